@@ -11,7 +11,7 @@ from pathlib import Path
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_file import ModelRow, held_out_loss, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import MEASURES, least_inputs, terms_from
+from rbfrag.fragility.measures import MEASURES, STATED, least_inputs, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
 from rbfrag.fragility.model import FragilityModel, Model
 
@@ -74,7 +74,8 @@ def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters
         kind: how the block is asked to fail, if the question says so.
     """
     described = {name for name in given if name not in MEASURES}
-    if kind is None and described <= {*TOPPLING_BLOCK.names, *TOPPLING_BLOCK.sigmas}:
+    toppling = kind is None or kind == TOPPLING_BLOCK.kind
+    if toppling and described <= {*TOPPLING_BLOCK.names, *TOPPLING_BLOCK.sigmas}:
         return TOPPLING_BLOCK  # without loading the methods
     blocks = dict.fromkeys((TOPPLING_BLOCK, *(method.block for method in methods())))
 
@@ -143,7 +144,8 @@ def find_model(
             raise InputError(
                 f"model {chosen.name!r} needs {' and '.join(chosen.term.inputs)} "
                 f"({chosen.term.title}); given is {_measures(given)}: give what it needs, or "
-                "choose a model of another term"
+                "choose a model of another term",
+                fields=STATED,
             )
     return chosen
 
@@ -182,7 +184,10 @@ def _suited_in(
     possible = terms_from(given)
     if not possible:
         enough = ", or ".join(" and ".join(inputs) for inputs in least_inputs())
-        raise InputError(f"{_measures(given)} is given: a prediction needs {enough}, or a motion")
+        raise InputError(
+            f"{_measures(given)} is given: a prediction needs {enough}, or a motion",
+            fields=STATED,
+        )
     block_of_question = block_of(given)
     kind = block_of_question.kind if kind is None else kind
     if not store.rows:
@@ -208,8 +213,8 @@ def _suited_in(
         of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
         raise (InputError if block.criterion is None else UnknownModelError)(
             f"no stored {kind} model{of} works with {_measures(given)}; stored are {have}: give "
-            "the measures that one of them needs, or fit another with  rbfrag fit --kind "
-            f"{kind} --term {' or '.join(possible)}"
+            f"the measures that one of them needs, or fit a model "
+            f"of {' or '.join(possible)}"
         )
     most = max(model.term.level for model in best.values())
     return sorted(
@@ -228,7 +233,7 @@ def _how_to_make(kind: str) -> str:
 
     stored = [name for name, model in sorted(KINDS.items()) if model.campaign]
     if kind in stored:
-        return f"make one with  rbfrag simulate --kind {kind}  and  rbfrag fit --kind {kind}"
+        return f"make one by rbfrag simulate and rbfrag fit, both of kind {kind}"
     return f"there are models of {', '.join(stored)}"
 
 
@@ -253,14 +258,16 @@ def _check_block(
     if others and len(missing) == len(block.names):
         who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
         raise InputError(
-            f"{who} reads {' and '.join(block.names)}, given is {' and '.join(others)}"
+            f"{who} reads {' and '.join(block.names)}, given is {' and '.join(others)}",
+            fields=(*block.names, *others),
         )
     if missing:
         raise InputError(
             f"{missing[0]} is missing: a block of kind {kind} is given by "
-            f"{' and '.join(block.names)}"
+            f"{' and '.join(block.names)}",
+            fields=block.names,
         )
-    raise InputError(f"{others[0]} does not go with kind {kind}: leave it out")
+    raise InputError(f"{others[0]} does not go with kind {kind}: leave it out", fields=(others[0],))
 
 
 def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | None) -> None:

@@ -7,32 +7,13 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.fragility.lookup import find_model, suited_models
-from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction import Prediction, answer_given
-from rbfrag.question.question import described
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rbfrag.fragility.prediction_motion import Polarity
     from rbfrag.motions.recognise import MotionLike
-
-
-def question_document(
-    given: Mapping[str, Any], *, kind: str | None = None, **options: Any
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return :func:`prediction_document` of one block by numbers or by shape, and what it read.
-
-    Args:
-        given: fields of block and shaking.
-        kind: how the block fails; None for what it is given by.
-        options: as for :func:`prediction_document`.
-    """
-    blocks = described(given, kind)
-    (group,) = blocks.groups
-    known = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
-    document = prediction_document(known, kind=group.kind, remarks=blocks.remarks, **options)
-    return document, known
 
 
 def prediction_document(

@@ -326,7 +326,9 @@ class AnsweringFields(TypedDict, total=False):
     level: Annotated[
         float,
         Field(
-            "Level of the interval of P, and of the range of one earthquake", above=0.0, below=1.0
+            "Level of the interval of P, and of the range of one earthquake; default: 0.95",
+            above=0.0,
+            below=1.0,
         ),
     ]
     db: Annotated[
@@ -443,7 +445,7 @@ def by_field(words: Mapping[str, Any]) -> dict[str, Any]:
         name = name_of(word)
         if name in given:
             raise InputError(
-                f"{word} does not go with {words_of[name]}: both are the {declared()[name].what}",
+                f"{word} does not go with {words_of[name]}: both say the same, {name}",
                 fields=(word, words_of[name]),
             )
         words_of[name] = word

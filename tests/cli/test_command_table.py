@@ -21,6 +21,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.refusals import CONFLICTS, NEEDS, refuse
 from rbfrag.cli.parameters.stack import stacked
 from rbfrag.errors import InputError
+from rbfrag.question.fields import BlockFields, Field, _by_word, declared, option_of
 
 COMMAND_FOLDER = Path(__file__).parents[2] / "rbfrag" / "cli" / "commands"
 MODULES = [import_module(f"rbfrag.cli.commands.{name}") for name in COMMANDS]
@@ -40,7 +41,9 @@ def test_the_table_names_every_module_and_its_first_line() -> None:
 
 def test_no_command_has_more_parameters_than_a_reader_can_hold() -> None:
     for module in MODULES:
-        for name, function in inspect.getmembers(module, inspect.isfunction):
+        for name, function in inspect.getmembers(module, callable):
+            if inspect.isclass(function):
+                continue
             whole = inspect.unwrap(function)
             if whole.__module__ == module.__name__:
                 assert len(inspect.signature(whole, follow_wrapped=True).parameters) <= (
@@ -98,6 +101,45 @@ def test_a_command_gets_the_object_and_the_shell_its_fields(
     )
     assert run(made, ["a"]).stdout == "a Pair(one=1.0, two=None) False\n"
     assert "--two" in run(made, ["--help"]).stdout
+
+
+def test_a_field_that_is_declared_is_an_option_wherever_fields_of_its_class_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    about = Field("Share of the base that rests on something", "%", least=0.0)
+    monkeypatch.setitem(BlockFields.__annotations__, "rest_percent", Annotated[float, about])
+    declared.cache_clear()
+    _by_word.cache_clear()
+    try:
+        for command in ("predict", "survival"):
+            text = CliRunner().invoke(app, [command, "--help"]).stdout
+            assert "--rest-percent <float>" in text
+            assert "Share of the base that rests on something" in text
+        result = CliRunner().invoke(app, ["predict", "--rest-percent", "x"])
+        assert "'x' cannot be used: give a number" in result.stderr
+    finally:
+        monkeypatch.undo()
+        declared.cache_clear()
+        _by_word.cache_clear()
+    assert "--rest-percent" not in CliRunner().invoke(app, ["predict", "--help"]).stdout
+
+
+def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> None:
+    made = typer.Typer(add_completion=False)
+
+    @made.command()
+    @stacked
+    def show(given: options.Block, measures: options.Measures) -> None:
+        """Show them."""
+        typer.echo(f"{given} {measures}")
+
+    run = CliRunner().invoke
+    assert run(made, ["--dip", "3", "--no-back", "--kind", "rocking", "--pga", "0.3"]).stdout == (
+        "{'beta_deg': 3.0, 'back_fracture': False, 'kind': 'rocking'} {'pga_g': 0.3}\n"
+    )
+    refused = run(made, ["--dip", "3", "--beta", "3"]).exception
+    assert isinstance(refused, InputError)
+    assert refused.spelled(option_of).startswith("--dip does not go with --beta")
 
 
 def test_the_table_refuses_by_what_is_given_and_known() -> None:

@@ -65,10 +65,13 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
         (
             ("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"),
-            "nothing about the shaking",
+            "nothing about the motion is given: a prediction needs --pgv, or --sa10",
         ),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
-        (("--kind", "slumping", "--kr", "0.1", *MOTION), "kind slumping reads ks and ps2"),
+        (
+            ("--kind", "slumping", "--kr", "0.1", *MOTION),
+            "kind slumping reads --ks and --ps2",
+        ),
         (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "ky does not go with kind toppling"),
         (
             ("--kind", "confined_toppling", "--p2", "3", "--kr", "1", *MOTION),

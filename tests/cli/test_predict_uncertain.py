@@ -36,7 +36,7 @@ def test_draws_of_a_table_are_one_block(shell: Shell) -> None:
     ("more", "words"),
     [
         (("--kr-sigma", "-1"), "kr_sigma = -1: give a standard deviation of 0 or more"),
-        (("--restitution-sigma", "0.1"), "restitution_sigma does not go with kind toppling"),
+        (("--restitution-sigma", "0.1"), "--restitution-sigma does not go with kind"),
         (("--block-draws", "draws.csv"), "--block-draws does not go with --p2"),
     ],
 )

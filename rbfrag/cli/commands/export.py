@@ -9,8 +9,9 @@ import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
-from rbfrag.cli.parameters.stack import command_group, option, stacked
+from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
+from rbfrag.question.fields import AnsweringFields
 
 if TYPE_CHECKING:
     from rbfrag.exchange.export import ExportAnswer
@@ -19,6 +20,8 @@ app = command_group(
     "Write fragility functions for other tools.",
     "Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml",
 )
+
+Answering = Annotated[Given, fields_of(AnsweringFields, without=("level",))]
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
 
@@ -30,27 +33,26 @@ class FunctionOptions(BlocksOptions):
     name: str = option("Identifier of the one block or of the rock mass.", "block")
     imt: str = option("Measure of the function: PGV, PGA, or SA at 0.3, 1, 2 or 3 s.", "PGV")
     levels: int = option("Number of levels of a function that is not lognormal.", 80)
-    model: options.Model = None
-    db: options.Db = None
 
-    def keywords(self, standing: FailureOptions) -> tuple[dict[str, Any], tuple[str, ...]]:
+    def keywords(self, given: Given, answering: Given) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        given = self.given_blocks(standing, one_kind=True)
-        of_many = given.is_class or given.rows is not None
+        several = self.given_blocks(given, one_kind=True)
+        of_many = several.is_class or several.rows is not None
         keywords = {
-            **({"blocks": given.question} if of_many else given.numbers),
-            "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
-            "model": self.model, "db": self.db, "kind": str(given.columns["kind"][0]),
+            **({"blocks": several.question} if of_many else several.numbers),
+            "one_class": several.is_class, "imt": self.imt, "name": self.name,
+            "levels": self.levels, "kind": str(several.columns["kind"][0]), **answering,
         }  # fmt: skip
-        return keywords, given.remarks
+        return keywords, several.remarks
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")
 @stacked
 def nrml(
     out: Out,
+    given: options.Block,
     blocks: FunctionOptions,
-    standing: FailureOptions,
+    answering: Answering,
     shares: str | None = option(
         "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
         "Example: 1,10,50.",
@@ -61,7 +63,7 @@ def nrml(
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.export import nrml as written
 
-    keywords, remarks = blocks.keywords(standing)
+    keywords, remarks = blocks.keywords(given, answering)
     wanted = None if shares is None else options.number_list(shares, "--shares")
     _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
@@ -71,7 +73,11 @@ def nrml(
 )
 @stacked
 def pelicun(
-    out: Out, blocks: FunctionOptions, standing: FailureOptions, json: options.Json = False
+    out: Out,
+    given: options.Block,
+    blocks: FunctionOptions,
+    answering: Answering,
+    json: options.Json = False,
 ) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv), and its description (.json).
 
@@ -80,7 +86,7 @@ def pelicun(
     """
     from rbfrag.exchange.export import pelicun as written
 
-    keywords, remarks = blocks.keywords(standing)
+    keywords, remarks = blocks.keywords(given, answering)
     _print(written(out, **keywords), remarks, json=json)
 
 

@@ -16,7 +16,7 @@ from rbfrag.cli.output import (
     write_table,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
+from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
@@ -80,8 +80,8 @@ def hazard(
         "logic tree.",
         metavar="CURVE...",
     ),
+    given: options.Block,
     blocks: BlocksOptions,
-    standing: FailureOptions,
     meaning: options.Curve,
     answering: options.Answering,
     wanted: RateOptions,
@@ -111,7 +111,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    table, is_class, remarks, rows = blocks.given_blocks(standing)
+    table, is_class, remarks, rows = blocks.given_blocks(given)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
@@ -131,8 +131,7 @@ def hazard(
             one.curves, **one.numbers, weights=wanted.weights,
             at_least=wanted.counts(len(one.names), most),
             convert=meaning.convert, convert_sigma=meaning.convert_sigma,
-            component=meaning.component, years=wanted.years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class,
+            component=meaning.component, years=wanted.years, one_class=is_class, **answering,
         )
         for one in sites
     ]  # fmt: skip

@@ -151,8 +151,7 @@ def losses(
             expected=sampling.expected, seed=sampling.seed,
             investigation_time=time.investigation_time, ses=time.ses,
             imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,
-            model=answering.model, level=answering.level, db=answering.db,
-            run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
+            **answering, run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)

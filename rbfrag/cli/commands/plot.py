@@ -9,7 +9,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, FailureOptions, NoBack, ShapeOptions
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 from rbfrag.errors import InputError
@@ -88,21 +88,18 @@ def plot_chart(
 def plot_curve(
     *,
     out: Out,
-    block: BlockOptions,
-    standing: FailureOptions,
+    given: options.Block,
     held: options.Measures,
     over: str | None = option(
         "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
         "--model reads first."
     ),
-    model: str | None = option("Name of the model. Default: the best for what is given."),
-    level: options.Level = 0.95,
+    answering: options.Answering,
     beside: str | None = option(
         "Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
         "pelicun table (.csv).",
         metavar="FILE",
     ),
-    db: options.Db = None,
 ) -> None:
     """Draw the fragility curve of one block over a measure of the shaking.
 
@@ -118,10 +115,9 @@ def plot_curve(
 
         return of_measure(beside, measure)
 
-    question: dict[str, Any] = {**block.fields(standing), **held.given()}
-    picture = plot.curve(
-        out=out, over=over, model=model, level=level, beside=others, db=db, **question
-    )
+    question: dict[str, Any] = {**given, **held, **answering}
+    with given.named():
+        picture = plot.curve(out=out, over=over, beside=others, **question)
     print_warnings(picture.warnings)
     print(out)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from rbfrag.cli.output import (
     check_files,
@@ -14,48 +14,15 @@ from rbfrag.cli.output import (
     show_prediction,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.block import numbers_of
+from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import answer_in_short, table_in_words
-from rbfrag.errors import InputError
-from rbfrag.question.fields import option_of
+from rbfrag.question.fields import BlockFields, RequestFields, WholeFields
 
 SHOWN = 40
 """So many rows of a table are printed."""
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Failure:
-    """How a block fails, and the numbers of one that does not topple."""
-
-    kind: str | None = option(
-        "How the block fails: toppling (backed by a slope), rocking (free-standing), slumping or "
-        "sliding. Default: what the block is given by, --p2 (toppling), --ks or --ky."
-    )
-    restitution: float | None = option(
-        "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
-        "angular momentum leaves."
-    )
-    ky: float | None = option(
-        "Sliding: yield acceleration coefficient tan(phi - beta), with --beta."
-    )
-    displacement: float | None = option("Sliding: the displacement that is too far [m].")
-    ks: float | None = option("Slumping: yield acceleration coefficient k_s, with --ps2.")
-    ps2: float | None = option("Slumping: frequency parameter p_s² at rest [1/s²].")
-    rotation: float | None = option(
-        "Slumping: rotation that counts as failure [deg]; there must be a model of it. "
-        "Default: failure past recovery."
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Uncertainty(UncertaintyOptions):
-    """How well a block is known that fails in any way."""
-
-    ks_sigma: float | None = option("Standard deviation of ln k_s.")
-    ps2_sigma: float | None = option("Standard deviation of ln p_s².")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,14 +61,14 @@ class Table:
 
 @stacked
 def predict(
-    block: BlockOptions,
-    failure: Failure,
-    known: Uncertainty,
+    *,
+    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
     measures: options.Measures,
+    request: Annotated[Given, fields_of(RequestFields)],
+    block_draws: options.BlockDraws = None,
     record: Record,
     reading: options.Reading,
     table: Table,
-    answering: options.Answering,
     printing: options.Printing,
 ) -> None:
     """Print the probability that a block fails.
@@ -120,79 +87,37 @@ def predict(
     A block of which --kr-sigma and the like are given is uncertain: P is the mean over all that it
     may be, and block_sd how much P differs among them.
     """
-    numbers = {
-        "p2": block.p2, "kr": block.kr, "ky": failure.ky, "displacement_m": failure.displacement,
-        "ks": failure.ks, "ps2": failure.ps2, "restitution": failure.restitution,
-    }  # fmt: skip
-    given: dict[str, Any] = {name: value for name, value in numbers.items() if value is not None}
-    given |= {**known.sigmas(), **measures.given()}
-    question: dict[str, Any] = {
-        "rotation_deg": failure.rotation, "model": answering.model, "level": answering.level,
-        "db": answering.db,
-    }  # fmt: skip
     if table.blocks is not None:
         from rbfrag.exchange.table_answers import predict_table
 
         check_files(table=table.out, excel_text=table.excel_text)
-        if block.beta is not None:
-            given["beta_deg"] = block.beta
+        for_all = {**given, **measures}
+        kind = for_all.pop("kind", None)
         summary = predict_table(
-            table.blocks, table.out, given=given, kind=failure.kind, sheet=table.sheet,
-            excel_text=table.excel_text, **question,
+            table.blocks, table.out, given=for_all, kind=kind,
+            sheet=table.sheet, excel_text=table.excel_text, **request,
         )  # fmt: skip
         _show_table(summary, json=printing.json)
         return
-    if record.motion is None and not measures.given():
-        raise InputError(
-            "nothing about the shaking is given: state what is known of it, --pgv [m/s], --pga "
-            "[g], --tm [s], --sa10 [g] …, or  --motion FILE"
-        )
     from rbfrag.question.document import prediction_document
 
-    kind = failure.kind
-    remarks: tuple[str, ...] = ()
-    if known.block_draws is not None:
+    question: dict[str, Any] = {**request}
+    if block_draws is not None:
         from rbfrag.exchange.block_draws import read_draws
 
-        draws, question["weights"] = read_draws(known.block_draws)
-        given = {**draws, **given}
+        draws, question["weights"] = read_draws(block_draws)
+        numbers = {**draws, **given}
+        kind = numbers.pop("kind", None)
     else:
-        kind, given, remarks = _completed(given, block, kind)
+        kind, numbers, question["remarks"] = numbers_of(given)
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 
-        question["motion"] = find_motion(record.motion, db=answering.db, reading=reading)
+        question["motion"] = find_motion(record.motion, db=request.get("db"), reading=reading)
         question["polarity"] = record.polarity
-    document = prediction_document(given, kind=kind, remarks=remarks, **question)
-    show_prediction(document, given, json=printing.json, verbose=printing.verbose)
-
-
-def _completed(
-    given: dict[str, Any], block: BlockOptions, kind: str | None
-) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
-    """Return the kind, block and measures as answers read them, and warnings about the block."""
-    from rbfrag.fragility.lookup import block_of
-    from rbfrag.fragility.measures import MEASURES
-
-    shape = block.described()
-    if shape is not None:
-        from rbfrag.question.blocks import described_block
-
-        others = {name: value for name, value in given.items() if name not in MEASURES}
-        measures = {name: value for name, value in given.items() if name in MEASURES}
-        blocks = described_block(shape, others, kind)
-        (group,) = blocks.groups
-        return group.kind, {**group.numbers, **measures}, blocks.remarks
-    if block.beta is not None:
-        given["beta_deg"] = block.beta
-    known_by = block_of(given, kind)
-    missing = [name for name in known_by.names if name not in given]
-    if missing and kind in (None, known_by.kind):
-        raise InputError(
-            f"{option_of(missing[0])} is missing: a block of kind {known_by.kind} is given by "
-            f"{' and '.join(map(option_of, known_by.names))}, or by {WAYS}"
-        )
-    return kind, given, ()
+    known = {**numbers, **measures}
+    document = prediction_document(known, kind=kind, **question)
+    show_prediction(document, known, json=printing.json, verbose=printing.verbose)
 
 
 def _show_table(summary: dict[str, Any], *, json: bool) -> None:

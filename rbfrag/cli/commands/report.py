@@ -57,13 +57,12 @@ def report(
     numbers = {"p2": block.p2, "kr": block.kr, "restitution": standing.restitution}
     given = {name: value for name, value in numbers.items() if value is not None}
     contents = write_report(
-        out, block.described(), {**given, **measures.given()}, kind=standing.kind,
+        out, block.described(), {**given, **measures}, kind=standing.kind,
         rate=RateQuestion(
             rate.hazard, meaning.imt, meaning.site, meaning.component, meaning.convert,
             meaning.convert_sigma, rate.years,
         ),
-        title=heading.title or TITLE, date=heading.date, model=answering.model,
-        level=answering.level, db=answering.db,
+        title=heading.title or TITLE, date=heading.date, **answering,
     )  # fmt: skip
     if json:
         rates = None if contents.rate is None else contents.rate.document

@@ -144,18 +144,18 @@ def rockmass(
     about: list[str] = []
     if shaken.motion is not None:
         ground, upward, about = find_shaking(
-            shaken.motion, shaken, db=answering.db, reading=reading
+            shaken.motion, shaken, db=answering.get("db"), reading=reading
         )
         say_when_compiling()
-    stated: dict[str, Any] = measures.given()
+    stated: dict[str, Any] = {**measures}
     spectrum = {period: stated.pop(name) for period, name in SPECTRAL.items() if name in stated}
     with ProgressBar("rockmass", "blocks") as bar:
         answer = answered(
             file, n=drawn.n, seed=drawn.seed, **stated, sa_g=spectrum or None, motion=ground,
             vertical=upward, polarity=shaken.polarity,
             scales=options.number_list("1" if shaken.scales is None else shaken.scales, "--scales"),
-            displacement_m=limits.displacement, rotation_deg=limits.rotation,
-            model=answering.model, level=answering.level, db=answering.db, jobs=shaken.jobs,
+            displacement_m=limits.displacement, rotation_deg=limits.rotation, jobs=shaken.jobs,
+            **answering,
             on_progress=lambda progress: bar.show(progress.done, progress.total),
         )  # fmt: skip
     document = answer.as_dict()

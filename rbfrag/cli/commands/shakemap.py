@@ -8,7 +8,7 @@ from typing import Any
 from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
+from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 
 EXAMPLE = (
@@ -57,8 +57,8 @@ def shakemap(
         "File to write: .geojson, .csv, .xlsx (extra excel), .parquet or .gpkg (extra gis).", ...
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
+    given: options.Block,
     blocks: BlocksOptions,
-    standing: FailureOptions,
     meaning: MapOptions,
     drawing: DrawOptions,
     answering: options.Answering,
@@ -80,13 +80,13 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    given = blocks.given_blocks(standing, n=n, reads=(*PLACE, "weight"), one_kind=True)
+    several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight"), one_kind=True)
     answer = answered(
-        grid, blocks=given.question, uncertainty=meaning.uncertainty,
+        grid, blocks=several.question, uncertainty=meaning.uncertainty,
         component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
-        seed=drawing.seed, model=answering.model, level=answering.level, db=answering.db,
+        seed=drawing.seed, **answering,
     )  # fmt: skip
-    warnings = [*given.remarks, *answer.warnings]
+    warnings = [*several.remarks, *answer.warnings]
     about = {**answer.about, "warnings": warnings}
     _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:
@@ -97,7 +97,7 @@ def shakemap(
     if printing.json:
         print_json(document)
         return
-    for sentence in map_in_words(document, own="lon" in given.columns):
+    for sentence in map_in_words(document, own="lon" in several.columns):
         print(sentence)
     print()
     del document["warnings"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rbfrag.cli.hazard_sentences import survival_in_words
 from rbfrag.cli.output import (
@@ -16,9 +16,10 @@ from rbfrag.cli.output import (
     print_warnings,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import FailureOptions, TableOptions
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.block import TableOptions
+from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.cli.sentences import rounded
+from rbfrag.question.fields import BlockFields, WholeFields
 
 if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer
@@ -46,19 +47,6 @@ class Uncertainty:
         "How long the blocks have stood in this position [years], the mean.", default=...
     )
     age_sd: float = option("Standard deviation of the age [years]; the age is lognormal.", 0.0)
-    p2_sigma: float = option(
-        "Standard deviation of ln p² of each block; a column p2_sigma of a table goes before.", 0.0
-    )
-    kr_sigma: float = option(
-        "Standard deviation of ln k_r of each block; a column kr_sigma of a table goes before.",
-        0.0,
-    )
-    restitution_sigma: float = option("Rocking: standard deviation of the restitution.", 0.0)
-
-    def sigmas(self) -> dict[str, float]:
-        """Return the standard deviations of all blocks, by field."""
-        return {name: value for name, value in vars(self).items() if name.endswith("_sigma")}
-
     draws: int = option("Number of draws where several uncertain blocks are given.", 128)
     seed: int = option("Seed of these draws.", 0)
 
@@ -71,8 +59,8 @@ def survival(
         "USGS NSHM JSON, or CSV of two columns whose header names their units.",
         metavar="CURVE...",
     ),
+    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
     blocks: TableOptions,
-    standing: FailureOptions,
     known: Uncertainty,
     meaning: options.Curve,
     answering: options.Answering,
@@ -96,17 +84,16 @@ def survival(
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    given = blocks.given_blocks(standing)
-    numbers, remarks, rows = given.numbers, given.remarks, given.rows
+    several = blocks.given_blocks(given)
+    remarks, rows = several.remarks, several.rows
     if rows is not None:
         rows.whole(ALL_STAND)
         remarks += rows.remarks
     read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
         read, age_years=known.age, age_sd_years=known.age_sd, weights=weights,
-        **{**known.sigmas(), **numbers}, convert=meaning.convert,
-        convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
-        level=answering.level, draws=known.draws, seed=known.seed, db=answering.db,
+        **several.numbers, convert=meaning.convert, convert_sigma=meaning.convert_sigma,
+        component=meaning.component, draws=known.draws, seed=known.seed, **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
     if plot is not None:

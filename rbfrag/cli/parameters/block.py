@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rbfrag.cli.parameters.options import EXCEL_TEXT, SHEET
-from rbfrag.cli.parameters.stack import option
+from rbfrag.cli.parameters.stack import Given, option
 from rbfrag.errors import InputError
 from rbfrag.question.fields import column_of, name_of, option_of
 from rbfrag.solver.described import DescribedBlock, describe
@@ -138,15 +138,6 @@ class UncertaintyOptions:
 class BlockOptions(ShapeOptions, NumberOptions):
     """A block by numbers or by its shape."""
 
-    def fields(self, standing: StandingOptions) -> dict[str, Any]:
-        """Return what is stated of the block, by field."""
-        described = self.described()
-        planes: dict[str, Any] = {"beta_deg": self.beta}
-        if described is not None:
-            planes = {"block": described.block, **described.conditions}
-        numbers = {"p2": self.p2, "kr": self.kr, "kind": standing.kind, **standing.stated, **planes}
-        return {name: value for name, value in numbers.items() if value is not None}
-
     def toppling(
         self, kind: str | None = None
     ) -> tuple[str | None, dict[str, float], tuple[str, ...]]:
@@ -194,22 +185,8 @@ class StandingOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FailureOptions(StandingOptions):
-    """How blocks fail, and the numbers of those that do not topple."""
-
-    kind: str | None = option(
-        "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping or "
-        "sliding. Default: what they are given by."
-    )
-    ky: _Number = option("Sliding: yield acceleration coefficient tan(phi - beta), with --beta.")
-    displacement: _Number = option("Sliding: the displacement that is too far [m].")
-    ks: _Number = option("Slumping: yield acceleration coefficient k_s, with --ps2.")
-    ps2: _Number = option("Slumping: frequency parameter p_s² at rest [1/s²].")
-
-
-@dataclass(frozen=True, kw_only=True)
-class TableOptions(BlockOptions):
-    """One block, or a table of them."""
+class TableOptions:
+    """A table of blocks in the place of one."""
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
@@ -221,76 +198,41 @@ class TableOptions(BlockOptions):
 
     def given_blocks(
         self,
-        standing: StandingOptions | None = None,
+        given: Given,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
         one_kind: bool = False,
-        only: Collection[str] = (),
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
         Args:
-            standing: how they stand and fail; None for what they are given by.
+            given: what they say of one block, or of all rows of a table.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
-            only: numbers that the command reads of a block; () for those of every kind.
         """
         from rbfrag.exchange.block_rows import read_blocks
-        from rbfrag.question.blocks import refuse_foreign
 
-        standing = standing or StandingOptions()
-        kind, stated = standing.kind, standing.stated
+        kind = given.get("kind")
+        stated = {field: value for field, value in given.items() if field != "kind"}
         if self.blocks is not None:
             table: Any = self.blocks
             rows = read_blocks(
-                table, kind, reads=reads, one_kind=one_kind, only=only, for_all=stated,
-                sheet=self.sheet,
-            )  # fmt: skip
-            return GivenBlocks(rows.blocks, False, (), rows)
-        described = self.described()
-        remarks: tuple[str, ...] = ()
-        numbers: dict[str, Any] = {"p2": self.p2, "kr": self.kr, **stated}
-        if described is None and self.beta is not None:
-            numbers["beta_deg"] = self.beta
-        numbers = {field: value for field, value in numbers.items() if value is not None}
-        if described is not None:
-            from rbfrag.question.blocks import described_block
-
-            blocks = described_block(described, numbers, kind)
-            (group,) = blocks.groups
-            kind, numbers, remarks = group.kind, {**group.numbers}, blocks.remarks
-        else:
-            self._refuse_part(numbers, kind)
-        if absent := [each for each in only if each not in numbers]:
-            raise InputError(
-                f"a block of kind {kind} has no {absent[0]}: this command answers for blocks that "
-                "topple or rock; predict answers for others"
+                table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet
             )
-        refuse_foreign(numbers, kind)
+            return GivenBlocks(rows.blocks, False, (), rows)
+        kind, numbers, remarks = numbers_of(given)
         columns = {column_of(field): [value] for field, value in numbers.items()}
         names = {} if name is None else {"block_id": [name]}
         read = read_blocks({**columns, **names}, kind, one_kind=True).whole()
         own = {column: values for column, values in read.items() if column not in ("row", "line")}
         return GivenBlocks({**own, "block_id": [name]}, False, remarks)
 
-    def _refuse_part(self, numbers: Collection[str], kind: str | None) -> None:
-        """Refuse a block of which a number is missing."""
-        from rbfrag.question.blocks import missing_number
-
-        missing = missing_number(numbers, kind)
-        if missing is not None:
-            field, names = missing
-            raise InputError(
-                f"{option_of(field)} is missing: a block is given by "
-                f"{' and '.join(map(option_of, names))}, or by {WAYS}"
-            )
-
 
 @dataclass(frozen=True, kw_only=True)
 class BlocksOptions(TableOptions):
-    """One block, or many."""
+    """A table of blocks or a rock mass in the place of one block."""
 
     rockmass: str | None = option(
         "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
@@ -298,36 +240,72 @@ class BlocksOptions(TableOptions):
 
     def given_blocks(
         self,
-        standing: StandingOptions | None = None,
+        given: Given,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
         one_kind: bool = False,
-        only: Collection[str] = (),
         n: int | None = None,
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
         Args:
-            standing: how they stand and fail; None for what they are given by.
+            given: what they say of one block, or of all rows of a table.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
-            only: numbers that the command reads of a block; () for those of every kind.
             n: number of realisations of the rock mass; None for what its file says.
         """
         if self.rockmass is None:
-            return super().given_blocks(
-                standing, name=name, reads=reads, one_kind=one_kind, only=only
-            )
+            return super().given_blocks(given, name=name, reads=reads, one_kind=one_kind)
         from rbfrag.fragility.methods import TOPPLING_BLOCK
 
-        if standing is not None and standing.kind not in (None, TOPPLING_BLOCK.kind):
+        if given.get("kind") not in (None, TOPPLING_BLOCK.kind):
             raise InputError(
-                f"--rockmass does not go with --kind {standing.kind}: its blocks are backed by the "
+                f"--rockmass does not go with --kind {given['kind']}: its blocks are backed by the "
                 "rock behind them, and those that topple are answered for"
             )
         return _of_rock_mass(self.rockmass, n)
+
+
+def numbers_of(
+    given: Given, *, topples: bool = False
+) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
+    """Return the kind of the one block that options describe, its numbers, and warnings.
+
+    Args:
+        given: what they say, by field.
+        topples: whether a shape of no stated kind is to topple, or to rock where nothing backs it.
+
+    Raises:
+        InputError: it is described twice or in part, or is of another kind.
+    """
+    from rbfrag.question.blocks import has_shape, missing_number, one_block, refuse_foreign
+    from rbfrag.solver.kinds import kind_of_mode
+
+    stated = {field: value for field, value in given.items() if field != "kind"}
+    kind = given.get("kind")
+    if topples and kind is None and has_shape(stated):
+        kind = kind_of_mode("topple", back_fracture=stated.get("back_fracture", True)).kind
+    with given.named():
+        blocks = one_block(stated, kind)
+    (group,) = blocks.groups
+    if lacking := missing_number(group.numbers, group.kind):
+        missing, names = lacking
+        of_kind = f" of kind {group.kind}" if group.kind else ""
+        raise InputError(
+            f"{missing} is missing: a block{of_kind} is given by {' and '.join(names)}, or by its "
+            "shape, such as height_m and width_m",
+            fields=(*names, "height_m", "width_m"),
+        )
+    refuse_foreign(group.numbers, group.kind)
+    if topples and "p2" not in group.numbers:
+        raise InputError(
+            f"p2 is no number of a block that is given by {' and '.join(group.numbers)}: this "
+            "command answers for blocks that topple or rock; predict answers for others",
+            fields=("p2", *group.numbers),
+        )
+    return group.kind, {**group.numbers}, blocks.remarks
 
 
 class GivenBlocks(NamedTuple):

@@ -7,9 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from rbfrag.cli.parameters.completion import model_names, motion_ids
-from rbfrag.cli.parameters.stack import option
+from rbfrag.cli.parameters.completion import motion_ids
+from rbfrag.cli.parameters.stack import Given, fields_of, option
 from rbfrag.errors import InputError
+from rbfrag.question.fields import (
+    AnsweringFields,
+    FailureFields,
+    NumberFields,
+    PlaneFields,
+    ShakingFields,
+    ShapeFields,
+    WholeFields,
+    declared,
+    option_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,13 +39,7 @@ Json = Annotated[
 ]
 
 Db = Annotated[
-    str | None,
-    typer.Option(
-        "--db",
-        metavar="URL",
-        help="Database: a path or an SQLAlchemy URL. Default: RBFRAG_DB, else rbfrag.db in the "
-        "current folder.",
-    ),
+    str | None, typer.Option("--db", metavar="URL", help=declared()["db"].sentence(option_of))
 ]
 
 Motion = Annotated[
@@ -72,29 +77,25 @@ AllowPartial = Annotated[
 
 Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
 
-Pga = Annotated[float | None, typer.Option("--pga", help="Peak ground acceleration [g].")]
+Block = Annotated[
+    Given, fields_of(NumberFields, FailureFields, ShapeFields, PlaneFields, WholeFields)
+]
+"""One block of which all is known that is stated, by field."""
 
-Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].")]
+Measures = Annotated[Given, fields_of(ShakingFields)]
+"""What may be known of a motion, by field."""
 
-_SA = "Spectral acceleration at {} s, 5 % damping [g]."
-Sa03 = Annotated[float | None, typer.Option("--sa03", help=_SA.format("0.3"))]
-Sa10 = Annotated[float | None, typer.Option("--sa10", help=_SA.format("1"))]
-Sa20 = Annotated[float | None, typer.Option("--sa20", help=_SA.format("2"))]
-Sa30 = Annotated[float | None, typer.Option("--sa30", help=_SA.format("3"))]
+Answering = Annotated[Given, fields_of(AnsweringFields)]
+"""Which fragility model answers, and how wide its interval is, by field."""
 
-Model = Annotated[
+BlockDraws = Annotated[
     str | None,
     typer.Option(
-        "--model",
-        autocompletion=model_names,
-        help="Name of a stored model. Default: the database's default if the given "
-        "measures suffice for it, else the best that they suffice for.",
+        "--block-draws",
+        metavar="FILE",
+        help="Table of what the one block may be (.csv, .xlsx, .parquet), a row each, with the "
+        "columns of a block table and weight if they weigh differently.",
     ),
-]
-
-Level = Annotated[
-    float,
-    typer.Option("--level", help="Level of the interval of P, and of the range of one earthquake."),
 ]
 
 Jobs = Annotated[
@@ -136,37 +137,6 @@ class Direction:
     def polarity(self) -> Literal["forward", "reverse"]:
         """The polarity of the motion."""
         return "reverse" if self.reverse else "forward"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Measures:
-    """What may be known of a motion."""
-
-    pgv: float | None = option("Peak ground velocity [m/s].")
-    pga: Pga = None
-    tm: Tm = None
-    pgd: float | None = option("Peak ground displacement [m].")
-    sa03: Sa03 = None
-    sa10: Sa10 = None
-    sa20: Sa20 = None
-    sa30: Sa30 = None
-
-    def given(self) -> dict[str, float]:
-        """Return those that were given, by name."""
-        values = {
-            "pgv_m_s": self.pgv, "sa03_g": self.sa03, "sa10_g": self.sa10, "sa20_g": self.sa20,
-            "sa30_g": self.sa30, "pga_g": self.pga, "tm_s": self.tm, "pgd_m": self.pgd,
-        }  # fmt: skip
-        return {name: value for name, value in values.items() if value is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Answering:
-    """Which fragility model answers, and how wide its interval is."""
-
-    model: Model = None
-    level: Level = 0.95
-    db: Db = None
 
 
 @dataclass(frozen=True, kw_only=True)

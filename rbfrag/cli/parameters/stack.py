@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, Field, field, fields, is_dataclass
-from functools import partial, wraps
-from typing import Annotated, Any, get_type_hints
+from functools import partial, update_wrapper
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
+from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.refusals import refuse
+from rbfrag.errors import InputError
+from rbfrag.question.fields import (
+    OTHER_WORDS,
+    by_field,
+    declared,
+    names_of,
+    option_of,
+    word_of,
+)
 
 
 def option(
@@ -49,41 +60,143 @@ def command_group(help: str, epilog: str) -> typer.Typer:
     )
 
 
-def stacked(command: Callable[..., None]) -> Callable[..., None]:
-    """Make each field of the dataclasses among a command's parameters an option of its own.
+class Given(dict[str, Any]):
+    """What options say, by field.
 
-    The command line sees the fields; the command gets the objects. Options that do not go
-    together are refused before the command runs (:mod:`rbfrag.cli.parameters.refusals`).
+    Attributes:
+        file: the file that describes the block; None for none.
     """
-    hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, tuple[type[Any], list[str]]] = {}
-    flat: list[inspect.Parameter] = []
-    for name, parameter in inspect.signature(command).parameters.items():
-        if not is_dataclass(hints[name]):
-            flat.append(_parameter(name, hints[name], parameter.default))
-            continue
-        kind: Any = hints[name]
-        types = get_type_hints(kind, include_extras=True)
-        options = [_parameter(each.name, types[each.name], each) for each in fields(kind)]
-        groups[name] = kind, [each.name for each in options]
-        flat += options
-    defaults = {each.name: each.default for each in flat}
-    words = {each.name: word for each in flat if (word := _word(each))}
-    known = frozenset(words.values())
 
-    @wraps(command)
-    def run(**values: Any) -> None:
-        given = [word for name, word in words.items() if values[name] != defaults[name]]
-        refuse(command.__name__, given, known)
+    file: str | None = None
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Let what is wrong with the block name its file."""
+        try:
+            yield
+        except InputError as error:
+            if self.file is None or str(error).startswith(self.file):
+                raise
+            raise InputError(f"{self.file}: {error}", fields=error.fields) from None
+
+
+class FieldOptions(NamedTuple):
+    """Fields of a question, each of which is an option of a command.
+
+    Args:
+        classes: what declares them.
+        without: those of them that the command does not take.
+    """
+
+    classes: tuple[Any, ...]
+    without: tuple[str, ...] = ()
+
+    def options(self) -> Iterator[inspect.Parameter]:
+        """Yield the options, as typer reads them."""
+        for name in names_of(*self.classes):
+            if name in self.without:
+                continue
+            about = declared()[name]
+            if name == "block":
+                for word, help in FILES.items():
+                    yield _parameter(word, str | None, option(help, metavar="FILE"))
+                continue
+            help, further = about.sentence(option_of), FURTHER.get(name, {})
+            own = option(help, False if about.is_flag else None, **further)
+            kind = bool if about.is_flag else str | None if about.is_text else float | None
+            yield _parameter(word_of(name), kind, own)
+            for word, other in OTHER_WORDS.items():
+                if other == name:
+                    yield _parameter(word, kind, option(f"Another word for {option_of(name)}."))
+
+    def read(self, words: Mapping[str, Any]) -> Given:
+        """Return what was given, by field; of a block file what no option states anew."""
+        files = [words[word] for word in FILES if words.get(word) is not None]
+        given = Given(by_field({name: words[name] for name in words if name not in FILES}))
+        if files:
+            from rbfrag.solver.block.file import read_block
+
+            (given.file,) = files
+            read = read_block(given.file, gamma_deg=given.pop("gamma_deg", None))
+            given |= {"block": read.block, **read.conditions, **given}
+        return given
+
+
+FILES = {
+    "block": "Block file (.toml or .csv); what it states about the planes may be given anew by "
+    "options.",
+    "polygon": "File with the outline of a block (.csv or .toml), read as --block is.",
+}
+"""Options that name the file of a block, with their help."""
+
+FURTHER: dict[str, dict[str, Any]] = {
+    "model": {"autocompletion": model_names},
+    "db": {"metavar": "URL"},
+}
+"""What typer is told of fields beside their help."""
+
+
+def fields_of(*classes: Any, without: tuple[str, ...] = ()) -> FieldOptions:
+    """Return the options of the fields that classes declare, for `Annotated[Given, …]`."""
+    return FieldOptions(classes, without)
+
+
+class Stacked:
+    """A command whose parameters are objects, each of which stands for several options.
+
+    The command line sees the options, made when it asks for them; the command gets the objects:
+    dataclasses of options, and what was given by field. Options that do not go together are refused
+    before the command runs (:mod:`rbfrag.cli.parameters.refusals`).
+    """
+
+    def __init__(self, command: Callable[..., None]) -> None:
+        update_wrapper(self, command, ("__module__", "__name__", "__qualname__", "__doc__"))
+        self.__annotations__: dict[str, Any] = {}  # typer reads those of the signature
+        self._command = command
+        self._objects: dict[str, tuple[Callable[..., Any], list[str]]] = {}
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        """The options, as typer reads them."""
+        hints = get_type_hints(self._command, include_extras=True)
+        flat: list[inspect.Parameter] = []
+        for name, parameter in inspect.signature(self._command).parameters.items():
+            hint = hints[name]
+            of_fields = [e for e in getattr(hint, "__metadata__", ()) if type(e) is FieldOptions]
+            if of_fields:
+                options = [*of_fields[0].options()]
+                make: Callable[..., Any] = of_fields[0].read
+            elif is_dataclass(hint):
+                types = get_type_hints(hint, include_extras=True)
+                options = [_parameter(each.name, types[each.name], each) for each in fields(hint)]
+                make = partial(_whole, hint)
+            else:
+                flat.append(_parameter(name, hint, parameter.default))
+                continue
+            self._objects[name] = make, [each.name for each in options]
+            flat += options
+        return inspect.Signature(flat)
+
+    def __call__(self, **values: Any) -> None:
+        """Run the command with the values of its options."""
+        options = self.__signature__.parameters
+        words = {name: word for name in options if (word := _word(options[name]))}
+        given = [word for name, word in words.items() if values[name] != options[name].default]
+        refuse(self._command.__name__, given, frozenset(words.values()))
         whole = {
-            name: kind(**{option: values.pop(option) for option in options})
-            for name, (kind, options) in groups.items()
+            name: make({option: values.pop(option) for option in own})
+            for name, (make, own) in self._objects.items()
         }
-        command(**values, **whole)
+        self._command(**values, **whole)
 
-    run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
-    run.__annotations__ = {each.name: each.annotation for each in flat}
-    return run
+
+def stacked(command: Callable[..., None]) -> Callable[..., None]:
+    """Make a command of a function with objects of options; see :class:`Stacked`."""
+    return Stacked(command)
+
+
+def _whole(kind: Any, values: Mapping[str, Any]) -> Any:
+    return kind(**values)
 
 
 def _parameter(name: str, annotation: Any, declared: Any) -> inspect.Parameter:
