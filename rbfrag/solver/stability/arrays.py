@@ -36,8 +36,6 @@ from rbfrag.solver.stability.modes import (
     STATES,
     TOPPLE,
     Planes,
-    mode_code,
-    mode_code_without_back,
     state_code,
 )
 
@@ -210,25 +208,16 @@ def _yields(
     t1: FloatArray, t3: FloatArray, planes: Planes[Any], back_fracture: bool
 ) -> tuple[NDArray[Any], FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return modes, their yields, those of sliding, and where a bond lets the toe lift."""
-    cot, ky, limit = cot_gamma(t1, t3), planes.ky, planes.limit
+    cot, ky = cot_gamma(t1, t3), planes.ky
     k, lifts = np.array(np.broadcast_to(ky, t1.shape)), np.zeros(t1.shape, dtype=np.bool_)
-    if back_fracture:
-        mode = mode_code(t1, t3, limit, cot < 0.0, planes.functions)
-    else:
-        mode = mode_code_without_back(t1, t3, limit, planes.tan_beta, planes.functions)
+    mode = planes.mode(t1, t3, cot < 0.0, back_fracture=back_fracture)
     for code in (TOPPLE, SLUMP, CONFINED_TOPPLE):
         here = np.flatnonzero(mode == code)
-        if not here.size:
-            continue
-        own = _at(planes, here)
-        a1, a3, cot_here = t1[here], t3[here], cot[here]
-        # contacts in units of half the S1, as `Block.arms` has them
-        if code == TOPPLE:
-            k[here] = own.coefficient(a3, 1.0)
-        elif code == SLUMP:
-            k[here], _ = own.slump(a1, -1.0, -a3, 1.0, cot_here)
-        else:
-            k[here], lifts[here] = own.confined_topple(a3, -1.0, a1, -1.0, cot_here)
+        if here.size:
+            a1, a3 = t1[here], t3[here]
+            # in units of half the S1, as `Block.arms` has them
+            arms = (a1, -1.0), (-a3, 1.0), (a3, -1.0), (a1, -1.0)
+            k[here], _, lifts[here] = _at(planes, here).yield_of(code, arms, cot[here])
     if not back_fracture:
         # the weight passes upslope of the heel, and nothing stands there to lean on
         k[planes.tan_beta < t1] = -math.inf

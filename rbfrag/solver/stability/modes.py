@@ -258,6 +258,10 @@ def toe_lifts(
     return ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
 
 
+Arms = tuple[tuple[N, Any], tuple[N, Any], tuple[N, Any], tuple[N, Any]]
+"""Contacts from the centroid, along the base and normal to it."""
+
+
 @dataclass(frozen=True)
 class Planes(Generic[N]):
     """What the yield of a mechanism depends on besides its contacts.
@@ -337,6 +341,33 @@ class Planes(Generic[N]):
             k, r_base, cosine, pull, self.tan_beta, self.weight, self.bond, self.functions
         )
         return k, lifts & (self.bond > 0.0) & (abs(k) < math.inf)
+
+    def mode(self, tan_alpha1: N, tan_alpha3: N, confined: object, *, back_fracture: bool) -> N:
+        """Return the code of the mode of a block; arguments as for :func:`mode_code`."""
+        if back_fracture:
+            return mode_code(tan_alpha1, tan_alpha3, self.limit, confined, self.functions)
+        return mode_code_without_back(
+            tan_alpha1, tan_alpha3, self.limit, self.tan_beta, self.functions
+        )
+
+    def yield_of(self, code: int, arms: Arms[N], cot: N) -> tuple[N, Any, Any]:
+        """Return the yield in a mode, where its back contact cannot hold, and where its toe lifts.
+
+        Args:
+            code: the mode.
+            arms: contacts from the centroid: heel, back, toe and the lowest point on the back
+                plane, in any unit.
+            cot: cot γ.
+        """
+        heel, back, (toe_x, toe_y), lowest = arms
+        if code == SLUMP:
+            k, untenable = self.slump(*heel, *back, cot)
+            return k, untenable, False
+        if code == CONFINED_TOPPLE:
+            k, lifts = self.confined_topple(toe_x, toe_y, *lowest, cot)
+            return k, False, lifts
+        # (3.16): δ* = α3
+        return (self.coefficient(toe_x / -toe_y, 1.0) if code == TOPPLE else self.ky), False, False
 
 
 def words_of_mode(mode: str) -> str:

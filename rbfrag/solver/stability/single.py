@@ -29,16 +29,11 @@ from rbfrag.solver.stability.margins import (
     warnings_about,
 )
 from rbfrag.solver.stability.modes import (
-    CONFINED_TOPPLE,
     MODES,
-    SLUMP,
     STATES,
-    TOPPLE,
     ModeName,
     Planes,
     StateName,
-    mode_code,
-    mode_code_without_back,
     state_code,
     yield_coefficient,
 )
@@ -137,75 +132,72 @@ def stability(
     Raises:
         InputError: a value outside its range; the message names the range.
     """
+    finding, planes = judged(
+        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, kv=kv,
+        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3,
+    )  # fmt: skip
+    beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
+    around = Surroundings(
+        beta_deg=beta_deg,
+        phi_deg=finding.phi_deg,
+        limit_deg=degrees_of(planes.limit) if bond else finding.phi_deg,
+        back_fracture=back_fracture,
+        phi_for=partial(
+            _friction_that_slides_at, beta_deg=beta_deg, weight=planes.weight, bond=bond
+        ),
+    )
+    own = {mode: k if mode == finding.mode else None for mode in MODES}
+    return Stability(
+        mode=finding.mode,
+        state=finding.state,
+        yield_acceleration=k,
+        ky=planes.ky,
+        kr=own["topple"],
+        ks=own["slump"],
+        kct=own["confined_topple"],
+        delta_deg=beta_deg + degrees_of(k / planes.weight) if math.isfinite(k) else None,
+        beta_deg=beta_deg,
+        phi_deg=finding.phi_deg,
+        phi_back_deg=finding.phi_back_deg,
+        kv=vertical_g(kv),
+        back_fracture=back_fracture,
+        margins=margins(block, around),
+        cohesion=_cohesion(planes, bond) if bond else None,
+        warnings=warnings_about(block, finding),
+    )
+
+
+def judged(
+    block: Block,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    kv: float = 0.0,
+    back_fracture: bool = True,
+    cohesion_pa: float = 0.0,
+    density_kg_m3: float | None = None,
+) -> tuple[Finding, Planes[float]]:
+    """Return the mode and yield of a block and its planes; arguments as for :func:`stability`."""
     if not isinstance(block, Block):
         raise InputError(f"block = {block!r}: make one with Block.from_angles or its siblings")
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
     phi_deg = friction_angle(phi_deg, "phi_deg")
     phi_back_deg = phi_deg if phi_back_deg is None else friction_angle(phi_back_deg, "phi_back_deg")
-    kv = vertical_g(kv)
     bond = _bond(block, cohesion_pa, density_kg_m3)
-
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
-    weight = 1.0 + kv
-    planes = Planes(tb, mu1, mu2, weight, SCALAR, bond or None)
-    t1, t3, cot = block.tan_alpha1, block.tan_alpha3, block.cot_gamma
-    ky, limit = planes.ky, planes.limit
-    if back_fracture:
-        code = int(mode_code(t1, t3, limit, block.confines, SCALAR))
-    else:
-        code = int(mode_code_without_back(t1, t3, limit, tb, SCALAR))
+    planes = Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR, bond or None)
+    t1, t3 = block.tan_alpha1, block.tan_alpha3
+    code = int(planes.mode(t1, t3, block.confines, back_fracture=back_fracture))
     # the weight passes upslope of the heel, and nothing stands there to lean on
     backward = not back_fracture and tb < t1
-    untenable = lifts = False
-    k = ky
-    if code == SLUMP and back_fracture:
-        k, untenable = planes.slump(*block.arms.heel, *block.arms.back, cot)
-    elif code == CONFINED_TOPPLE:
-        k, lifts = planes.confined_topple(*block.arms.toe, *block.arms.lowest_on_back, cot)
-    elif code == TOPPLE:
-        # (3.16): δ* = α3
-        k = planes.coefficient(t3, 1.0)
-    if backward:
-        k = -math.inf
-    state = STATES[int(state_code(k, SCALAR))]
-
+    k, untenable, lifts = planes.yield_of(code, block.arms, block.cot_gamma)
+    k = -math.inf if backward else k
     finding = Finding(
-        mode=MODES[code],
-        state=state,
-        k=k,
-        beta_deg=beta_deg,
-        phi_deg=phi_deg,
-        phi_back_deg=phi_back_deg,
-        back_fracture=back_fracture,
-        backward=backward,
-        untenable=untenable,
-        lifts=lifts,
-    )
-    around = Surroundings(
-        beta_deg=beta_deg,
-        phi_deg=phi_deg,
-        limit_deg=degrees_of(limit) if bond else phi_deg,
-        back_fracture=back_fracture,
-        phi_for=partial(_friction_that_slides_at, beta_deg=beta_deg, weight=weight, bond=bond),
-    )
-    return Stability(
-        mode=MODES[code],
-        state=state,
-        yield_acceleration=k,
-        ky=ky,
-        kr=k if code == TOPPLE else None,
-        ks=k if code == SLUMP else None,
-        kct=k if code == CONFINED_TOPPLE else None,
-        delta_deg=beta_deg + degrees_of(k / weight) if math.isfinite(k) else None,
-        beta_deg=beta_deg,
-        phi_deg=phi_deg,
-        phi_back_deg=phi_back_deg,
-        kv=kv,
-        back_fracture=back_fracture,
-        margins=margins(block, around),
-        cohesion=_cohesion(mu1, tb, weight, bond, ky) if bond else None,
-        warnings=warnings_about(block, finding),
-    )
+        MODES[code], STATES[int(state_code(k, SCALAR))], k, beta_deg, phi_deg, phi_back_deg,
+        back_fracture, backward, untenable and back_fracture, lifts,
+    )  # fmt: skip
+    return finding, planes
 
 
 def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
@@ -236,13 +228,13 @@ def _friction_that_slides_at(
     return degrees_of(math.tan(alpha) - bond * math.cos(tilt) / (weight * math.cos(alpha)))
 
 
-def _cohesion(mu1: float, tb: float, weight: float, bond: float, ky: float) -> Cohesion:
-    equivalent = mu1 + bond
+def _cohesion(planes: Planes[float], bond: float) -> Cohesion:
+    equivalent = planes.mu1 + bond
     return Cohesion(
         ratio=bond,
-        ky=ky,
+        ky=planes.ky,
         phi_equivalent_deg=degrees_of(equivalent),
-        ky_equivalent=yield_coefficient(equivalent, 1.0, tb, weight, SCALAR),
+        ky_equivalent=yield_coefficient(equivalent, 1.0, planes.tan_beta, planes.weight, SCALAR),
     )
 
 
