@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import BLOCK_FIELDS, opened_table
 from rbfrag.fragility.unusable import in_list
-from rbfrag.question.blocks import has_shape, many_blocks
+from rbfrag.question.blocks import has_shape
+from rbfrag.question.many import many_blocks
 
 FloatArray = NDArray[np.float64]
 

@@ -17,8 +17,10 @@ from rbfrag.exchange.block_table import BLOCK_FIELDS, opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
-from rbfrag.question.blocks import NUMBERS, OF_A_SHAPE, many_blocks
+from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import column_of
+from rbfrag.question.many import many_blocks
+from rbfrag.question.shapes import OF_A_SHAPE
 from rbfrag.solver.kinds import KINDS, facts_of
 
 Columns = Mapping[str, NDArray[Any]]

@@ -15,7 +15,8 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
-from rbfrag.question.blocks import Blocks, Refused, many_blocks, one_block
+from rbfrag.question.blocks import Blocks, Refused, one_block
+from rbfrag.question.many import many_blocks
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",

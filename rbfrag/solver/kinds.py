@@ -122,3 +122,10 @@ def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
     if back_fracture or facts.free_standing or facts.mode is None:
         return False
     return kind_of_mode(facts.mode, back_fracture=False).free_standing
+
+
+NOT_BACKED = (
+    "no plane backs the block: free-standing, it rocks on both corners and fails at weaker shaking "
+    "than this model says; kind rocking answers for it as it stands (docs/theory/rocking.md)"
+)
+"""What is said of a block that :func:`stands_free_of` is true of."""

@@ -195,6 +195,17 @@ class BlockArray(Tabular):
         """Why an element is no block, as text; empty where it is one."""
         return np.array(REASONS)[self.reason_code]
 
+    def at(self, places: NDArray[np.intp]) -> BlockArray:
+        """Return some of the blocks; a single one among many stays one."""
+        parts: list[Any] = [self.tan_alpha1, self.tan_alpha3, self.half_s1_m, self.reason_code]
+        return BlockArray(*(each if each.size == 1 else each[places] for each in parts))
+
+    @property
+    def inertia_m2(self) -> FloatArray:
+        """Moments of inertia about the centroid per mass [m²]."""
+        h, t1, t3 = self.half_s1_m, self.tan_alpha1, self.tan_alpha3
+        return h * h * (2.0 + t1 * t1 + t3 * t3) / 6.0
+
     @property
     def alpha1_deg(self) -> FloatArray:
         """Angles of the heel [deg]."""

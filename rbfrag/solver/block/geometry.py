@@ -200,6 +200,11 @@ class Block:
         )
 
     @property
+    def half_s1_m(self) -> float:
+        """Height of the centroid above the base, normal to it [m]; of a parallelogram S1/2."""
+        return -self.toe[1]
+
+    @property
     def r1_m(self) -> float:
         """Distance from the centroid to the heel [m]."""
         return -self.heel[1] * math.sqrt(self.tan_alpha1 * self.tan_alpha1 + 1.0)

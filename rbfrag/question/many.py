@@ -1,0 +1,382 @@
+"""Many blocks, by numbers or by shape: how each fails, and what answers read of it.
+
+Each block that cannot be used keeps its reason, and one that fails at rest is known to fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import block_of
+from rbfrag.fragility.measures import HIGHEST
+from rbfrag.question.blocks import NUMBERS, Blocks, Group, Refused, kinds_by_numbers, requested_kind
+from rbfrag.question.shapes import (
+    FRICTION_MISSING,
+    LEAST_M,
+    MOST_M,
+    NO_MODEL,
+    PLANES,
+    RECTANGLE,
+    SHAPES,
+    Judged,
+    check_ranges,
+    numbers_of_shape,
+    shape_among,
+)
+from rbfrag.solver.block.arrays import REASONS, BlockArray
+from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.stability.arrays import stability_arrays
+from rbfrag.solver.stability.modes import MODES, words_of_mode
+
+_IF_EMPTY = {"beta_deg": 0.0, "leaves_g": HIGHEST}
+"""What an option stands for that is not stated: a level base, and a back plane never left."""
+
+_OF_ALL = ("back_fracture", "cohesion_pa", "density_kg_m3")
+"""Fields that hold one value for all blocks."""
+
+_FACTS = tuple(KINDS.values())
+
+Places = NDArray[np.intp]
+
+
+def many_blocks(
+    given: Mapping[str, NDArray[np.float64]],
+    size: int,
+    *,
+    kinds: str | Sequence[str | None] | None = None,
+    modes: Sequence[str | None] | None = None,
+    rows: bool = False,
+) -> Blocks:
+    """Return blocks as answers read them, each with its kind.
+
+    Args:
+        given: fields that are stated, flat arrays of the number of blocks, or of one element for
+            all; ``back_fracture``, a truth value, is said of all.
+        size: number of blocks.
+        kinds: how they are asked to fail, one kind for all or one each; None or an empty text for
+            what shape, mode or numbers say.
+        modes: failure modes that are stated, empty for none.
+        rows: they are rows of a table, which may state more than is needed: numbers go before a
+            shape, and what is empty is not stated.
+
+    Raises:
+        InputError: they are described twice or in part.
+    """
+    return _Sorted(given, size, rows).blocks(kinds, modes)
+
+
+class _Some:
+    """Keeps why some of many blocks cannot be used, of those that no reason is known against."""
+
+    def __init__(self, whole: _Sorted, places: Places) -> None:
+        self.whole, self.places = whole, places
+
+    def refuse(self, holds: Any, text: str, *_fields: str, **values: Any) -> None:
+        # the row, or the element, is the subject of its reason
+        self._keep(self.whole.refused, holds, text.removeprefix("the block "), values)
+
+    def unstable(self, holds: Any, text: str, **values: Any) -> None:
+        self._keep(self.whole.unstable, holds, text, values)
+
+    def remark(self, holds: Any, text: str) -> None:
+        if np.any(holds & self.whole.free[self.places]):
+            self.whole.remarks[text] = None
+
+    def _keep(self, reasons: list[Refused], holds: Any, text: str, values: dict[str, Any]) -> None:
+        here = np.flatnonzero(holds & self.whole.free[self.places])
+        if here.size:
+            self.whole.free[self.places[here]] = False
+            own = {n: _at(v, here) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+            reasons.append(Refused(self.places[here], text, own))
+
+
+class _Sorted:
+    """Many blocks while they are sorted by kind."""
+
+    def __init__(self, given: Mapping[str, Any], size: int, rows: bool) -> None:
+        self.size, self.rows = size, rows
+        self.of_all = {name: given[name] for name in _OF_ALL if name in given}
+        self.backed = bool(self.of_all.get("back_fracture", True))
+        self.given = {name: value for name, value in given.items() if name not in _OF_ALL}
+        self.groups: list[Group] = []
+        self.refused: list[Refused] = []
+        self.unstable: list[Refused] = []
+        self.free = np.ones(size, dtype=np.bool_)
+        """Which blocks no reason is known against."""
+        self.done = np.zeros(size, dtype=np.bool_)
+        """Which blocks are sorted."""
+        self.kinds = np.full(size, -1, dtype=np.int8)
+        self.modes = np.full(size, -1, dtype=np.int8)
+        self.remarks: dict[str, None] = {}
+        self.read: set[str] = set()
+
+    def blocks(
+        self, kinds: str | Sequence[str | None] | None, modes: Sequence[str | None] | None
+    ) -> Blocks:
+        self._state(kinds, modes)
+        shapes = self._shapes()
+        self._state_free(shapes)
+        left = ~self._complete()
+        for shape in shapes:
+            own = left & self._known(shape)
+            left &= ~own
+            if own.any():
+                self._sort_shapes(shape, np.flatnonzero(own))
+            self.done |= own
+        if shapes:  # of which part of a shape is empty, and no number is stated either
+            own = left & ~self._known_any(NUMBERS)
+            if own.any():
+                self._sort_shapes(shapes[0], np.flatnonzero(own))
+            self.done |= own
+        if not self.done.all():
+            self._sort_numbers(np.flatnonzero(~self.done))
+        return Blocks(
+            tuple(self.groups), tuple(self.remarks), tuple(self.refused),
+            tuple(self.unstable), self.kinds, self.modes,
+            frozenset(self.read),
+        )  # fmt: skip
+
+    def _state(
+        self, kinds: str | Sequence[str | None] | None, modes: Sequence[str | None] | None
+    ) -> None:
+        """Enter the kinds that are asked for, one each or by the mode that is stated."""
+        if isinstance(kinds, str):
+            self.kinds[:] = _codes()[facts_of(kinds).kind]
+            kinds = None
+        if kinds is None and modes is None:
+            return
+        nothing = [""] * self.size
+        whys: dict[tuple[str, str, int], list[int]] = {}
+        pairs = zip(kinds or nothing, modes or nothing, self.kinds.tolist(), strict=True)
+        for i, (kind, mode, code) in enumerate(pairs):
+            pair = (str(kind or "").strip(), str(mode or "").strip(), code)
+            whys.setdefault(pair, []).append(i)
+        for (kind, mode, code), places in whys.items():
+            here = np.array(places)
+            if kind and kind not in KINDS:
+                text = f"kind = {kind[:40]!r} is none of {', '.join(KINDS)}"
+                _Some(self, here).refuse(True, "{why}", why=text)
+                continue
+            if kind:
+                code = _codes()[kind]
+            elif code < 0 and mode in MODES:
+                code = _codes()[kind_of_mode(mode, back_fracture=self.backed).kind]
+            self.kinds[here] = code
+            if mode in MODES:
+                self.modes[here] = MODES.index(mode)
+            own = None if code < 0 else _FACTS[code]
+            if mode and (own is None or own.mode != mode):
+                model = "any" if own is None else f"the {own.kind}"
+                text = (
+                    f"the block's mode is {words_of_mode(mode[:40])}: {model} model says nothing "
+                    "about it"
+                )
+                _Some(self, here).refuse(True, "{why}", why=text)
+
+    def _state_free(self, shapes: Sequence[tuple[str, ...]]) -> None:
+        """Enter that blocks stand free of which a restitution is stated."""
+        restitution = self.given.get("restitution")
+        if restitution is None or not (shapes or {"p2", "kr"} & self.given.keys()):
+            return
+        facts = requested_kind(None, ("restitution",))
+        assert facts is not None
+        stated = ~np.isnan(restitution) if self.rows else True
+        self.kinds[(self.kinds < 0) & stated] = _codes()[facts.kind]
+
+    def _shapes(self) -> list[tuple[str, ...]]:
+        """Return the shape that is stated; of a table those that its rows may have."""
+        if self.rows:
+            whole = [names for names in SHAPES if all(name in self.given for name in names)]
+            begun = any(name in self.given for names in SHAPES for name in names)
+            if begun and not whole and not kinds_by_numbers(self.given):
+                shape_among(self.given)
+            return whole
+        of_all = [name for name in self.of_all if name != "back_fracture" or not self.backed]
+        shape = shape_among({*self.given, *of_all})
+        if shape is not None and (numbers := [name for name in NUMBERS if name in self.given]):
+            raise InputError(
+                f"{numbers[0]} does not go with {shape[0]}: a block is described once",
+                fields=(numbers[0], *shape),
+            )
+        return [] if shape is None else [shape]
+
+    def _complete(self) -> Any:
+        """Return which blocks have all numbers of a kind."""
+        complete = np.zeros(self.size, dtype=np.bool_)
+        for facts in kinds_by_numbers(self.given):
+            complete |= self._known(facts.parameters)
+        return complete
+
+    def _stated(self, name: str) -> Any:
+        """Return the values of a field; what an empty cell of a table stands for."""
+        values = self.given[name]
+        if self.rows and name in _IF_EMPTY:
+            return np.where(np.isnan(values), _IF_EMPTY[name], values)
+        return values
+
+    def _known_any(self, names: Collection[str]) -> Any:
+        known = np.zeros(self.size, dtype=np.bool_)
+        for name in names:
+            if name in self.given:
+                known |= ~np.isnan(self.given[name])
+        return known
+
+    def _known(self, names: Collection[str]) -> Any:
+        known = np.ones(self.size, dtype=np.bool_)
+        for name in names:
+            known &= ~np.isnan(self.given[name])
+        return known
+
+    def _sort_numbers(self, places: Any) -> None:
+        """Sort blocks that are given by numbers."""
+        # a restitution has told already
+        names = [name for name in self.given if not name.startswith("restitution")]
+        if (self.kinds < 0).any():
+            for facts in kinds_by_numbers(names):
+                kind = block_of([name for name in names if name in _numbers_of(facts)]).kind
+                here = (self.kinds < 0) & self._known(facts.parameters)
+                self.kinds[here] = _codes()[kind]
+            self.kinds[self.kinds < 0] = _codes()[block_of(names).kind]
+        of_these = self.kinds[places]
+        for code in np.unique(of_these[self.free[places]]).tolist():
+            facts = _FACTS[code]
+            here = places[(of_these == code) & self.free[places]]
+            if not facts.parameters:
+                _Some(self, here).refuse(True, NO_MODEL, kind=facts.kind)
+                continue
+            self.modes[here] = MODES.index(facts.mode) if facts.mode else -1
+            missing = [name for name in facts.parameters if name not in self.given]
+            if missing:
+                whole = " and ".join(facts.parameters)
+                _Some(self, here).refuse(
+                    True,
+                    f"the block's mode is {words_of_mode(facts.mode or '')}, and {missing[0]} is "
+                    f"missing: a block of kind {facts.kind} is given by {whole}",
+                )
+                continue
+            numbers = {
+                name: self._stated(name) for name in _numbers_of(facts) if name in self.given
+            }
+            self.read |= numbers.keys()
+            self.group(facts, here, {name: _at(value, here) for name, value in numbers.items()})
+
+    def _sort_shapes(self, shape: tuple[str, ...], places: Places) -> None:
+        """Sort blocks that are given by their shape."""
+        planes = [name for name in PLANES if name in self.given]
+        self.read |= {*shape, *planes, *self.of_all}
+        stated = {name: _at(self.given[name], places) for name in (*shape, *planes)}
+        if shape != RECTANGLE:
+            for name in ("beta_deg", "phi_deg"):
+                if name not in stated:
+                    raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
+        elif self.rows and "beta_deg" in stated:
+            stated["beta_deg"] = np.nan_to_num(stated["beta_deg"], nan=0.0, posinf=np.inf)
+        listener = _Some(self, places)
+        check_ranges(stated, listener, columns=self.rows)
+        stated.setdefault("beta_deg", np.zeros(1))
+        stated.setdefault("phi_deg", np.full(1, np.nan))
+        stated.setdefault("phi_back_deg", stated["phi_deg"])
+        if shape != RECTANGLE:
+            listener.refuse(np.isnan(stated["phi_deg"]), FRICTION_MISSING)
+        is_free = np.array([*(facts.free_standing for facts in _FACTS), not self.backed])
+        for free_standing in (False, True):
+            own = (is_free[self.kinds[places]] == free_standing) & self.free[places]
+            if own.any():
+                here = np.flatnonzero(own)
+                values = {name: _at(value, here) for name, value in stated.items()}
+                self._sort_standing(shape, places[here], values, free_standing)
+
+    def _sort_standing(
+        self, shape: tuple[str, ...], places: Places, stated: dict[str, Any], free_standing: bool
+    ) -> None:
+        """Sort shapes that all are backed, or all stand free."""
+        n = places.size
+        blocks = getattr(BlockArray, SHAPES[shape])(*(stated[name] for name in shape))
+        phi, back = stated["phi_deg"], stated["phi_back_deg"]
+        taken = np.isnan(phi)
+        # a friction angle that leaves a rectangle no choice: between that of its toe and 90°
+        phi = np.where(taken, 0.5 * (blocks.alpha3_deg + 90.0), phi)
+        back = np.where(np.isnan(back), phi, back)
+        bond = {name: value for name, value in self.of_all.items() if name != "back_fracture"}
+        judged_all = stability_arrays(
+            blocks, beta_deg=stated["beta_deg"], phi_deg=phi, phi_back_deg=back,
+            back_fracture=not free_standing, **bond,
+        )  # fmt: skip
+        codes = np.broadcast_to(judged_all.mode_code, (n,))
+        reasons = np.broadcast_to(judged_all.reason_code, (n,))
+        k = np.broadcast_to(judged_all.yield_acceleration, (n,))
+        listener = _Some(self, places)
+        for code in np.unique(reasons[reasons > 0]).tolist():
+            listener.refuse(reasons == code, REASONS[code])
+        self.modes[places] = codes
+        across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
+        unusual = int(np.count_nonzero((across_m < LEAST_M) | (across_m > MOST_M)))
+        if unusual:
+            self.remarks[
+                f"{unusual:,} of {n:,} blocks measure less than {LEAST_M:g} m or more than "
+                f"{MOST_M:g} m: lengths are in m"
+            ] = None
+        displacement = np.full(1, np.nan)
+        if "displacement_m" in self.given:
+            self.read.add("displacement_m")
+            displacement = _at(self.given["displacement_m"], places)
+            listener.refuse(taken & ~np.isnan(displacement), FRICTION_MISSING)
+        pairs = np.unique(np.stack([codes, self.kinds[places]])[:, self.free[places]], axis=1)
+        for code, requested in pairs.T.tolist():
+            own = (codes == code) & (self.kinds[places] == requested) & self.free[places]
+            if not own.any():
+                continue
+            here = np.flatnonzero(own)
+            mode, of_these = MODES[code], places[here]
+            facts = (
+                kind_of_mode(mode, back_fracture=not free_standing)
+                if requested < 0
+                else _FACTS[requested]
+            )
+            self.kinds[of_these] = _FACTS.index(facts)
+            judged = Judged(
+                blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
+                _at(back, here), _at(taken, here), self.backed, bool(bond.get("cohesion_pa")),
+            )  # fmt: skip
+            names = [
+                name for name in _numbers_of(facts)
+                if name in self.given and name.endswith(("_sigma", "restitution"))
+            ]  # fmt: skip
+            self.read |= {*names}
+            others = {name: _at(self.given[name], of_these) for name in names}
+            with np.errstate(all="ignore"):
+                numbers = numbers_of_shape(
+                    facts, judged, _at(displacement, here), others, _Some(self, of_these)
+                )
+            self.group(facts, of_these, numbers)
+
+    def group(self, facts: KindFacts, places: Places, numbers: Mapping[str, Any]) -> None:
+        """Keep blocks of one kind, of those that no reason is known against."""
+        usable = np.flatnonzero(self.free[places])
+        if usable.size:
+            if usable.size < places.size:
+                numbers = {name: _at(np.asarray(v), usable) for name, v in numbers.items()}
+            self.groups.append(Group(facts.kind, numbers, places[usable]))
+
+
+def _at(values: Any, places: Places) -> Any:
+    """Return the values of some places; one that holds for all stays one."""
+    return values if values.size == 1 else values[places]
+
+
+@cache
+def _codes() -> dict[str, int]:
+    return {kind: code for code, kind in enumerate(KINDS)}
+
+
+@cache
+def _numbers_of(facts: KindFacts) -> tuple[str, ...]:
+    """Return what a model of a kind reads of a block."""
+    block = block_of(facts.parameters, facts.kind)
+    return (*block.names, *block.options, *block.sigmas)

@@ -1,0 +1,312 @@
+"""Shapes on their planes: why no model answers for them, and what a model reads of them.
+
+One code for a single shape and for many: a :class:`Listener` raises the first reason of a single
+one, and keeps each's own of many. No numpy is loaded for a single shape.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.measures import HIGHEST
+from rbfrag.question.fields import PlaneFields, column_of, declared, names_of
+from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
+from rbfrag.solver.stability.at_rest import rocking_at_rest, slump_at_rest
+from rbfrag.solver.stability.modes import ModeName, words_of_mode
+
+if TYPE_CHECKING:
+    from rbfrag.solver.block.arrays import BlockArray
+
+RECTANGLE = ("height_m", "width_m")
+
+SHAPES = {
+    RECTANGLE: "rectangle",
+    ("alpha1_deg", "alpha3_deg", "r3_m"): "from_angles",
+    ("s1_m", "s2_m", "gamma_deg"): "from_fractures",
+}
+"""The fields that state a shape, all of which it needs, and what makes a block of them."""
+
+WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
+
+PLANES = names_of(PlaneFields)
+
+LEAST_DEG = 1.6
+"""Friction angles below this are seldom meant [deg]: it may be one in radians."""
+
+LEAST_M, MOST_M = 0.05, 60.0
+"""Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
+
+FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
+
+UNSTABLE_AT_REST = (
+    "the block is unstable at rest in {mode} (yield {k:.4g} g): it fails without an earthquake"
+)
+
+TOPPLES_AT_REST = (
+    "the block topples at rest: its base dips by {beta:g} deg, and the angle of its toe, of a "
+    "rectangle atan(width/height), is {alpha3:.4g} deg: it fails without an earthquake"
+)
+
+LEANS_AT_REST = (
+    "the block falls backward over its heel at rest: its base dips by {beta:g} deg, and the angle "
+    "of its heel is {alpha1:.4g} deg: it fails without an earthquake"
+)
+
+LOCKED_AT_REST = "the block is locked in {mode}: no earthquake decides about it"
+
+NO_MODEL = "there is no fragility model of kind {kind}"
+
+NO_MODEL_OF_MODE = "its mode is {mode} (yield {k:.4g} g), of which there is no fragility model"
+
+OTHER_MODE = (
+    "its mode is {mode} (yield {k:.4g} g), and the {kind} model says nothing about it{instead}"
+)
+
+SLIDES = (
+    "the block slides (yield {k:.2g} g): state displacement_m, the displacement that is too far"
+)
+
+COHESIVE = (
+    "cohesion_pa does not go with {kind}: the first motion breaks a bond, which the model does not "
+    "describe"
+)
+
+STEEP = (
+    "a block rocks about a corner whose critical angle is below 90 degrees: alpha3 - beta and "
+    "beta - alpha1 are to be less"
+)
+
+TAKEN_TO_TOPPLE = (
+    "no friction angle is given: the rectangle is taken to topple, backed by a slope; with phi its "
+    "mode is checked"
+)
+
+TAKEN_NOT_TO_SLIP = (
+    "no friction angle is given: the corners of the free-standing rectangle are taken not to slip"
+)
+
+_WEAKER = (
+    "the block does not stand alike on both corners: the answer is that of the symmetric block of "
+    "its weaker sense, {sense}; respond runs it as it stands"
+)
+
+_INSTEAD = {
+    "slide": "; with displacement_m, kind sliding tells how likely it slides so many metres",
+    "slump": "; kind slumping tells how likely it slumps",
+}
+
+_RADIANS = "{name} is less than a rock's: angles are in degrees, is it in radians?"
+
+
+class Listener(Protocol):
+    """Hears what is found about blocks."""
+
+    def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
+        """Say where blocks cannot be used, and why.
+
+        Args:
+            holds: whether, or which.
+            text: the reason, with the names of values in braces.
+            fields: fields in it that a door may spell in its own way.
+            values: the values, numbers or arrays.
+        """
+
+    def unstable(self, holds: Any, text: str, **values: Any) -> None:
+        """Say where blocks fail at rest; arguments as for `refuse`."""
+
+    def remark(self, holds: Any, text: str) -> None:
+        """Say what is to be known of the answer where it holds."""
+
+
+class Judged(NamedTuple):
+    """Shapes of one mode: numbers, or arrays of shape (m,).
+
+    Args:
+        body: the shapes.
+        mode: their mode.
+        k: their yields [g].
+        beta_deg: dips of the bases [deg].
+        phi_deg: friction angles of the bases [deg].
+        phi_back_deg: those of the back planes [deg].
+        taken: whether the friction is not known, and they are taken not to slide.
+        backed: whether a plane is behind them.
+        bonded: whether their bases have cohesion.
+    """
+
+    body: Block | BlockArray
+    mode: ModeName
+    k: Any
+    beta_deg: Any
+    phi_deg: Any
+    phi_back_deg: Any
+    taken: Any
+    backed: bool
+    bonded: bool = False
+
+
+def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
+    """Return the fields of the shape that is stated, () for a block; None where none is.
+
+    Raises:
+        InputError: two shapes, a part of one, or planes without a shape.
+    """
+    begun = [names for names in SHAPES if any(name in given for name in names)]
+    if "block" in given:
+        # of a file or an outline the angle of the back plane may be stated
+        if others := [name for names in begun for name in names if name in given]:
+            raise InputError(
+                f"{others[0]} does not go with block: a block is described once",
+                fields=(others[0],),
+            )
+        return ()
+    if not begun:
+        if planes := [name for name in PLANES_OF_A_SHAPE if name in given]:
+            raise InputError(
+                f"{planes[0]} goes with the shape of a block, by {WAYS}", fields=OF_A_SHAPE
+            )
+        return None
+    first = begun[0]
+    if len(begun) > 1:
+        one, other = (next(name for name in names if name in given) for names in begun[:2])
+        raise InputError(
+            f"{other} does not go with {one}: a block is described once, by {WAYS}",
+            fields=OF_A_SHAPE,
+        )
+    if missing := [name for name in first if name not in given]:
+        raise InputError(
+            f"{missing[0]} is missing: {', '.join(first)} together are the shape of a block",
+            fields=first,
+        )
+    return first
+
+
+PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", "cohesion_pa", "density_kg_m3")
+"""Fields that describe a block only beside its shape; the dip stands with numbers too."""
+
+OF_A_SHAPE = ("block", *(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
+"""Fields that describe a block by its shape and its planes."""
+
+
+def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool = False) -> None:
+    """Refuse values that are out of the ranges of their fields, and say where angles are odd.
+
+    Args:
+        stated: sides, angles and planes, by field; NaN where a friction angle is not known.
+        listener: hears of it.
+        columns: call fields as the columns of tables that are written.
+    """
+    for name, value in stated.items():
+        about = declared()[name]
+        shown = column_of(name) if columns else name
+        unknown = value != value
+        if name in ("phi_deg", "phi_back_deg"):
+            low = (value > 0.0) & (value < LEAST_DEG)
+            listener.remark(low, _RADIANS.format(name=name))
+        else:
+            text = "is empty" if columns else "is no number"
+            listener.refuse(unknown, f"{shown} {text}", name)
+        text = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
+        listener.refuse(about.usable(value) ^ True ^ unknown, text, name, value=value)
+
+
+def numbers_of_shape(
+    facts: KindFacts,
+    judged: Judged,
+    displacement_m: Any,
+    stated: Mapping[str, Any],
+    listener: Listener,
+) -> dict[str, Any]:
+    """Return what the model of a kind reads of shapes of one mode, by field.
+
+    Args:
+        facts: the kind that answers.
+        judged: the shapes.
+        displacement_m: displacements that are too far [m], NaN where none is stated.
+        stated: restitutions and standard deviations that are stated, by field.
+        listener: hears why shapes cannot be answered for.
+    """
+    k, mode = judged.k, judged.mode
+    words: dict[str, Any] = {"k": k, "mode": words_of_mode(mode), "kind": facts.kind}
+    angles = {"beta": judged.beta_deg, "alpha1": judged.body.alpha1_deg}
+    angles["alpha3"] = judged.body.alpha3_deg
+    forward_at_rest = TOPPLES_AT_REST if mode == "topple" else UNSTABLE_AT_REST
+    listener.unstable(k <= 0.0, forward_at_rest, **words, **angles)
+    if facts.mode != mode:
+        listener.refuse(judged.taken, FRICTION_MISSING, "phi_deg")
+        words["instead"] = _INSTEAD.get(mode, "")
+        listener.refuse(True, OTHER_MODE, "displacement_m", **words)
+        return {}
+    if not facts.parameters:
+        listener.refuse(True, NO_MODEL_OF_MODE, **words)
+        return {}
+    listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
+    if judged.bonded and (facts.free_standing or "p2" not in facts.parameters):
+        listener.refuse(True, COHESIVE, "cohesion_pa", **words)
+    if "ky" in facts.parameters:
+        listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
+        return {"ky": k, "beta_deg": judged.beta_deg, "displacement_m": displacement_m, **stated}
+    single = isinstance(judged.body, Block)
+    functions: Elementwise[Any] = SCALAR if single else array_elementwise()
+    if "ps2" in facts.parameters:
+        return {"ks": k, **_of_slumps(judged, functions), **stated}
+    listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
+    if stands_free_of(facts, judged.backed):
+        listener.remark(True, NOT_BACKED)
+    if not facts.free_standing:
+        return {"p2": judged.body.p2, "kr": k, **stated}
+    body = judged.body
+    forward, backward, p2, own, least = rocking_at_rest(
+        tan_alpha1=body.tan_alpha1, tan_alpha3=body.tan_alpha3, half_s1_m=body.half_s1_m,
+        inertia_m2=body.inertia_m2, tan_beta=tan_deg(judged.beta_deg, functions),
+        functions=functions,
+    )  # fmt: skip
+    listener.unstable(forward <= 0.0, TOPPLES_AT_REST, **angles)
+    listener.unstable(backward <= 0.0, LEANS_AT_REST, **angles)
+    listener.refuse(least <= 0.0, STEEP)
+    weaker = forward <= backward
+    kr = functions.where(weaker, forward, backward)
+    uneven = abs(forward - backward) > 1e-6 * (1.0 + forward * backward) * abs(forward)
+    listener.remark(uneven & weaker, _WEAKER.format(sense="forward"))
+    listener.remark(uneven & (weaker ^ True), _WEAKER.format(sense="backward"))
+    restitution = stated.get("restitution", own)
+    restitution = functions.where(restitution == restitution, restitution, own)
+    return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
+
+
+def _of_slumps(judged: Judged, functions: Elementwise[Any]) -> dict[str, Any]:
+    body = judged.body
+    trigonometry: Any = math
+    if not isinstance(body, Block):
+        import numpy as np
+
+        trigonometry = np
+    elif body.lowest_on_back != body.heel:
+        raise InputError(
+            "slumping in time is known for blocks whose heel lies on the back plane: the corner at "
+            "the heel of this outline is missing"
+        )
+    elif not body.is_parallelogram:  # its centroid does not lie between heel and toe
+        from rbfrag.solver.kinds import kind_of_mode
+        from rbfrag.solver.mechanism import shaken_mechanism
+
+        shaken = shaken_mechanism(
+            body, kind=kind_of_mode(judged.mode).kind, beta_deg=judged.beta_deg,
+            phi_deg=judged.phi_deg, phi_back_deg=judged.phi_back_deg,
+        )  # fmt: skip
+        return _leaving(shaken.p2, shaken.leaves_g, functions)
+    ps2, leaves_g = slump_at_rest(
+        alpha1_deg=body.alpha1_deg, alpha3_deg=body.alpha3_deg, gamma_deg=body.gamma_deg,
+        r1_m=body.r1_m, r3_m=body.r3_m, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
+        phi_back_deg=judged.phi_back_deg, functions=functions, trigonometry=trigonometry,
+    )  # fmt: skip
+    return _leaving(ps2, leaves_g, functions)
+
+
+def _leaving(ps2: Any, leaves_g: Any, functions: Elementwise[Any]) -> dict[str, Any]:
+    # where no k_h opens a contact the model holds as far as numbers go
+    return {"ps2": ps2, "leaves_g": functions.where(leaves_g < HIGHEST, leaves_g, HIGHEST)}
