@@ -16,7 +16,7 @@ from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
-from rbfrag.question.many import many_blocks
+from rbfrag.question.many import OF_ALL, many_blocks
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -52,7 +52,7 @@ def ask_many(
     Raises:
         InputError: nothing of it can be answered for, or, if asked, an element.
     """
-    backed = {name: given[name] for name in ("back_fracture",) if name in given}
+    backed = {name: given[name] for name in OF_ALL if name in given}
     numbers = {name: value for name, value in given.items() if name not in backed}
     each = {"kind": kind, "mode": mode}
     texts = {
@@ -103,7 +103,7 @@ def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
     kind = known.pop("kind", None)
     if "block" in known:
         return one_block(known, kind), 1
-    backed = {name: known.pop(name) for name in ("back_fracture",) if name in known}
+    backed = {name: known.pop(name) for name in OF_ALL if name in known}
     each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
     values, shape = flat({**known, **each})
     size = int(np.prod(shape))

@@ -37,7 +37,7 @@ from rbfrag.solver.stability.modes import MODES, words_of_mode
 _IF_EMPTY = {"beta_deg": 0.0, "leaves_g": HIGHEST}
 """What an option stands for that is not stated: a level base, and a back plane never left."""
 
-_OF_ALL = ("back_fracture", "cohesion_pa", "density_kg_m3")
+OF_ALL = ("back_fracture", "cohesion_pa", "density_kg_m3")
 """Fields that hold one value for all blocks."""
 
 _FACTS = tuple(KINDS.values())
@@ -101,9 +101,9 @@ class _Sorted:
 
     def __init__(self, given: Mapping[str, Any], size: int, rows: bool) -> None:
         self.size, self.rows = size, rows
-        self.of_all = {name: given[name] for name in _OF_ALL if name in given}
+        self.of_all = {name: given[name] for name in OF_ALL if name in given}
         self.backed = bool(self.of_all.get("back_fracture", True))
-        self.given = {name: value for name, value in given.items() if name not in _OF_ALL}
+        self.given = {name: value for name, value in given.items() if name not in OF_ALL}
         self.groups: list[Group] = []
         self.refused: list[Refused] = []
         self.unstable: list[Refused] = []
