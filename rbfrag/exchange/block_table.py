@@ -28,8 +28,9 @@ from rbfrag.exchange.tables.files import (
 from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of
-from rbfrag.question.blocks import SHAPES, kinds_by_numbers
+from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, columns_declared, names_of
+from rbfrag.question.shapes import SHAPES
 from rbfrag.question.table import Header, columns_in
 
 BLOCK_FIELDS = {column_of(name): name for name in names_of(BlockFields)}

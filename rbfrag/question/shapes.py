@@ -48,13 +48,13 @@ UNSTABLE_AT_REST = (
 )
 
 TOPPLES_AT_REST = (
-    "the block topples at rest: its base dips by {beta:g} deg, and the angle of its toe, of a "
+    "the block is unstable at rest: its base dips by {beta:g} deg, and the angle of its toe, of a "
     "rectangle atan(width/height), is {alpha3:.4g} deg: it fails without an earthquake"
 )
 
 LEANS_AT_REST = (
-    "the block falls backward over its heel at rest: its base dips by {beta:g} deg, and the angle "
-    "of its heel is {alpha1:.4g} deg: it fails without an earthquake"
+    "the block is unstable at rest, backward over its heel: its base dips by {beta:g} deg, and the "
+    "angle of its heel is {alpha1:.4g} deg: it fails without an earthquake"
 )
 
 LOCKED_AT_REST = "the block is locked in {mode}: no earthquake decides about it"
