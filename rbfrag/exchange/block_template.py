@@ -10,7 +10,6 @@ import numpy as np
 from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.tables.workbook import openpyxl
 from rbfrag.files import output_path, written_whole
-from rbfrag.question.blocks import RECTANGLE
 from rbfrag.question.fields import (
     FailureFields,
     PlaneFields,
@@ -19,6 +18,7 @@ from rbfrag.question.fields import (
     names_of,
     word_of,
 )
+from rbfrag.question.shapes import RECTANGLE
 from rbfrag.question.table import header_of
 
 COLUMNS = ("block_id", *RECTANGLE, *names_of(PlaneFields, FailureFields), "pgv_m_s", "pga_g")
