@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -20,9 +19,7 @@ from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
 from rbfrag.exchange.tables.files import (
     open_table,
-    place_word,
     table_path,
-    table_source,
     table_writer,
 )
 from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
@@ -77,7 +74,6 @@ class BlockTable:
 
     Args:
         name: what messages call it.
-        word: what its rows are counted by: line, row or feature.
         file: what is open.
         stated: which columns state which fields.
         texts: fields that are texts.
@@ -85,11 +81,15 @@ class BlockTable:
     """
 
     name: str
-    word: str
     file: TableFile
     stated: Header
     texts: Collection[str]
     filled: set[str] = field(default_factory=set)
+
+    @property
+    def word(self) -> str:
+        """What its rows are counted by."""
+        return self.file.word
 
     @property
     def header(self) -> list[str]:
@@ -211,20 +211,17 @@ def opened_table(
         MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
     with ExitStack() as stack:
-        name, word = "blocks", "row"
+        name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
         if not isinstance(source, str | os.PathLike):
-            file = _of_one_part(given_part(source))
+            file = _of_one_part(given_part(source), "row")
         elif (path := Path(source)).suffix.lower() in GEOJSON:
-            name, word = str(path), "feature"
-            file = _of_one_part(read_points(path))
+            file = _of_one_part(read_points(path), "feature")
         else:
-            path = table_source(path)
-            name, word = str(path), place_word(path)
             stack.enter_context(_reading(path))
             fast = path.is_file() and path.stat().st_size > _LARGE
             file = open_table(path, stack, sheet=sheet, fast=fast)
         stated = columns_in(file.header, name, (*read, *texts))
-        yield BlockTable(name, word, file, stated, texts)
+        yield BlockTable(name, file, stated, texts)
 
 
 @contextmanager
@@ -236,8 +233,8 @@ def _reading(source: Path) -> Iterator[None]:
         raise InputError(f"{source}: not a CSV file: {error}") from None
 
 
-def _of_one_part(part: Part) -> TableFile:
-    return TableFile([*part.cells], lambda _: iter([part]))
+def _of_one_part(part: Part, word: str) -> TableFile:
+    return TableFile([*part.cells], lambda _: iter([part]), word=word)
 
 
 def given_part(columns: Mapping[str, Any]) -> Part:
@@ -247,18 +244,14 @@ def given_part(columns: Mapping[str, Any]) -> Part:
         sizes = ", ".join(f"{name} {column.size}" for name, column in cells.items())
         raise InputError(f"the columns of the blocks differ in length: {sizes}")
     size = next((column.size for column in cells.values()), 0)
-    return Part(
-        range(1, size + 1),
-        {
-            name: column.astype(np.float64)
-            if column.dtype.kind in "iuf"
-            else [None if _is_missing(cell) else cell for cell in column.tolist()]
-            for name, column in cells.items()
-        },
-    )
 
+    def as_cells(column: NDArray[Any]) -> Any:
+        if column.dtype.kind in "iuf":
+            return column.astype(np.float64)
+        # what is missing is None, NaN, NaT or NA, as Python, numpy and pandas have it
+        return [
+            None if type(cell).__name__ == "NAType" or cell != cell else cell
+            for cell in column.tolist()
+        ]
 
-def _is_missing(cell: object) -> bool:
-    """Whether a cell is empty, as Python, numpy and pandas have it."""
-    is_nan = isinstance(cell, float) and math.isnan(cell)
-    return cell is None or is_nan or type(cell).__name__ in ("NAType", "NaTType")
+    return Part(range(1, size + 1), {name: as_cells(column) for name, column in cells.items()})

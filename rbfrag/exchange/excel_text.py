@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from rbfrag.exchange.tables.parts import cells_of
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-](inf|nan)", re.ASCII)
 _SUSPECT = r"^'?[=+\-@]"
 
@@ -56,14 +58,7 @@ def formula_warnings(columns: Mapping[str, Any]) -> list[str]:
 def _changed(column: Any, change: Callable[[str], str]) -> Any:
     if not _suspect(column):
         return column
-    cells = [change(cell) if isinstance(cell, str) else cell for cell in _cells(column)]
-    if isinstance(column, list):
-        return cells
-    if isinstance(column, np.ndarray):
-        return np.array(cells, dtype=object)
-    import pyarrow
-
-    return pyarrow.array(cells, type=pyarrow.string())
+    return [change(cell) if isinstance(cell, str) else cell for cell in cells_of(column)]
 
 
 def _suspect(column: Any) -> bool:
@@ -81,9 +76,5 @@ def _suspect(column: Any) -> bool:
     return bool(pyarrow.compute.any(suspects).as_py())
 
 
-def _cells(column: Any) -> list[Any]:
-    return list(column) if isinstance(column, list | np.ndarray) else list(column.to_pylist())
-
-
 def _texts(column: Any) -> list[str]:
-    return [cell for cell in _cells(column) if isinstance(cell, str)]
+    return [cell for cell in cells_of(column) if isinstance(cell, str)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -85,7 +86,7 @@ def predict_table(
     chosen: dict[str, dict[str, None]]
     chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
     with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
-        _check(table, given, kind)
+        table.check(given, kind)
         uncertain = any(name.endswith("_sigma") for name in (*table.stated.columns, *given))
         columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
         if goal is None:
@@ -121,14 +122,6 @@ def predict_table(
         **({"blocks": rows} if goal is None else {}),
         "warnings": [*table.remarks(known), *notes, *missing, *formulas],
     }
-
-
-def _check(table: BlockTable, given: Mapping[str, float], kind: str | None) -> None:
-    """Refuse a table that does not describe blocks, or in which something is said twice."""
-    doubled = next((name for name in table.header if table.header.count(name) > 1), None)
-    if doubled is not None:
-        raise InputError(f"{table.name}: the column {doubled} is there twice")
-    table.check(given, kind)
 
 
 def _answer(
@@ -181,6 +174,9 @@ def _written(
     excel_text: bool,
 ) -> Write:
     """Return what writes parts and their answers to a file; enters what is to be said of it."""
+    doubled = next((name for name in table.header if table.header.count(name) > 1), None)
+    if doubled is not None:
+        raise InputError(f"{table.name}: the column {doubled} is there twice")
     kept = [name for name in table.header if name not in (*ANSWERS, OF_UNCERTAIN)]
     write = table_writer(
         partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
@@ -201,19 +197,15 @@ def _written(
 
 def _listed(table: BlockTable, answers: Sequence[str], rows: list[dict[str, Any]]) -> Write:
     """Return what enters the answers for parts into a list, up to :data:`MOST_LISTED`."""
-    before = [0]
 
     def list_part(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
-        size = min(len(part.lines), MOST_LISTED - len(rows))
-        names = table.text(part, "block_id") or [
-            str(before[0] + i + 1) for i in range(len(part.lines))
-        ]
-        columns = [answer[name][:size].tolist() for name in answers]
-        rows.extend(
-            {"block_id": name}
-            | {n: None if v != v else v for n, v in zip(answers, row, strict=True)}
-            for name, *row in zip(names[:size], *columns, strict=True)
-        )
-        before[0] += len(part.lines)
+        first, most = len(rows), MOST_LISTED - len(rows)
+        if not most:
+            return
+        names = table.text(part, "block_id") or map(str, range(first + 1, MOST_LISTED + 1))
+        columns = [answer[name].tolist() for name in answers]
+        for name, *row in islice(zip(names, *columns, strict=False), most):
+            known = (None if value != value else value for value in row)
+            rows.append({"block_id": name, **dict(zip(answers, known, strict=True))})
 
     return list_part

@@ -75,7 +75,7 @@ def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
         if done is not None:
             yield from parts_of_rows(names, islice(rows, done, None), decimal=dialect.decimal)
 
-    return TableFile(names, read, remarks, dialect)
+    return TableFile(names, read, remarks, "line", dialect)
 
 
 def _rows(reader: Any) -> Rows:

@@ -18,22 +18,6 @@ SUFFIXES = (".csv", ".xlsx", ".parquet")
 """File types of a table of blocks."""
 
 
-def table_source(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a table that is to be read, or refuse its name."""
-    source = Path(path)
-    if source.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"{source}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
-            f"{source.suffix!r}"
-        )
-    return source
-
-
-def place_word(source: Path) -> str:
-    """Return what the numbers of a table's rows count: lines of CSV, rows of a sheet."""
-    return "line" if source.suffix.lower() == ".csv" else "row"
-
-
 def table_path(path: str | os.PathLike[str]) -> Path:
     """Return the path if a table can be written there; ask before long work."""
     target = output_path(path, SUFFIXES, "table")
@@ -59,13 +43,18 @@ def open_table(
         MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
     suffix = source.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"{source}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
+            f"{source.suffix!r}"
+        )
     if suffix == ".xlsx":
         return open_workbook(source, stack, sheet)
     if sheet is not None:
         raise InputError(f"{source} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
-    return (
-        open_parquet(source, stack) if suffix == ".parquet" else open_csv(source, stack, fast=fast)
-    )
+    if suffix == ".parquet":
+        return open_parquet(source, stack)
+    return open_csv(source, stack, fast=fast)
 
 
 def table_writer(

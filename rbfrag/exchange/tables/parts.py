@@ -94,12 +94,14 @@ class TableFile:
         names: what its columns are called; empty for one without a name.
         read: returns its parts, by the columns that hold numbers.
         remarks: what is to be said of it; all of it when its parts have been read.
+        word: what its rows are counted by: line, row or feature.
         dialect: how to write CSV that is like it.
     """
 
     names: Sequence[str]
     read: Callable[[Container[str]], Parts]
     remarks: list[str] = field(default_factory=list)
+    word: str = "row"
     dialect: Dialect = field(default_factory=Dialect)
 
     @property
