@@ -21,7 +21,6 @@ from rbfrag.db.model_file import read_models
 from rbfrag.db.models import save_model
 from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     discrete_function,
@@ -33,6 +32,7 @@ from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table
+from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.branch_weights import realization_weights
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves

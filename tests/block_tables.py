@@ -26,5 +26,5 @@ def read_columns(
         columns, faults, lines = table.whole()
     if faults:
         i = min(faults)
-        raise InputError(f"{path}, {table.word} {lines[i]}: {faults[i]}")
+        raise InputError(f"{path}, {table.file.word} {lines[i]}: {faults[i]}")
     return {fields[field]: values for field, values in columns.items()}

@@ -79,8 +79,8 @@ def print_warnings(warnings: Iterable[str]) -> None:
 
 def write_table(columns: Mapping[str, Any], out: str | PathLike[str], *, excel_text: bool) -> None:
     """Write the table of a command, and warn of texts that spreadsheets take for formulas."""
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.excel_text import formula_warnings
+    from rbfrag.exchange.tables.files import write_block_table
 
     write_block_table(columns, out, excel_text=excel_text)
     if not excel_text and str(out).lower().endswith(".csv"):

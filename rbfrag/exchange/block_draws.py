@@ -32,7 +32,7 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
     with opened_table(path, (*_FIELDS, "weight"), ()) as table:
         columns, faults, lines = table.whole()
     if faults:
-        places = [f"{table.word} {lines[i]}" for i in sorted(faults)]
+        places = [f"{table.file.word} {lines[i]}" for i in sorted(faults)]
         raise InputError(f"{path}, {in_list(places, (faults[i] for i in sorted(faults)))}")
     weight = columns.pop("weight", None)
     drawn = {name: values for name, values in columns.items() if not np.isnan(values).all()}

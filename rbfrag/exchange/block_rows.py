@@ -176,7 +176,6 @@ def read_blocks(
     *,
     reads: Collection[str] = (*PLACE, *PORTFOLIO),
     one_kind: bool = False,
-    only: Collection[str] = (),
     for_all: Mapping[str, float] | None = None,
     sheet: str | None = None,
 ) -> BlockRows:
@@ -191,7 +190,6 @@ def read_blocks(
             ``loss_sigma`` the answer needs; what is wrong with others is no concern.
         one_kind: all are answered as of one kind, that which is named, or else that of most rows:
             others cannot be used.
-        only: numbers that the answer reads of a block; () for those of every kind.
         for_all: fields that are stated of all blocks; a cell goes before.
         sheet: of a workbook, the name of the sheet; None for the first.
 
@@ -241,64 +239,35 @@ def read_blocks(
             own[group.places] = each
     assert blocks.kinds is not None
     columns["kind"] = np.array([*KINDS, ""], dtype=object)[blocks.kinds]
-    _refuse_kinds(columns["kind"], reasons, kind, one_kind=one_kind, only=only)
+    usable = columns["kind"][reasons == ""]
+    if one_kind and usable.size:
+        one = kind or Counter(usable.tolist()).most_common(1)[0][0]
+        for i in np.flatnonzero((reasons == "") & (columns["kind"] != one)).tolist():
+            own = columns["kind"][i]
+            reasons[i] = f"the block's kind is {own}, and the answer is for kind {one}"
     _refuse_columns(columns, reasons)
     for i, fault in faults.items():
         reasons[i] = fault
     remarks = (*blocks.remarks, *table.remarks({*blocks.read, *TEXTS, *PLACE, *PORTFOLIO}))
     columns |= {"row": np.arange(size), "line": np.array(lines, dtype=np.int64)}
-    return BlockRows(columns, reasons, name, table.word, named, remarks).checked()
-
-
-def _refuse_kinds(
-    kinds: NDArray[np.object_],
-    reasons: NDArray[np.object_],
-    kind: str | None,
-    *,
-    one_kind: bool,
-    only: Collection[str],
-) -> None:
-    """Say of rows whose kind the answer is not for why they cannot be used."""
-    counts = Counter(kinds[reasons == ""].tolist())
-    whys = {
-        own: f"a block of kind {own} is not described by {' and '.join(only)}"
-        for own in counts
-        if not {*facts_of(own).parameters}.issuperset(only)
-    }
-    left = Counter({own: count for own, count in counts.items() if own not in whys})
-    if one_kind and left:
-        one = kind or left.most_common(1)[0][0]
-        whys |= {
-            own: f"the block's kind is {own}, and the answer is for kind {one}"
-            for own in left
-            if own != one
-        }
-    for own, why in whys.items():
-        reasons[(reasons == "") & (kinds == own)] = why
+    return BlockRows(columns, reasons, name, table.file.word, named, remarks).checked()
 
 
 def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
     """Say of rows why their place, count, weight or loss cannot be used."""
 
-    def say(wrong: NDArray[np.bool_], text: str) -> None:
+    def say(wrong: NDArray[np.bool_], text: str, *names: str) -> None:
         for i in np.flatnonzero(wrong & (reasons == "")).tolist():
-            reasons[i] = text.format(**{name: columns[name][i] for name in about})
+            reasons[i] = text.format(*(columns[name][i] for name in names))
 
-    about: tuple[str, ...] = PLACE
     if "lon" in columns:
         on_map = (np.abs(columns["lon"]) <= 180.0) & (np.abs(columns["lat"]) <= 90.0)
-        say(~on_map, "lon = {lon:g}, lat = {lat:g} is no place on the map")
-    for name in {*PORTFOLIO} & {*columns}:
-        about = (name,)
-        numbers = columns[name]
-        say(
-            (numbers < 0.0) | (numbers == np.inf),
-            f"{name} = {{{name}:g}}: give a number not below zero",
-        )
+        say(~on_map, "lon = {:g}, lat = {:g} is no place on the map", *PLACE)
+    for name in PORTFOLIO:
+        if name in columns:
+            own = columns[name]
+            say((own < 0.0) | (own == np.inf), name + " = {:g}: give a number not below zero", name)
     if "count" in columns:
-        about, count = ("count",), columns["count"]
-        say(
-            (count < 1.0) | (count != np.rint(count)),
-            "count = {count:g}: give the number of like blocks, a whole number from 1 on, or a "
-            "weight",
-        )
+        own = columns["count"]
+        whole = "give the number of like blocks, a whole number from 1 on, or a weight"
+        say((own < 1.0) | (own != np.rint(own)), f"count = {{:g}}: {whole}", "count")

@@ -1,29 +1,20 @@
-"""A table of blocks, in a file, as GeoJSON points or as given: which column states which field."""
+"""A table of blocks: what its columns state, and of which rows something is wrong."""
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, checked_name
-from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
-from rbfrag.exchange.points import SUFFIXES as GEOJSON
-from rbfrag.exchange.points import read_points
-from rbfrag.exchange.tables.files import (
-    open_table,
-    table_path,
-    table_writer,
-)
+from rbfrag.exchange.excel_text import as_written
+from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
-from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, columns_declared, names_of
@@ -38,34 +29,6 @@ IF_EMPTY = {name: 0.0 for name in columns_declared() if name.endswith("_sigma")}
     "weight": 1.0,
 }
 """What an empty cell of a field stands for."""
-
-_LARGE = 1 << 20
-"""Bytes of CSV that are worth loading pyarrow for."""
-
-
-def write_block_table(
-    columns: Mapping[str, NDArray[Any]],
-    path: str | os.PathLike[str],
-    *,
-    excel_text: bool = False,
-) -> Path:
-    """Write a table of blocks, whole or not at all, and return its path.
-
-    Numbers keep all their digits. NaN is an empty cell in CSV and null in Parquet.
-
-    Args:
-        columns: arrays of one length by column name, units in the names.
-        path: file to write, ``.csv``, ``.xlsx`` or ``.parquet``; an existing file is replaced.
-        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
-    """
-    target = table_path(path)
-    if excel_text and target.suffix.lower() == ".csv":
-        columns = changed_texts(columns, as_text)
-    length = len(next(iter(columns.values())))
-    with written_whole(target, "table") as partial, ExitStack() as stack:
-        write = table_writer(partial, [*columns], stack=stack)
-        write(Part(range(length), dict(columns)), {})
-    return target
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,16 +48,6 @@ class BlockTable:
     stated: Header
     texts: Collection[str]
     filled: set[str] = field(default_factory=set)
-
-    @property
-    def word(self) -> str:
-        """What its rows are counted by."""
-        return self.file.word
-
-    @property
-    def header(self) -> list[str]:
-        """What its columns are called."""
-        return self.file.header
 
     @property
     def numeric(self) -> frozenset[str]:
@@ -141,7 +94,7 @@ class BlockTable:
             read: the fields that the answer depends on, or hands on.
         """
         empty = {c.header for name, c in self.stated.columns.items() if name not in self.filled}
-        named = [name for name in self.header if name not in empty]
+        named = [name for name in self.file.header if name not in empty]
         return (*self.file.remarks, *self.stated.remarks, *self.stated.unread(named, read))
 
     def check(self, given: Collection[str] = (), kind: str | None = None) -> None:
@@ -165,7 +118,7 @@ class BlockTable:
                 self._refuse(name)
 
     def _refuse(self, missing: str) -> None:
-        have = ", ".join(self.header) or "none"
+        have = ", ".join(self.file.header) or "none"
         raise InputError(f"{self.name}: there is no column {missing}; the columns are {have}")
 
     def whole(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:
@@ -211,47 +164,6 @@ def opened_table(
         MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
     with ExitStack() as stack:
+        file = open_table(source, stack, sheet=sheet)
         name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
-        if not isinstance(source, str | os.PathLike):
-            file = _of_one_part(given_part(source), "row")
-        elif (path := Path(source)).suffix.lower() in GEOJSON:
-            file = _of_one_part(read_points(path), "feature")
-        else:
-            stack.enter_context(_reading(path))
-            fast = path.is_file() and path.stat().st_size > _LARGE
-            file = open_table(path, stack, sheet=sheet, fast=fast)
-        stated = columns_in(file.header, name, (*read, *texts))
-        yield BlockTable(name, file, stated, texts)
-
-
-@contextmanager
-def _reading(source: Path) -> Iterator[None]:
-    try:
-        with reading(source, "a block table"):
-            yield
-    except csv.Error as error:
-        raise InputError(f"{source}: not a CSV file: {error}") from None
-
-
-def _of_one_part(part: Part, word: str) -> TableFile:
-    return TableFile([*part.cells], lambda _: iter([part]), word=word)
-
-
-def given_part(columns: Mapping[str, Any]) -> Part:
-    """Return columns by name, such as a pandas table, as the rows of a table."""
-    cells = {str(name): np.ravel(np.asarray(column)) for name, column in columns.items()}
-    if len({column.size for column in cells.values()}) > 1:
-        sizes = ", ".join(f"{name} {column.size}" for name, column in cells.items())
-        raise InputError(f"the columns of the blocks differ in length: {sizes}")
-    size = next((column.size for column in cells.values()), 0)
-
-    def as_cells(column: NDArray[Any]) -> Any:
-        if column.dtype.kind in "iuf":
-            return column.astype(np.float64)
-        # what is missing is None, NaN, NaT or NA, as Python, numpy and pandas have it
-        return [
-            None if type(cell).__name__ == "NAType" or cell != cell else cell
-            for cell in column.tolist()
-        ]
-
-    return Part(range(1, size + 1), {name: as_cells(column) for name, column in cells.items()})
+        yield BlockTable(name, file, columns_in(file.header, name, (*read, *texts)), texts)

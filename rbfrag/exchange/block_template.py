@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.exchange.tables.workbook import openpyxl
 from rbfrag.files import output_path, written_whole
 from rbfrag.question.fields import (

@@ -103,7 +103,7 @@ def predict_table(
                 words.update(dict.fromkeys(filter(None, own)))
             finite = np.isfinite(answer["probability"])
             for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
-                refused[f"{table.word} {part.lines[i]}"] = answer["reason"][i]
+                refused[f"{table.file.word} {part.lines[i]}"] = answer["reason"][i]
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
         total, answered, inside = counts.tolist()
         if not total:
@@ -174,10 +174,10 @@ def _written(
     excel_text: bool,
 ) -> Write:
     """Return what writes parts and their answers to a file; enters what is to be said of it."""
-    doubled = next((name for name in table.header if table.header.count(name) > 1), None)
+    doubled = next((name for name in table.file.header if table.file.header.count(name) > 1), None)
     if doubled is not None:
         raise InputError(f"{table.name}: the column {doubled} is there twice")
-    kept = [name for name in table.header if name not in (*ANSWERS, OF_UNCERTAIN)]
+    kept = [name for name in table.file.header if name not in (*ANSWERS, OF_UNCERTAIN)]
     write = table_writer(
         partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
         fast=True,

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_rows import BlockRows, read_blocks
-from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.table_answers import predict_table
+from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.fragility.unusable import in_list, unusable_in_words
 from tests.block_tables import read_columns
 

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.exchange import block_table
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.tables import files
+from rbfrag.exchange.tables.files import write_block_table
 from tests.block_tables import read_columns
 
 TABLE = {
@@ -83,7 +83,7 @@ def test_a_failure_keeps_the_older_file(
         place.write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(block_table, "table_writer", fail)
+    monkeypatch.setattr(files, "table_writer", fail)
     with pytest.raises(InputError, match="No space left"):
         write_block_table(TABLE, path)
     assert path.read_text() == "older"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.excel_text import as_text, as_written, formula_warnings
 from rbfrag.exchange.table_answers import predict_table
+from rbfrag.exchange.tables.files import write_block_table
 from tests.cli.conftest import Shell
 from tests.synthetic import shaking, write_at2
 

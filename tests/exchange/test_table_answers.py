@@ -13,9 +13,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.table_answers import ANSWERS, predict_table
 from rbfrag.exchange.tables import csv_file, parts
+from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.question.question import predict
 from tests.block_tables import read_columns
 from tests.fragility.conftest import model_row

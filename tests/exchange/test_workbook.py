@@ -15,9 +15,9 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables import workbook
+from rbfrag.exchange.tables.files import write_block_table
 from tests.block_tables import read_columns
 
 HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import csv
 import os
-from collections.abc import Container, Sequence
-from contextlib import ExitStack
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.exchange.excel_text import as_text, changed_texts
+from rbfrag.exchange.points import SUFFIXES as GEOJSON
+from rbfrag.exchange.points import read_points
 from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
 from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
-from rbfrag.exchange.tables.parts import Dialect, TableFile, Write, pyarrow
+from rbfrag.exchange.tables.parts import Dialect, Part, TableFile, Write, pyarrow
 from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer
-from rbfrag.files import output_path
+from rbfrag.files import output_path, reading, written_whole
 
 SUFFIXES = (".csv", ".xlsx", ".parquet")
 """File types of a table of blocks."""
+
+_LARGE = 1 << 20
+"""Bytes of CSV that are worth loading pyarrow for, which takes a third of a second."""
 
 
 def table_path(path: str | os.PathLike[str]) -> Path:
@@ -28,33 +39,75 @@ def table_path(path: str | os.PathLike[str]) -> Path:
 
 
 def open_table(
-    source: Path, stack: ExitStack, *, sheet: str | None = None, fast: bool = False
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    stack: ExitStack,
+    *,
+    sheet: str | None = None,
 ) -> TableFile:
     """Return a table that is open.
 
     Args:
-        source: the file.
-        stack: closes it at the end.
+        source: a table's file, a file of GeoJSON points, or columns by name, such as a pandas
+            table.
+        stack: closes it at the end, and says in words what is wrong with the file.
         sheet: of a workbook, the name of the sheet; None for the first.
-        fast: read CSV by pyarrow where it is installed, which takes a third of a second to load.
 
     Raises:
         InputError: the file cannot be read, or has no such sheet.
         MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
-    suffix = source.suffix.lower()
+    if not isinstance(source, str | os.PathLike):
+        return _of_one_part(_given_part(source), "row")
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if suffix in GEOJSON:
+        return _of_one_part(read_points(path), "feature")
     if suffix not in SUFFIXES:
         raise InputError(
-            f"{source}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
-            f"{source.suffix!r}"
+            f"{path}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
+            f"{path.suffix!r}"
         )
+    stack.enter_context(_reading(path))
     if suffix == ".xlsx":
-        return open_workbook(source, stack, sheet)
+        return open_workbook(path, stack, sheet)
     if sheet is not None:
-        raise InputError(f"{source} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
+        raise InputError(f"{path} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
     if suffix == ".parquet":
-        return open_parquet(source, stack)
-    return open_csv(source, stack, fast=fast)
+        return open_parquet(path, stack)
+    return open_csv(path, stack, fast=path.is_file() and path.stat().st_size > _LARGE)
+
+
+@contextmanager
+def _reading(source: Path) -> Iterator[None]:
+    try:
+        with reading(source, "a block table"):
+            yield
+    except csv.Error as error:
+        raise InputError(f"{source}: not a CSV file: {error}") from None
+
+
+def _of_one_part(part: Part, word: str) -> TableFile:
+    return TableFile([*part.cells], lambda _: iter([part]), word=word)
+
+
+def _given_part(columns: Mapping[str, Any]) -> Part:
+    """Return columns by name, such as a pandas table, as the rows of a table."""
+    cells = {str(name): np.ravel(np.asarray(column)) for name, column in columns.items()}
+    if len({column.size for column in cells.values()}) > 1:
+        sizes = ", ".join(f"{name} {column.size}" for name, column in cells.items())
+        raise InputError(f"the columns of the blocks differ in length: {sizes}")
+    size = next((column.size for column in cells.values()), 0)
+
+    def as_cells(column: NDArray[Any]) -> Any:
+        if column.dtype.kind in "iuf":
+            return column.astype(np.float64)
+        # what is missing is None, NaN, NaT or NA, as Python, numpy and pandas have it
+        return [
+            None if type(cell).__name__ == "NAType" or cell != cell else cell
+            for cell in column.tolist()
+        ]
+
+    return Part(range(1, size + 1), {name: as_cells(column) for name, column in cells.items()})
 
 
 def table_writer(
@@ -83,3 +136,28 @@ def table_writer(
         return csv_writer(partial, header, answers, numeric, stack, dialect or Dialect(), fast=fast)
     make = parquet_writer if suffix == ".parquet" else workbook_writer
     return make(partial, header, answers, numeric, stack)
+
+
+def write_block_table(
+    columns: Mapping[str, NDArray[Any]],
+    path: str | os.PathLike[str],
+    *,
+    excel_text: bool = False,
+) -> Path:
+    """Write a table of blocks, whole or not at all, and return its path.
+
+    Numbers keep all their digits. NaN is an empty cell in CSV and null in Parquet.
+
+    Args:
+        columns: arrays of one length by column name, units in the names.
+        path: file to write, ``.csv``, ``.xlsx`` or ``.parquet``; an existing file is replaced.
+        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
+    """
+    target = table_path(path)
+    if excel_text and target.suffix.lower() == ".csv":
+        columns = changed_texts(columns, as_text)
+    length = len(next(iter(columns.values())))
+    with written_whole(target, "table") as partial, ExitStack() as stack:
+        write = table_writer(partial, [*columns], stack=stack)
+        write(Part(range(length), dict(columns)), {})
+    return target
