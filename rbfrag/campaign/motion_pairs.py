@@ -37,7 +37,6 @@ def motion_pairs(
     """Return the pairs of a campaign, the longest first.
 
     Args:
-        suite: only the horizontal motions of this suite.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:

@@ -66,7 +66,6 @@ class CampaignPlan:
     Args:
         motions: the longest records first, so that no worker is left with one at the end.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
-        warnings: sentences about these.
     """
 
     kind: str

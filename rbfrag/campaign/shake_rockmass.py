@@ -42,7 +42,6 @@ def shake(
     The answer does not depend on the number of workers.
 
     Args:
-        scales: factors on the motion.
         vertical: vertical motion of the same recording, upward positive; scaled likewise.
         polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
         jobs: worker processes; None for one per processor, where there is work enough for them.

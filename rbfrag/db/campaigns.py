@@ -68,7 +68,6 @@ class KnownCombination:
     """What a campaign asks about a combination that is stored already.
 
     Args:
-        status: of its search.
         kr_over_pga: its critical value, if one was found.
         certified: whether that is proven.
         reentrant: whether a safe island lies below it; None where no map was made.

@@ -19,7 +19,6 @@ class ColumnMeaning:
     Args:
         type: ``integer``, ``number`` (float64), ``true/false``, ``text`` or ``array`` (float64).
         unit: its unit; empty for none, ``k_r/PGA`` for a k_r over the motion's PGA in g.
-        meaning: one sentence.
         may_be_missing: whether a row may have no value.
         refers_to: the table and column it points to; empty for none.
     """
@@ -34,12 +33,7 @@ class ColumnMeaning:
 
 @dataclass(frozen=True)
 class TableMeaning:
-    """One table.
-
-    Args:
-        meaning: one sentence.
-        columns: its columns, in order.
-    """
+    """One table."""
 
     name: str
     meaning: str

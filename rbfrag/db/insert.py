@@ -63,7 +63,6 @@ def insert_rows(
     value would cost more than the insertion.
 
     Args:
-        columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
             scalars are not understood by every driver.
         on_conflict: SQL that says what becomes of a row whose key is there.

@@ -28,7 +28,6 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
 
     Args:
         row: the model; without a time of creation it is now.
-        replace: overwrite a model of the same name.
 
     Returns:
         The model as stored.

@@ -79,7 +79,6 @@ def add_motion(
     Args:
         motion: equally spaced samples [g].
         earthquake: where it belongs; without an event_id it stands for itself alone.
-        is_vertical: True for a vertical component.
         recording: what all components of one recording share; when empty, the motion's own,
             or else file and trace, so that strangers never become companions.
         station: station; when empty, the motion's own.

@@ -37,9 +37,7 @@ class DatabaseInfo:
     """What a database holds.
 
     Args:
-        revision: its schema.
         dialect: ``sqlite`` or ``postgresql``.
-        rows: number of rows by table.
         numerics_versions: versions of the solver that made its combinations.
         default_model: name of the model of toppling that answers when none is named.
     """
@@ -96,7 +94,6 @@ def combination_table(
     Args:
         rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
             and of kinds that know none.
-        numerics_version: of the solver.
         doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
             final velocity or displacement; by default it is NaN, so that no fit reads it.
 

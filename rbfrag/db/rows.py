@@ -20,7 +20,6 @@ class EarthquakeInfo:
 
     Args:
         event_id: the key that earthquakes are told apart by.
-        name: name for people.
         magnitude: magnitude as the source gives it (scale not harmonised), if known.
         time: origin time or year as text, if known.
         guessed: True when the event was read off a file header instead of stated by metadata.

@@ -27,7 +27,6 @@ class ShockEnd(NamedTuple):
     """How one motion of two leaves a block.
 
     Args:
-        outcome: how the run ended.
         displacement_m: slip along the base since the block's first place [m]; None if not known.
         rotation_rad: rotation that is left [rad]; None of slides, and if not known.
         peak_rad: greatest rotation [rad]; None of slides, and where the block failed.
@@ -50,11 +49,8 @@ class ShockPairRecord:
     Args:
         natural_key: from :func:`rbfrag.db.keys.pair_key`.
         pairing: ``station`` for two shocks of one station, ``drawn`` for others.
-        polarity: of both.
         yield_g: yield acceleration in its first place [g].
         critical_rad: rotation without strength [rad]; None of slides.
-        first: after the first motion.
-        second: after both.
         intact: after the second alone.
     """
 
@@ -79,11 +75,8 @@ class ShockPairRow(NamedTuple):
     Args:
         event_id: earthquake of the second motion.
         pga_g: its PGA [g].
-        pairing: ``station`` or ``drawn``.
         yield_g: yield acceleration of the block [g].
         critical_rad: rotation without strength [rad]; None of slides.
-        first: after the first motion.
-        second: after both.
         intact: after the second alone.
     """
 

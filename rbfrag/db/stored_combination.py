@@ -31,7 +31,6 @@ class StoredCombination:
 
     Args:
         pga_g: PGA of the horizontal motion [g].
-        values: the columns of the combination by name.
         settings: what else went into its natural key.
         block: which block it is; None for toppling.
         campaign_settings: what the campaign that made it was asked for, and on which machine.

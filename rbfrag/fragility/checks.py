@@ -70,7 +70,6 @@ class Finding:
     """One thing found about a question.
 
     Args:
-        holds: whether (where) it is so.
         name: the value concerned.
         text: what is wrong and what to do.
     """
@@ -148,8 +147,6 @@ class Judgement(NamedTuple):
     """An answer with what was found about the question.
 
     Args:
-        answer: what the model says.
-        values: the completed values.
         intensity_m_s: the intensity term as it is [m/s].
         missing: where no answer is possible.
         in_domain: whether block and motion lie in the ranges that were fitted.

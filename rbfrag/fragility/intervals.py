@@ -65,7 +65,6 @@ class ParameterErrors:
 
         Args:
             x: slopes of eta by the parameters, numbers or arrays.
-            quantiles: of the confidence level.
         """
         g = len(self.steps)
         if not g:
@@ -209,11 +208,8 @@ def _incomplete_beta(a: float, b: float, x: float, rest: float, log_beta: float)
     """Return I_x(a, b) by its continued fraction (NIST DLMF 8.17.22), Lentz's way.
 
     Args:
-        a: first parameter.
-        b: second parameter.
         x: upper limit, below (a + 1)/(a + b + 2).
         rest: 1 - x.
-        log_beta: ln B(a, b).
     """
     c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
     value = d

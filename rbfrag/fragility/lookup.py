@@ -33,8 +33,6 @@ class _Store:
     Args:
         place: its name in messages.
         stamp: what tells whether the file has changed since; () where nothing can.
-        rows: the models of all kinds.
-        models: those that have answered, by name.
         suited: those that have been found to suit a question, the recommended first.
     """
 
@@ -321,9 +319,6 @@ def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
 def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
     """Return a model of a database as it is stored.
 
-    Args:
-        db: database, as for :func:`find_model`.
-
     Raises:
         UnknownModelError: no model of that name.
     """
@@ -331,11 +326,7 @@ def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
 
 
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
-    """Return the models of a database as they are stored, sorted by name.
-
-    Args:
-        db: database, as for :func:`find_model`.
-    """
+    """Return the models of a database as they are stored, sorted by name."""
     return list(_store(db).rows)
 
 

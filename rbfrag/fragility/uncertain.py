@@ -269,7 +269,6 @@ def uncertain_model(
     """Return the model that answers a question, and the question without sigmas that are 0.
 
     Args:
-        model: the model of certain blocks.
         given: the question, with standard deviations among its values.
 
     Raises:

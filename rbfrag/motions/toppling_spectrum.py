@@ -226,9 +226,7 @@ def spectrum_as_dict(
 
     Args:
         motion: the motion as the caller names it.
-        ground: the motion itself.
         p2: frequency parameters [1/s²].
-        polarity: forward or reverse.
     """
     return {
         "motion": motion,

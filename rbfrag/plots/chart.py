@@ -96,7 +96,6 @@ def draw_chart(
     """Draw the chart of :func:`plot_chart` into axes.
 
     Args:
-        axes: empty axes.
         point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
     """
     across, up = _known_ranges(model, held)

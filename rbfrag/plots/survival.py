@@ -44,11 +44,7 @@ _LEAST_RATE = 1e-7
 def plot_survival(
     curves: Sequence[HazardCurve], answer: SurvivalAnswer, path: str | PathLike[str]
 ) -> Path:
-    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights.
-
-    Args:
-        answer: what the blocks say of them.
-    """
+    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights."""
     plot_path(path)
     weighted = [one for one in answer.branches if one.weight is not None]
     figure = new_figure(11.0 if weighted else 9.0, 4.6)

@@ -96,8 +96,7 @@ class ScaleFailures:
     """What became of the blocks at one scale of the motion.
 
     Args:
-        scale: factor on the motion.
-        pga_g: its PGA [g].
+        pga_g: PGA of the scaled motion [g].
         modes: by mode, for the modes that have blocks.
     """
 

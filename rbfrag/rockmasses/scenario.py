@@ -81,9 +81,6 @@ class Scenario:
 
     Args:
         model: name of the model that answered; None if no block needed one.
-        term: its intensity term.
-        method: how it was fitted.
-        modes: answers by mode, for the modes that have blocks.
         covered: average over all blocks for which there is an answer, and over no others.
         covered_share: the share of these among all blocks.
         uncovered_share: share of the blocks without an answer, by mode.
@@ -141,7 +138,6 @@ def scenario(
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
             [m], sa03_g, sa10_g, sa20_g, sa30_g [g].
         model: as in :func:`rbfrag.question.question.predict`.
-        db: database of the models.
         displacement_m: how far is too far for a block that slides [m]; None for an answer of
             toppling alone.
         rotation_deg: with it, the rotation that is failure of a block that slumps [deg]; None

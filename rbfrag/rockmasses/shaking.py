@@ -225,7 +225,6 @@ class ShakingPlan:
     """What is known of the blocks without running any, and which ones have to be run.
 
     Args:
-        shaking: the motion and its scales.
         code: places in :data:`OUTCOMES`, -1 for no block, shape (scales, n); ``at_rest`` where a
             block is still to be run.
         moves: which block moves, and is to be run, at which scale, shape (scales, n).
@@ -263,11 +262,7 @@ class ShakingPlan:
             )
 
     def gathered(self, answers: Iterable[BlockOutcomes]) -> ShakenMass:
-        """Return the outcomes of all blocks; the order of the answers does not matter.
-
-        Args:
-            answers: to all of :meth:`work`.
-        """
+        """Return the outcomes of all blocks; the order of the answers does not matter."""
         code = self.code.copy()
         at_rest = (self.code == AT_REST) | (self.code == LOCKED)
         mode_code = self.realisations.stability.mode_code

@@ -8,12 +8,7 @@ from rbfrag.errors import InputError
 
 
 def number(value: object, name: str, what: str) -> float:
-    """Return a finite number as a float.
-
-    Args:
-        name: its name, for the message.
-        what: what it should be, for the message.
-    """
+    """Return a finite number as a float."""
     if isinstance(value, bool | str | bytes):
         raise InputError(f"{name} = {value!r} is not a number: give {what}")
     try:

@@ -109,7 +109,6 @@ class ModeChange:
 
     Args:
         time_s: when [s].
-        motion: what it does from then on.
     """
 
     time_s: float
@@ -156,7 +155,6 @@ class Part:
     Args:
         begins_s: when it begins, on the clock of the sequence [s].
         first_s: time of its first sample on its own clock [s].
-        motion: its label.
         start: the state that it finds; None for a block at rest in its first place.
         response: the answer to it alone, on its own clock.
     """

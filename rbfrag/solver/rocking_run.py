@@ -151,7 +151,6 @@ def corner_force(
     across it (physics of toppling, section 5); backward rotation is the mirror image.
 
     Args:
-        history: its motion.
         tan_phi: coefficient of friction of the base; infinite where it does not slip.
         until_s: time up to which it is of interest [s].
     """

@@ -32,7 +32,6 @@ class Ledger:
     """Counts, notes and conflicts, gathered while a merge goes on.
 
     Args:
-        added: rows added by table.
         same: rows that were there already by table.
         restated: motions whose guessed earthquake became a stated one.
         within_error: combinations and histories that differ by no more than the solver's error.

@@ -88,12 +88,7 @@ def _check(
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Calibration of one model on earthquakes left out.
-
-    Args:
-        bins: predicted and observed.
-        outcomes: what the outcomes are, in words.
-    """
+    """Calibration of one model on earthquakes left out."""
 
     name: str
     bins: CalibrationBins

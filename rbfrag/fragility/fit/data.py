@@ -59,7 +59,6 @@ class FitSource:
     """Combinations with all that the methods of fitting read, columns of equal length.
 
     Args:
-        table: critical values and intensities.
         xp_m_s: toppling spectrum at each combination's p² and polarity [m/s], shape (n,); NaN
             where it is not stored.
         k_over_pga: strengths of the blocks of the outcome grid, shape (n, m).
@@ -146,7 +145,6 @@ def read_source(
         kind: response kind; None for the one that `block` stands for.
         rotation_deg: the rotation that counts as failure [deg], of kinds that have one; None for
             failure past recovery.
-        suite: only motions of this suite.
         doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
     from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
@@ -225,7 +223,6 @@ class FitData:
     """Rows of one fit: the points at which blocks just fail, and the blocks of the grid.
 
     Args:
-        kind: response kind.
         values: what formulas read at the point of failure, by name, shape (n,): measures of the
             shaking, the block's parameters, the intensity. For censored rows at the limit beyond
             which the block fails; NaN where nothing was searched.
@@ -243,7 +240,6 @@ class FitData:
         scored: which of these it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
-        n_total: number of combinations read.
         n_excluded: found combinations left out because the term is not defined.
         n_outside_model: combinations for which the block model does not apply.
         guessed_events: number of earthquakes read off file headers.
@@ -335,7 +331,6 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
 
     Args:
         source: critical values, spectra and outcomes as the database returns them.
-        method: the method of fitting.
         kind: response kind; None for the one that the method's block stands for.
 
     Raises:

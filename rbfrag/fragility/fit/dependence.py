@@ -45,7 +45,6 @@ class DependenceEstimate:
 
     Args:
         errors: standard error of each by its name, from resamples of earthquakes.
-        earthquakes: number of earthquakes with pairs.
         pairs: number of pairs read of other sites, other components of a site, same component.
         seed: seed of resamples and of the pairs drawn.
     """
@@ -277,7 +276,6 @@ def _own(
     Args:
         own: of pairs of one component.
         times: how often each earthquake counts.
-        start: where the search begins.
         shared: ρ_e + ρ_s and λ_e.
     """
     of_own, left = own.likelihood(times), 1.0 - shared[0]
@@ -310,7 +308,6 @@ def _least(
     """Return where a function of shares and logarithms of lengths is least, from several starts.
 
     Args:
-        starts: where the search begins.
         shares: how many of its arguments are shares.
         most: greatest share.
     """

@@ -262,7 +262,6 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
 
     Args:
         term: the intensity term, which sets the degree of v(x).
-        seed: seed of the bootstrap.
 
     Raises:
         FitError: the line does not rise with intensity, or there is no scatter.
@@ -365,8 +364,6 @@ def event_bootstrap(
         bins: bins over the rising intensities.
         y: critical toppling velocities [m/s].
         events: number of each point's earthquake.
-        degree: degree of the variance polynomial.
-        start: parameters of the fit to all data.
 
     Returns:
         The parameters, and how many replicates did not become stable.

@@ -28,8 +28,6 @@ class Numbers(NamedTuple):
     Args:
         ndtr: standard normal distribution function.
         expm1: exponential less one.
-        maximum: the larger of two.
-        minimum: the smaller of two.
         sin: sine of an angle [rad].
         cos: its cosine.
         ndtri: its inverse.
@@ -107,7 +105,6 @@ class Link(NamedTuple):
     """A function from eta to probability.
 
     Args:
-        name: as reports call it.
         probability: F(eta, functions).
         density: F'(eta, functions).
         quantile: eta of a probability between 0 and 1, from it and functions.
@@ -157,7 +154,6 @@ class Bound(NamedTuple):
     Args:
         holds: whether (where) it is so, from values by name.
         about: name of the value that it is said of.
-        text: what is said.
     """
 
     holds: Callable[[Mapping[str, Any]], Any]
@@ -356,7 +352,6 @@ class Form:
 
         Args:
             parameters: of the formula, in its order.
-            values: completed values by name.
         """
         formula = self.formula(parameters, values, ns)
         return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
@@ -385,10 +380,7 @@ class Method:
     """One method of fitting.
 
     Args:
-        name: name in options and in the database.
-        block: what describes its blocks.
         link: F in P = F(eta).
-        forms: its formulas by name of the measure.
         reads: what it is fitted to: ``outcomes`` of blocks on the grid, or ``critical`` values.
         meaning: what the probability is one of, in words.
         fit: module and function that fit it, as ``module:function``.

@@ -117,7 +117,6 @@ class RecordFile:
     """A file that is being read. Every refusal is a MotionFileError that names the line.
 
     Args:
-        text: the file's text.
         units: unit of acceleration that the caller states, or None.
         dt_s: sampling interval that the caller states [s], or None.
         allow_partial: True to read a file whose header states another number of samples than
@@ -279,7 +278,6 @@ class RecordFile:
         They stand below 7 lines of integers and 7 of reals, and end with a line ``/&``.
 
         Args:
-            span: indices of the block's lines.
             header_line: 1-based line of the last header field, above the numbers.
         """
         lines = self.lines
@@ -342,7 +340,6 @@ class RecordFile:
             rows: the lines that hold them; only the last may hold fewer than the others.
             first_line: 1-based line of the first.
             layout: fields a line, and characters a field, the number at its right end.
-            what: what the numbers are, for messages.
         """
         per_line, width = layout
         rows = [row.rstrip() for row in rows]

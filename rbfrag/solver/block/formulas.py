@@ -67,7 +67,6 @@ def tan_deg(angle_deg: N, functions: Elementwise[N]) -> N:
 
     Args:
         angle_deg: angle [deg], scalar or array; NaN gives NaN.
-        functions: the functions for this kind of number.
     """
     where = functions.where
     steep = abs(angle_deg) > 45.0
@@ -83,7 +82,6 @@ def cot_deg(angle_deg: N, functions: Elementwise[N]) -> N:
 
     Args:
         angle_deg: angle [deg], scalar or array; NaN gives NaN.
-        functions: the functions for this kind of number.
     """
     where = functions.where
     steep = abs(angle_deg - 90.0) <= 45.0
@@ -124,7 +122,6 @@ def tangents_from_spacings(
         s1_m: spacing of the base fractures [m].
         s2_m: spacing of the back fractures [m].
         gamma_deg: dip of the back less dip of the base [deg].
-        functions: the functions for this kind of number.
     """
     cot = cot_deg(gamma_deg, functions)
     half_base = s2_m / s1_m * functions.sqrt(cot * cot + 1.0)

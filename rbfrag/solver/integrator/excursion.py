@@ -58,8 +58,6 @@ class Excursion(NamedTuple):
 
     Args:
         event: IMPACT, TOPPLED, IN_AIR (at the end of the record), STOPPED or ORDER_LOST.
-        state: state of the block there.
-        steps: integration steps taken.
     """
 
     event: int
@@ -167,11 +165,9 @@ def integrate_excursion(
 
     Args:
         kr: rocking acceleration coefficient.
-        start: where it begins.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
             kr the rotation rate cannot become negative, so that no impact is looked for.
         stop: where it ends; the last node for none.
-        rules: how it is followed.
     """
     interval_s = excitation.interval_s
     k_h, w = excitation.k_h, excitation.w

@@ -93,7 +93,6 @@ class FreeRun(NamedTuple):
     Args:
         time_s: when it came to rest, or ended [s].
         motion: place and velocity then.
-        steps: integration steps.
         filled: columns of the history that are filled.
         moved_s: first motion [s]; NaN for none.
         landed_s: first impact of the whole base [s]; NaN for none.
@@ -125,7 +124,6 @@ def one_step(
     """Take one step; return where it leads and what touched, as bits.
 
     Args:
-        corners: pairs of corner and plane.
         frame: the block on its slope.
         at: motion at the start.
         h: length of the step [s].
@@ -259,7 +257,6 @@ def run_free(
 
     Args:
         record: the excitation; a time may repeat.
-        corners: pairs of corner and plane.
         frame: the block on its slope.
         start_s: where in the record the run begins [s].
         h: greatest step [s].

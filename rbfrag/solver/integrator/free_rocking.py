@@ -83,8 +83,7 @@ def after_record(
         toe: the corner of forward rotation.
         heel: that of backward rotation.
         side: the present one, 1 or -1.
-        state: of the block.
-        off: its error.
+        off: error of the state.
         slowest: speed after an impact below which the block rests [rad/s].
     """
     # energy alone decides: (theta'/p)²/2 - (1 - cos x) is conserved about one corner

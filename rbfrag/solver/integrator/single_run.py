@@ -217,7 +217,6 @@ class Crossing(NamedTuple):
             then holds the rate of the impact.
         verdict_at: fraction at the end of the first step past which it has toppled, or -1.
         verdict_error: `known.error` there.
-        steps: integration steps taken.
         filled: rows of the history that are filled.
     """
 
@@ -246,10 +245,7 @@ def cross_interval(
     """Integrate from (i, tau) to the end of the interval, or to an impact before it.
 
     Args:
-        nodes: the excitation.
         tau: fraction of it to begin at.
-        state: state of the block there.
-        known: what is known of the trajectory.
         lifting: the threshold is being crossed from below: the first step holds no impact.
         rows: history to be filled with peaks; with one, the run goes on after the verdict.
         filled: how many rows are.
@@ -351,7 +347,6 @@ def after_impact(
     """Return what follows an impact at (i, tau).
 
     Args:
-        nodes: the excitation.
         i: the interval.
         tau: fraction of it.
         stuck: whether the block has not moved since it was there last.
@@ -475,7 +470,6 @@ def run_toppling(
     """Run one block over one record; the fields of :class:`Run` in order.
 
     Args:
-        nodes: the excitation.
         kr: rocking acceleration coefficient k_r.
         p: frequency parameter [1/s].
         order: degree of the Taylor step: 4, 5, 6 or 8.

@@ -17,8 +17,6 @@ class Bracket(NamedTuple):
     """Two k_r, of which one topples and the other does not.
 
     Args:
-        low: the smaller.
-        high: the greater.
         low_topples: whether it is the smaller that topples.
         at_low: distance of the smaller from toppling; infinite where it is not known.
         at_high: the same of the greater.

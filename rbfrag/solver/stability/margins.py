@@ -46,7 +46,6 @@ class Surroundings:
         phi_deg: friction angle of the base [deg].
         limit_deg: angle of the resultant at which the base slides [deg]; phi_deg unless a
             bond helps.
-        back_fracture: whether there is a back plane.
         phi_for: the friction angle [deg] with which the base slides at a given angle of the
             resultant [deg].
     """
@@ -131,12 +130,10 @@ class Finding:
     """What the warnings are about; the fields are those of the answer.
 
     Args:
-        mode: failure mode.
         k: yield acceleration of the mode.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg].
-        back_fracture: whether there is a back plane.
         backward: whether the block turns back about its heel for want of a back plane.
         untenable: whether the back contact cannot hold the block.
         lifts: whether the bond of the base would have to bear tension at the yield.

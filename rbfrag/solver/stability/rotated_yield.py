@@ -154,7 +154,6 @@ class RotatedYield(NamedTuple):
     Args:
         yield_g: function of the block and θ [deg] like :func:`ks_after_rotation`.
         limit_deg: the greatest θ, by block and `back_follows` [deg].
-        end: what happens there.
     """
 
     yield_g: Callable[..., Any]

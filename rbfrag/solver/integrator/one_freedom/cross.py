@@ -49,10 +49,8 @@ class Crossing(NamedTuple):
     Args:
         kind: `PASSED`, or the event.
         condition: which condition failed, if it is `BROKEN`.
-        state: state of the block.
         peak: greatest x so far.
         filled: columns of the history that are filled.
-        steps: integration steps.
     """
 
     kind: int
@@ -71,7 +69,6 @@ class Arrival(NamedTuple):
         kind: `PASSED`, or the event that cuts it short.
         condition: which condition failed, if it is `BROKEN`.
         tau: fraction of the step.
-        state: state of the block.
         turn_tau: where a block that nothing holds turns round on the way; -1 if it does not.
         turn_x: position there.
     """
@@ -104,7 +101,6 @@ def cross_interval(
         series: work array for the series of a step.
         tau: where in it the motion is.
         own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
-        state: state of the block.
         peak: greatest x so far.
         history: as for the phase.
         filled: columns of it that are filled.

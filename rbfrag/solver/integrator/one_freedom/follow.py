@@ -93,7 +93,6 @@ class MechanismRun:
     """What became of a mechanism under one excitation.
 
     Args:
-        outcome: how it ended.
         peak: greatest position.
         x: position at the end.
         rate: rate at the end; not zero where the model ended in motion.
@@ -105,7 +104,6 @@ class MechanismRun:
         certain_s: time from which nothing in the rest of the record turns the motion back,
             as far as k_h against the strength left says [s]; None unless it went on to the end.
         error: estimated bound on the error of the peak position.
-        steps: integration steps.
         samples_moved: sample intervals that had to be integrated.
         changes: changes of phase.
         sentences: what the answer takes for granted, and where it ends.
@@ -145,7 +143,6 @@ def follow(
     """Run a mechanism from rest under one excitation until nothing moves any more.
 
     Args:
-        excitation: accelerations at nodes.
         history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.
         order: order of the method; for convergence studies.

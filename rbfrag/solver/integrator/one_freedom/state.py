@@ -148,14 +148,12 @@ class PhaseRun(NamedTuple):
     """What became of a phase; times are NaN where nothing happened.
 
     Args:
-        stop: why it ended.
         condition: which condition failed: 0 for the inertia, or the number of the contact from 1.
         time_s: when it ended [s].
         peak: greatest position.
         started_s: first motion [s].
         stopped_s: last standstill [s].
         certain_s: time from which nothing in the rest of the record turns the motion back [s].
-        steps: integration steps.
         samples_moved: sample intervals in which the block moved.
         impacts: impacts at the lowest position that stopped the block.
         history_length: columns of the history that are filled.
@@ -264,7 +262,6 @@ def certain_since(
     Args:
         since_s: the time so far, or NaN.
         now_s: the present.
-        rate: rate of the block.
         driving: factor of k_h in the equation of forward motion.
         resistance: factor of 1 + k_v in it.
         least_q: least k_h/(1 + k_v) from now on.
