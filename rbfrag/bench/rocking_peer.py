@@ -154,7 +154,4 @@ def _hermite(
     u0, u1 = h * rate, h * rate_end
     c2 = 3.0 * (theta_end - theta) - 2.0 * u0 - u1
     c3 = 2.0 * (theta - theta_end) + u0 + u1
-    return (
-        theta + x * (u0 + x * (c2 + x * c3)),
-        (u0 + x * (2.0 * c2 + x * 3.0 * c3)) / h,
-    )
+    return (theta + x * (u0 + x * (c2 + x * c3)), (u0 + x * (2.0 * c2 + x * 3.0 * c3)) / h)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,7 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.processing import (
-    DEFAULT_HIGH_PASS,
-    HighPass,
-    counts_as_uncorrected,
-    processed,
-)
+from rbfrag.motions.processing import DEFAULT_HIGH_PASS, HighPass, counts_as_uncorrected, processed
 from rbfrag.motions.quality import quality_flags
 
 AS_SUPPLIED = "as supplied"
@@ -80,13 +75,8 @@ class AddReport(Tabular):
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract."""
-        return {
-            "added": list(self.added),
-            "known": list(self.known),
-            "processed": list(self.processed),
-            "failed": [{"file": bad.path, "reason": bad.reason} for bad in self.failed],
-            "warnings": list(self.warnings),
-        }
+        lists = {each.name: list(getattr(self, each.name)) for each in fields(self)}
+        return {**lists, "failed": [{"file": f.path, "reason": f.reason} for f in self.failed]}
 
 
 @dataclass
@@ -192,13 +182,7 @@ def add_motions(
         if engine is not None:
             with engine.connect() as connection:
                 run.warnings += _mixed_intervals(connection, run.place)
-    return AddReport(
-        tuple(run.added),
-        tuple(run.known),
-        tuple(run.processed),
-        tuple(run.failed),
-        tuple(run.warnings),
-    )
+    return AddReport(*(tuple(getattr(run, each.name)) for each in fields(AddReport)))
 
 
 def _take_note(run: _Run, stored: list[_Stored]) -> None:

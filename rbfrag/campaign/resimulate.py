@@ -23,11 +23,7 @@ from rbfrag.db.shock_pairs import (
     pair_keys_with_samples,
     stored_shock_pair,
 )
-from rbfrag.db.stored_combination import (
-    StoredCombination,
-    keys_with_samples,
-    stored_combination,
-)
+from rbfrag.db.stored_combination import StoredCombination, keys_with_samples, stored_combination
 from rbfrag.errors import RbfragError
 from rbfrag.solver.kind import Case, CaseRequest, Shaking, model_of_kind
 from rbfrag.solver.results import (

@@ -20,12 +20,7 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.rockmasses.counts import crossings, mode_counts
-from rbfrag.rockmasses.failures import (
-    failure_warnings,
-    failures,
-    failures_as_dict,
-    outcome_columns,
-)
+from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns

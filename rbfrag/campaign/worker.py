@@ -32,10 +32,7 @@ class PlannedCase:
     case: Case
 
     def history_key(
-        self,
-        motion: GroundMotion | MotionRow,
-        vertical_sha256: str | None,
-        k_over_pga: float,
+        self, motion: GroundMotion | MotionRow, vertical_sha256: str | None, k_over_pga: float
     ) -> str:
         """Return the natural key of the motion in time of one block."""
         assert motion.dt_s is not None  # the database holds no other motions

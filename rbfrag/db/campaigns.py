@@ -252,17 +252,12 @@ def _insert_intervals(
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:
     values = {
-        "natural_key": record.natural_key,
+        **vars(record),
         "campaign_id": campaign_id,
-        "motion_id": record.motion_id,
-        "vertical_motion_id": record.vertical_motion_id,
-        "polarity": record.polarity,
-        "kind": record.kind,
         "linear": False,
         "p2": _number(record.p2),
         "block": None if record.block is None else canonical_json(record.block),
         "settings": canonical_json(record.settings),
-        "numerics_version": record.numerics_version,
         **_result_values(record.result),
     }
     return tuple(values[name] for name in _COLUMNS)

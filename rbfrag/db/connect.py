@@ -20,11 +20,7 @@ from sqlalchemy import (
     make_url,
 )
 
-from rbfrag.db.sqlite_file import (
-    LONGEST_WAIT_S,
-    connect_sqlite,
-    explained_sqlite_error,
-)
+from rbfrag.db.sqlite_file import LONGEST_WAIT_S, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,

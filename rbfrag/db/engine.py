@@ -9,12 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
-from rbfrag.db.connect import (
-    BUSY_TIMEOUT_S,
-    database_label,
-    raw_sqlite,
-    unchecked_engine,
-)
+from rbfrag.db.connect import BUSY_TIMEOUT_S, database_label, raw_sqlite, unchecked_engine
 from rbfrag.db.location import VERSION_TABLE, check_revision, locate
 from rbfrag.db.sqlite_file import check_sqlite_database
 from rbfrag.errors import NotADatabaseError

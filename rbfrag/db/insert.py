@@ -82,10 +82,7 @@ def insert_rows(
 
 
 def update_rows(
-    connection: Connection,
-    table: Table,
-    where: ColumnElement[bool],
-    values: Mapping[str, object],
+    connection: Connection, table: Table, where: ColumnElement[bool], values: Mapping[str, object]
 ) -> None:
     """Change columns of the rows that meet a condition.
 

@@ -12,7 +12,7 @@ import math
 import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -60,22 +60,7 @@ class ModelRow:
     dependence: Mapping[str, object] | None = None
 
 
-COLUMNS = (
-    "name",
-    "term",
-    "method",
-    "coefficients",
-    "covariance",
-    "domain",
-    "data_fingerprint",
-    "diagnostics",
-    "is_default",
-    "created",
-    "kind",
-    "form",
-    "leave_out_steps",
-    "dependence",
-)
+COLUMNS = tuple(each.name for each in fields(ModelRow))
 """The columns that make a model, in the order of :func:`decode_model`."""
 
 STORED = (*COLUMNS, "digest")
@@ -121,18 +106,12 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
             f"model {row.name}: its diagnostics or dependence cannot be stored as JSON: {error}"
         ) from error
     return {
-        "name": row.name,
-        "term": row.term,
-        "method": row.method,
+        **vars(row),
         "coefficients": json.dumps({k: float(v) for k, v in row.coefficients.items()}),
         "covariance": _lines(row.covariance),
         "domain": json.dumps({k: [float(v) for v in pair] for k, pair in row.domain.items()}),
-        "data_fingerprint": row.data_fingerprint,
         "diagnostics": diagnostics,
         "is_default": bool(row.is_default),
-        "created": row.created,
-        "kind": row.kind,
-        "form": row.form,
         "leave_out_steps": None if steps is None else _lines(steps),
         "dependence": dependence,
     }
@@ -150,25 +129,21 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
     try:
         if _digest_of(by_name) != by_name["digest"]:
             raise ValueError("its digest differs: a value was altered after it was stored")
-        return ModelRow(
-            name=by_name["name"],
-            term=by_name["term"],
-            method=by_name["method"],
-            coefficients={k: _finite(v) for k, v in json.loads(by_name["coefficients"]).items()},
-            covariance=_numbers(by_name["covariance"]),
-            domain={
-                k: (_finite(low), _finite(high))
-                for k, (low, high) in json.loads(by_name["domain"]).items()
-            },
-            data_fingerprint=by_name["data_fingerprint"],
-            diagnostics=json.loads(by_name["diagnostics"]),
-            is_default=bool(by_name["is_default"]),
-            created=by_name["created"],
-            kind=by_name["kind"],
-            form=int(by_name["form"]),
-            leave_out_steps=None if steps is None else _numbers(steps),
-            dependence=None if dependence is None else dict(json.loads(dependence)),
-        )
+        coefficients = {k: _finite(v) for k, v in json.loads(by_name["coefficients"]).items()}
+        domain = {
+            k: (_finite(a), _finite(b)) for k, (a, b) in json.loads(by_name["domain"]).items()
+        }
+        decoded = {
+            "coefficients": coefficients,
+            "covariance": _numbers(by_name["covariance"]),
+            "domain": domain,
+            "diagnostics": json.loads(by_name["diagnostics"]),
+            "is_default": bool(by_name["is_default"]),
+            "form": int(by_name["form"]),
+            "leave_out_steps": None if steps is None else _numbers(steps),
+            "dependence": None if dependence is None else dict(json.loads(dependence)),
+        }
+        return ModelRow(**{**{name: by_name[name] for name in COLUMNS}, **decoded})
     except (ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise DatabaseError(
             f"model {by_name['name']} is damaged in the database ({error}): fit it again with "

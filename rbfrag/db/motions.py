@@ -11,17 +11,7 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import (
-    Connection,
-    RowMapping,
-    Select,
-    and_,
-    case,
-    delete,
-    exists,
-    or_,
-    select,
-)
+from sqlalchemy import Connection, RowMapping, Select, and_, case, delete, exists, or_, select
 
 from rbfrag.db import schema
 from rbfrag.db.insert import insert_if_new, storable, update_rows, utc_now

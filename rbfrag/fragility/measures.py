@@ -125,15 +125,7 @@ TERMS: Mapping[str, Term] = {
             pgv_m_s,
             1,
         ),
-        Term(
-            "pgv",
-            "peak ground velocity",
-            "PGV",
-            ("pgv_m_s",),
-            pgv_m_s,
-            1,
-            0,
-        ),
+        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s, 1, 0),
         Term(
             "pga_sa03_sa10_sa30",
             "spectral acceleration at 1 s, as a velocity, with PGA and those at 0.3 and 3 s",
@@ -267,12 +259,10 @@ CREDIBLE = {
     "pgv_m_s": (0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
     "pga_g": (0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
     **dict.fromkeys(
-        ("sa03_g", "sa10_g"),
-        (0.0, 10.0, "larger than ever recorded (it is in g): is it in g?"),
+        ("sa03_g", "sa10_g"), (0.0, 10.0, "larger than ever recorded (it is in g): is it in g?")
     ),
     **dict.fromkeys(
-        ("sa20_g", "sa30_g"),
-        (0.0, 5.0, "larger than ever recorded (it is in g): is it in g?"),
+        ("sa20_g", "sa30_g"), (0.0, 5.0, "larger than ever recorded (it is in g): is it in g?")
     ),
     "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
     "pgv_over_pga_s": (

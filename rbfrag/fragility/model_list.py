@@ -13,11 +13,10 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
     """Return what `rbfrag models list` says of each model."""
     return [
         {
-            "name": row.name,
-            "kind": row.kind,
-            "term": row.term,
-            "method": row.method,
-            "is_default": row.is_default,
+            **{
+                each: getattr(row, each)
+                for each in ("name", "kind", "term", "method", "is_default")
+            },
             "n": fitted_number(row.diagnostics),
             "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
             "events": row.diagnostics.get("events"),

@@ -117,9 +117,7 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         first = seen.setdefault((place, row.trace_index), line)
         if first != line:
             raise MotionFileError(
-                table,
-                f"{_named(row)} was given in line {first}: keep one row",
-                line=line,
+                table, f"{_named(row)} was given in line {first}: keep one row", line=line
             )
         others = by_file.get(place, [])
         if others and None in (row.trace_index, others[0].trace_index):

@@ -235,8 +235,5 @@ def spectrum_as_dict(
         "pgv_m_s": ground.pgv_m_s,
         "p2": list(p2),
         "x_m_s": toppling_spectrum(ground, p2, polarity).tolist(),
-        "warnings": [
-            *ground.remarks,
-            *(flag.sentence for flag in quality_flags(ground)),
-        ],
+        "warnings": [*ground.remarks, *(flag.sentence for flag in quality_flags(ground))],
     }

@@ -9,16 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rbfrag.plots.canvas import (
-    MODE_COLOURS,
-    ROCK,
-    in_own_style,
-    light_grid,
-    mode_title,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import write_near
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
@@ -111,7 +102,7 @@ def _resultant(stability: Stability, length: float) -> Point:
 _INK, _RESULTANT = "#222222", "#b2182b"
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_block(block: Block, stability: Stability, path: str | PathLike[str]) -> Path:
     """Draw a block to scale on its base and back planes, out of the slope to the right.
 
@@ -119,22 +110,22 @@ def plot_block(block: Block, stability: Stability, path: str | PathLike[str]) ->
     the resultant of weight and inertia at the yield acceleration; a block that no acceleration
     moves, or that none holds, has the direction of its weight.
     """
-    plot_path(path)
-    figure = new_figure(7.4, 4.8)
+    canvas.plot_path(path)
+    figure = canvas.new_figure(7.4, 4.8)
     axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
     draw_block(axes, block, stability)
     _write_panel(panel, block, stability)
     figure.suptitle(_title(stability), fontsize=11)
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def draw_block(axes: Axes, block: Block, stability: Stability) -> None:
     """Draw the block of :func:`plot_block` into axes."""
     lines = block_lines(block, stability)
-    axes.fill(*zip(*lines.rock, strict=True), facecolor="#e9e5de", edgecolor=ROCK, hatch="////",
-              lw=0.0)  # fmt: skip
-    axes.plot(*zip(*lines.planes, strict=True), color=ROCK, lw=1.4, zorder=1)
-    outline, colour = lines.outline, MODE_COLOURS[stability.mode]
+    axes.fill(*zip(*lines.rock, strict=True), facecolor="#e9e5de", edgecolor=canvas.ROCK,
+              hatch="////", lw=0.0)  # fmt: skip
+    axes.plot(*zip(*lines.planes, strict=True), color=canvas.ROCK, lw=1.4, zorder=1)
+    outline, colour = lines.outline, canvas.MODE_COLOURS[stability.mode]
     axes.fill(*zip(*outline, strict=True), color=colour, alpha=0.28, lw=0, zorder=2)
     axes.plot(*zip(*[*outline, outline[0]], strict=True), color=colour, lw=1.6, zorder=3)
     near = _CLOSE * max(math.dist(a, b) for a in lines.rock for b in lines.rock)
@@ -157,12 +148,12 @@ def draw_block(axes: Axes, block: Block, stability: Stability) -> None:
     axes.ticklabel_format(scilimits=(-2, 5), useMathText=True)
     axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")
     axes.set_ylabel("height above the centroid [m]")
-    light_grid(axes)
+    canvas.light_grid(axes)
 
 
 def _title(stability: Stability) -> str:
     k = stability.yield_acceleration
-    name = mode_title(stability.mode)
+    name = canvas.mode_title(stability.mode)
     if stability.state == "locked":
         return f"{name}: locked, no horizontal acceleration moves the block in this mode"
     if stability.state == "unstable":
@@ -175,7 +166,7 @@ def _write_panel(panel: Axes, block: Block, stability: Stability) -> None:
     panel.set_axis_off()
     k = stability.yield_acceleration
     rows = [
-        ("mode", mode_title(stability.mode)),
+        ("mode", canvas.mode_title(stability.mode)),
         ("state", stability.state),
         ("yield $k$", f"{k:.4f} g" if math.isfinite(k) else "none"),
         ("sliding $k_y$", f"{stability.ky:.4f} g" if math.isfinite(stability.ky) else "none"),

@@ -10,13 +10,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.scores import CalibrationBins
-from rbfrag.plots.canvas import (
-    in_own_style,
-    light_grid,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")
@@ -25,7 +19,7 @@ MARKERS = ("o", "s", "^", "D")
 MOST_MODELS = len(COLOURS)
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_calibration(
     models: Mapping[str, CalibrationBins],
     path: str | PathLike[str],
@@ -42,10 +36,10 @@ def plot_calibration(
         scores: held-out scores by name of the model, for the legend.
         data: what the outcomes are, for the title.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     if not 1 <= len(models) <= MOST_MODELS:
         raise InputError(f"{len(models)} models: a figure of calibration shows 1 to {MOST_MODELS}")
-    figure = new_figure(6.2, 7.2)
+    figure = canvas.new_figure(6.2, 7.2)
     axes, below = figure.subplots(2, 1, sharex=True, height_ratios=[4.0, 1.0])
     axes.plot([0.0, 1.0], [0.0, 1.0], color="black", lw=0.8, ls=":")
     for number, (name, bins) in enumerate(models.items()):
@@ -65,14 +59,14 @@ def plot_calibration(
     below.set_yscale("log")
     below.set_ylabel("blocks per bin")
     below.set_xlabel("probability predicted for an earthquake that was left out")
-    light_grid(axes, below)
+    canvas.light_grid(axes, below)
     first = next(iter(models.values()))
     axes.set_title(
         f"{int(first.blocks.sum())} blocks under motions of {first.events} earthquakes"
         + (f"\n{data}" if data else ""),
         fontsize=10,
     )
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _scores(scores: Mapping[str, float]) -> str:

@@ -13,17 +13,7 @@ import numpy as np
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    in_own_style,
-    logarithmic,
-    new_figure,
-    plot_path,
-    save_figure,
-    spread_out,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 from rbfrag.plots.model_lines import (
     MORE_TERMS,
@@ -62,7 +52,7 @@ _USUAL_WIDTH_PT = 350.0
 _DEFAULT_RANGE = (0.01, 2.0)
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_chart(
     model: FragilityModel, path: str | PathLike[str], held: HeldMeasures | None = None
 ) -> Path:
@@ -77,13 +67,13 @@ def plot_chart(
         model: a model of one number, pgv_pga or pgv_pga_tm.
         held: what is held; None for the middle of the fitted ranges.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     held = held_measures(model) if held is None else held
-    figure = new_figure(7.4, 6.6)
+    figure = canvas.new_figure(7.4, 6.6)
     axes = figure.add_subplot()
     draw_chart(axes, model, held)
     axes.set_title(_caption(model, held), fontsize=10)
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def draw_chart(
@@ -107,11 +97,11 @@ def draw_chart(
         bottom, top = min(bottom, point[1] / _SPAN), max(top, _SPAN * point[1])
     width_pt, height_pt = _size_pt(axes)
     digits = _digits(x[-1] / x[0], width_pt, 30.0), _digits(top / bottom, height_pt, 14.0)
-    logarithmic(axes, *digits)
+    canvas.logarithmic(axes, *digits)
     axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top))
     thin = min(max(width_pt / _USUAL_WIDTH_PT, 0.5), 1.0)
     for probability, y in lines.items():
-        axes.plot(x, y, color=BLUE, lw=thin * (1.9 if probability in _BOLD else 0.9))
+        axes.plot(x, y, color=canvas.BLUE, lw=thin * (1.9 if probability in _BOLD else 0.9))
     _write_beside(axes, x, lines)
     if held.words:
         _shade_where_not_fitted(axes, model, held)
@@ -125,9 +115,11 @@ def draw_chart(
     if held.size_is_given:
         _draw_kr_axis(axes, held.p2, digits[1])
     if point is not None:
-        axes.plot(*point, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9, label="_point")
+        axes.plot(
+            *point, "o", ms=8, color=canvas.RED, mec="white", mew=1.2, zorder=9, label="_point"
+        )
         for xs, ys in (([point[0]] * 2, [bottom, point[1]]), ([x[0], point[0]], [point[1]] * 2)):
-            axes.plot(xs, ys, color=RED, lw=0.9, ls="--", zorder=3, label="_guide")
+            axes.plot(xs, ys, color=canvas.RED, lw=0.9, ls="--", zorder=3, label="_guide")
 
 
 def _known_ranges(
@@ -178,7 +170,7 @@ def _draw_kr_axis(axes: Axes, p2: float, digits: Sequence[float]) -> None:
         1.0 + _KR_AXIS_OFF_PT / _size_pt(axes)[0],
         functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
     )
-    written_numbers(beside.yaxis, *digits)
+    canvas.written_numbers(beside.yaxis, *digits)
     beside.yaxis.set_minor_locator(NullLocator())
     beside.set_ylabel(f"$k_r$ at $p^2$ = {p2:.3g} s$^{{-2}}$")
 
@@ -197,16 +189,16 @@ def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> 
     ends.sort()
     width_pt, height_pt = _size_pt(axes)
     beside = 1.0 + _LABEL_OFF_PT / width_pt
-    places = spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
+    places = canvas.spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
     for place, (up, across, probability) in zip(places, ends, strict=True):
         text = f"{100.0 * probability:g} %"
         axes.plot(
-            [across, beside - 0.005], [up, place], color=BLUE, lw=0.5,
+            [across, beside - 0.005], [up, place], color=canvas.BLUE, lw=0.5,
             transform=axes.transAxes, clip_on=False, label=f"_{text}",
         )  # fmt: skip
         axes.text(
-            beside, place, text, fontsize=8, va="center", color=BLUE, transform=axes.transAxes,
-            fontweight="bold" if probability in _BOLD else "normal",
+            beside, place, text, fontsize=8, va="center", color=canvas.BLUE,
+            transform=axes.transAxes, fontweight="bold" if probability in _BOLD else "normal",
         )  # fmt: skip
 
 

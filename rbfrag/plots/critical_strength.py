@@ -20,19 +20,7 @@ from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    density,
-    grey_bars,
-    in_own_style,
-    legend_below,
-    light_grid,
-    logarithmic,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
 FloatArray = NDArray[np.float64]
@@ -87,10 +75,14 @@ def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
     return LOBES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
 
 
-STYLES = {"rectangular": ("-", RED), "half-sine": ("--", BLUE), "triangular": ("-.", "#2e7d32")}
+STYLES = {
+    "rectangular": ("-", canvas.RED),
+    "half-sine": ("--", canvas.BLUE),
+    "triangular": ("-.", "#2e7d32"),
+}
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
     """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
 
@@ -100,7 +92,7 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         InputError: no critical value of a motion with a mean period, or a path that cannot
             be written.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     ratio = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))
     shown = (table.status == "found") & np.isfinite(ratio) & np.isfinite(table.kr_over_pga)
     if not shown.any():
@@ -112,12 +104,12 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     censored = np.isin(table.status.astype(str), ("below_limit", "no_motion"))
     below = int(censored.sum())
     limit = float(table.search_limit[shown | censored].min())
-    figure = new_figure(7.4, 5.6)
+    figure = canvas.new_figure(7.4, 5.6)
     axes = figure.add_subplot()
     left, right = 0.8 * float(x.min()), 1.25 * float(x.max())
     bottom, top = 0.8 * min(limit, float(y.min())), 1.25 * max(1.0, float(y.max()))
-    logarithmic(axes)
-    density(figure, axes, x, y, (left, right), (bottom, top))
+    canvas.logarithmic(axes)
+    canvas.density(figure, axes, x, y, (left, right), (bottom, top))
     line_x = np.geomspace(left, right, 300)
     for name in LOBES:
         style, colour = STYLES[name]
@@ -135,10 +127,10 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         + (f"\n{as_written(data, 85)}" if data else ""),
         fontsize=10,
     )
-    light_grid(axes)
-    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
-    legend_below(figure, 2)
-    return save_figure(figure, path)
+    canvas.light_grid(axes)
+    canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
+    canvas.legend_below(figure, 2)
+    return canvas.save_figure(figure, path)
 
 
 _NARROWEST, _WIDEST = 0.05, 0.5
@@ -191,7 +183,7 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
     )
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
 
@@ -200,28 +192,28 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     Args:
         pairs: critical values of the same motion, polarity and p².
     """
-    plot_path(path)
+    canvas.plot_path(path)
     if not pairs.ln_ratio.size:
         raise InputError(
             "no critical value is known both with and without vertical motion: run  "
             "rbfrag simulate --vertical both"
         )
-    figure = new_figure(9.2, 4.6)
+    figure = canvas.new_figure(9.2, 4.6)
     axes, beside = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
     values = np.concatenate([pairs.without, pairs.with_vertical])
     edges = 0.85 * float(values.min()), 1.2 * float(values.max())
-    logarithmic(axes)
-    density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
-    axes.plot(edges, edges, color=RED, lw=1.2, label="no change")
-    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
+    canvas.logarithmic(axes)
+    canvas.density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
+    axes.plot(edges, edges, color=canvas.RED, lw=1.2, label="no change")
+    canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     axes.set_xlabel(r"critical $k_r/\mathrm{PGA}$ without vertical motion")
     axes.set_ylabel(r"critical $k_r/\mathrm{PGA}$ with it")
     axes.legend(loc="upper left", fontsize=8.5, frameon=False)
 
     d = pairs.ln_ratio
     reach = float(np.clip(1.3 * np.quantile(np.abs(d), 0.995), _NARROWEST, _WIDEST))
-    grey_bars(beside, np.clip(d, -reach, reach), np.linspace(-reach, reach, 58))
-    beside.axvline(0.0, color=RED, lw=1.2)
+    canvas.grey_bars(beside, np.clip(d, -reach, reach), np.linspace(-reach, reach, 58))
+    beside.axvline(0.0, color=canvas.RED, lw=1.2)
     beside.set_xlim(-reach, reach)
     beside.set_xlabel("ln (with / without)")
     beside.set_ylabel("critical blocks")
@@ -232,4 +224,4 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
         f"{d.size} critical blocks of {events} earthquakes, the same motion, polarity and $p^2$",
         fontsize=10,
     )
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)

@@ -15,13 +15,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import output_path, written_whole
-from rbfrag.plots.canvas import (
-    ROCK,
-    in_own_style,
-    light_grid,
-    mode_title,
-    new_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 from rbfrag.plots.response import BLOCK, MOTION, STRENGTH
 from rbfrag.solver.block.geometry import Block
@@ -45,7 +39,7 @@ MARGIN_S = 0.5
 """Rest shown before the first motion and after the last [s]."""
 
 
-@in_own_style
+@canvas.in_own_style
 def film(
     response: Response,
     block: Block,
@@ -73,7 +67,7 @@ def film(
     history = response.history
     if history is None:
         raise InputError("this response holds no history: ask for it with history=True")
-    figure = new_figure(width_in=6.4, height_in=6.0)
+    figure = canvas.new_figure(width_in=6.4, height_in=6.0)
     from matplotlib.animation import FuncAnimation
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -88,10 +82,10 @@ def film(
     cursor = _draw_trace(trace, history, time_s)
     begins_s = [part.begins_s for part in response.parts]
     for begin_s in begins_s[1:]:
-        trace.axvline(begin_s, color=ROCK, lw=1.0, ls=":")
+        trace.axvline(begin_s, color=canvas.ROCK, lw=1.0, ls=":")
     scale = "true scale" if exaggerate == 1.0 else f"displacements times {exaggerate:g}"
     pace = "" if speed == 1.0 else f", {speed:.2g} times as fast as it was"
-    verdict = f"{mode_title(response.kind)}, {scale}{pace}"
+    verdict = f"{canvas.mode_title(response.kind)}, {scale}{pace}"
     figure.suptitle(f"{as_written(title, 75)}\n{verdict}", fontsize=10)
 
     def show(frame: int) -> tuple[Any, ...]:
@@ -211,10 +205,10 @@ def _draw_scene(
     up = np.array([-math.cos(gamma), math.sin(gamma)])
     root = np.array([0.0, 0.0])
     base = _to_slope(np.array([root, [3.0 * size, 0.0]]), beta_deg)
-    axes.plot(*base.T, color=ROCK, lw=2.0, zorder=2)
+    axes.plot(*base.T, color=canvas.ROCK, lw=2.0, zorder=2)
     back = np.array([root, 3.0 * size * up] if back_fracture else [[-3.0 * size, 0.0], root])
-    axes.plot(*_to_slope(back, beta_deg).T, color=ROCK, lw=2.0, zorder=2)
-    axes.plot(*_closed(shown[0]).T, color=ROCK, lw=1.0, ls="--", zorder=1)
+    axes.plot(*_to_slope(back, beta_deg).T, color=canvas.ROCK, lw=2.0, zorder=2)
+    axes.plot(*_closed(shown[0]).T, color=canvas.ROCK, lw=1.0, ls="--", zorder=1)
     margin = 0.12 * size
     axes.set_xlim(low[0] - 2.0 * margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
@@ -233,5 +227,5 @@ def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any
     top = 1.1 * float(np.abs(driving).max()) or 1.0  # a motion of zeros has a sheet, too
     axes.set_ylim(-top, 1.35 * top)
     axes.set(xlabel="time [s]", ylabel="[g]")
-    light_grid(axes)
+    canvas.light_grid(axes)
     return axes.axvline(time_s[0], color="black", lw=1.0)

@@ -14,32 +14,16 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.fit.line import Bins, bin_variances
 from rbfrag.fragility.methods import TOPPLING_BLOCK, FittedVariance
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import (
-    RED,
-    density,
-    grey_bars,
-    in_own_style,
-    legend_below,
-    logarithmic,
-    new_figure,
-    open_corner,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.equation import equation_lines
 from rbfrag.plots.labels import as_written
-from rbfrag.plots.model_lines import (
-    depends_on_size,
-    failure_line,
-    predicted_strengths,
-    smooth_line,
-)
+from rbfrag.plots.model_lines import depends_on_size, failure_line, predicted_strengths, smooth_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LINES = (
-    (0.025, "--", RED, "2.5 % probability of failure"),
+    (0.025, "--", canvas.RED, "2.5 % probability of failure"),
     (0.5, "-", "black", "50 % probability of failure"),
     (0.975, "-.", "#2166ac", "97.5 % probability of failure"),
 )
@@ -47,7 +31,7 @@ _LINES = (
 _BARS = 40
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_fit(
     table: CombinationTable,
     model: FragilityModel,
@@ -76,7 +60,7 @@ def plot_fit(
     Raises:
         InputError: nothing to draw, or a path that cannot be written.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     term, block = model.term, model.method.block
     if block.names != TOPPLING_BLOCK.names:
         raise InputError(
@@ -105,7 +89,7 @@ def plot_fit(
         )
     fitted = model.method.fitted_variance if alone else None
     binned = fitted is not None
-    figure = new_figure(7.6, 7.6 if binned else 6.2)
+    figure = canvas.new_figure(7.6, 7.6 if binned else 6.2)
     expected = x
     x, y = x[shown], table.y_m_s[shown]
     left, right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
@@ -134,10 +118,10 @@ def plot_fit(
     above = figure.add_subplot(grid[0, 0], sharex=axes)
     beside = figure.add_subplot(grid[1, 1], sharey=axes)
     if log:
-        logarithmic(axes)
-    density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
+        canvas.logarithmic(axes)
+    canvas.density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
     if log:
-        logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
+        canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     for (_, style, colour, label), (line_x, line) in zip(_LINES, lines, strict=True):
         label += "" if np.isfinite(line).any() else "\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
@@ -149,14 +133,14 @@ def plot_fit(
         )
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     spaced = np.geomspace if log else np.linspace
-    grey_bars(above, x, spaced(left, right, _BARS + 1))
+    canvas.grey_bars(above, x, spaced(left, right, _BARS + 1))
     above.set_ylabel("blocks", fontsize=8)
     above.tick_params(labelbottom=False, labelsize=8)
-    grey_bars(beside, y, spaced(bottom, top, _BARS + 1), flat=True)
+    canvas.grey_bars(beside, y, spaced(bottom, top, _BARS + 1), flat=True)
     beside.set_xlabel("blocks", fontsize=8)
     beside.tick_params(labelleft=False, labelsize=8)
     for edge in (above, beside):
-        open_corner(edge)
+        canvas.open_corner(edge)
     if fitted is not None:
         _draw_variance(figure.add_subplot(grid[2, 0], sharex=axes), model, fitted, x, y)
         axes.tick_params(labelbottom=False)
@@ -168,8 +152,8 @@ def plot_fit(
         + "\n".join(equation_lines(model)),
         fontsize=10,
     )
-    legend_below(figure, len(_LINES))
-    return save_figure(figure, path)
+    canvas.legend_below(figure, len(_LINES))
+    return canvas.save_figure(figure, path)
 
 
 def _draw_variance(
@@ -191,7 +175,7 @@ def _draw_variance(
     (dots,) = axes.plot(binned.centre, binned.variance, "o", color="#555555", markersize=5.0)
     (curve,) = axes.plot(line_x, line, "-", color="black", linewidth=1.8)
     if log:
-        logarithmic(axes, (1.0, 2.0, 5.0), (1.0,))
+        canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0,))
     else:
         axes.set_ylim(0.0, 1.15 * max(float(binned.variance.max()), float(line[-1])))
     axes.set_xlim(left, right)

@@ -10,13 +10,7 @@ import numpy as np
 
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.plots.canvas import (
-    in_own_style,
-    new_figure,
-    plot_path,
-    save_figure,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
@@ -34,15 +28,15 @@ def measure_title(curve: HazardCurve) -> str:
     return _NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | PathLike[str]) -> Path:
     """Draw a hazard curve and, below it, where the failures of the first block come from.
 
     Args:
         answer: the answer; its first block is drawn.
     """
-    plot_path(path)
-    figure = new_figure(6.4, 6.4)
+    canvas.plot_path(path)
+    figure = canvas.new_figure(6.4, 6.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
     draw_contribution(top, bottom, curve, answer)
     rate = float(answer.annual_rate[0])
@@ -54,7 +48,7 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
         f"{100 * answer.probability[0]:.3g} % in {answer.years:g} years",
         fontsize=10,
     )
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: HazardAnswer) -> None:
@@ -83,7 +77,7 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
     if beyond >= 0.05:
         text = f"{beyond:.2g} % more from beyond the end of the curve"
         bottom.set_title(text, fontsize=9, loc="right")
-    written_numbers(bottom.xaxis, 1.0, 2.0, 5.0)
+    canvas.written_numbers(bottom.xaxis, 1.0, 2.0, 5.0)
     for axes in (top, bottom):
         axes.grid(True, which="major", color="#dddddd", lw=0.6)
         axes.set_axisbelow(True)

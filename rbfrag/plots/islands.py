@@ -9,13 +9,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots.canvas import (
-    BLUE,
-    in_own_style,
-    new_figure,
-    save_figure,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import CriticalResult
@@ -27,7 +21,7 @@ if TYPE_CHECKING:
 
 BANDS = {"topples": "#e8b4b0", "safe": "#dce9f5", "undecided": "#8c8c8c"}
 NAMES = {"topples": "all topple", "safe": "all stay", "undecided": "undecided"}
-ROTATION = BLUE
+ROTATION = canvas.BLUE
 CRITICAL = "#8b1a1a"
 BOUND = "#5b3a86"
 
@@ -44,7 +38,7 @@ NEAR_CRITICAL = 0.03
 """Relative distance shown on both sides of the critical value where there is no island."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_islands(
     motion: GroundMotion,
     result: CriticalResult,
@@ -65,7 +59,7 @@ def plot_islands(
         why = f"no map of outcomes (status {result.status})"
         raise InputError(f"nothing to draw: {why}; islands need a motion that lifts blocks")
     excited = excitation(motion, vertical, result.polarity)
-    figure = new_figure(width_in=7.5, height_in=6.2)
+    figure = canvas.new_figure(width_in=7.5, height_in=6.2)
     whole, part = figure.subplots(2, 1)
     bottom = float(result.intervals.k_lo[0])
     known = result.k_up_over_pga or bottom
@@ -85,7 +79,7 @@ def plot_islands(
     name = f"{title}{', reversed' if result.polarity == 'reverse' else ''}"
     name += ", with vertical motion" if vertical is not None else ""
     figure.suptitle(f"{as_written(name, 85)}\n{_verdict(result)}", fontsize=10)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:
@@ -142,7 +136,7 @@ def _panel(
         axes.axvline(result.lower, color=CRITICAL, lw=1.4)
     if logarithmic:
         axes.set_xscale("log")
-        written_numbers(axes.xaxis, 1.0, 2.0, 3.0, 5.0)
+        canvas.written_numbers(axes.xaxis, 1.0, 2.0, 3.0, 5.0)
     axes.set_xlim(low, high)
     axes.set_ylim(0.0, max(1.15, 1.08 * float(np.nanmax(theta_n, initial=0.0))))
     axes.set_ylabel(r"peak rotation $\theta/\theta_c$")

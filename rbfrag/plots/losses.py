@@ -9,27 +9,16 @@ from typing import TYPE_CHECKING
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.losses import Exceedance, LossAnswer
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    in_own_style,
-    legend_below,
-    light_grid,
-    new_figure,
-    open_corner,
-    plot_path,
-    save_figure,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOURS = (BLUE, RED)
+_COLOURS = (canvas.BLUE, canvas.RED)
 _LOWEST = 0.05  # of one event in the effective time
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
     """Draw the curves of exceedance of failures and, where there is one, of the loss.
 
@@ -39,23 +28,23 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
     Raises:
         InputError: the answer has no curve.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     panels = [("blocks that fail", answer.exceedance)]
     if answer.has_losses:
         panels.append(("loss", answer.loss_exceedance))
     if not any(answer.exceedance.values()):
         raise InputError("there is no curve to draw: no block fails in a sample, or none was drawn")
-    figure = new_figure(5.2 * len(panels), 4.4)
+    figure = canvas.new_figure(5.2 * len(panels), 4.4)
     all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
     scenario = answer.events.is_scenario
     for axes, (title, curves) in zip(all_axes, panels, strict=True):
         _draw(axes, answer, curves)
         axes.set_xlabel(f"{title}, at least")
         axes.set_ylabel("probability given the event" if scenario else "times a year [1/a]")
-        open_corner(axes)
-    light_grid(*all_axes)
-    legend_below(figure, 4)
-    return save_figure(figure, path)
+        canvas.open_corner(axes)
+    canvas.light_grid(*all_axes)
+    canvas.legend_below(figure, 4)
+    return canvas.save_figure(figure, path)
 
 
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
@@ -65,7 +54,7 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
     if drawn and max(values) > 30.0:
         axes.set_xscale("log")
         digits = (1.0,) if max(values) > 30.0 * min(values) else (1.0, 2.0, 5.0)
-        written_numbers(axes.xaxis, *digits)
+        canvas.written_numbers(axes.xaxis, *digits)
     place = axes.get_subplotspec()
     assert place is not None  # it was made as one of a row
     first = not place.colspan.start

@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    ROCK,
-    in_own_style,
-    legend_below,
-    light_grid,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.block.mesh_block import ContactHull, MeshBlock, Weakest
 
@@ -33,7 +23,7 @@ _LINES = ("-", "--", "-.", ":")
 """For contacts within the heights that an answer is repeated with, in rising order."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
     """Draw the contacts of a block in plan, and k_r towards every azimuth.
 
@@ -41,8 +31,8 @@ def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
     of mass. At the right k_r towards each azimuth, for the heights of contact of the sensitivity;
     the arrow at the left and the point at the right are the weakest azimuth.
     """
-    plot_path(path)
-    figure = new_figure(10.0, 5.4)
+    canvas.plot_path(path)
+    figure = canvas.new_figure(10.0, 5.4)
     plan = figure.add_subplot(1, 2, 1)
     polar = cast("PolarAxes", figure.add_subplot(1, 2, 2, projection="polar"))
     weakest = block.hull.weakest()
@@ -54,19 +44,23 @@ def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
         f"$p^2$ = {weakest.p2:.3g} s$^{{-2}}$, contacts within {block.hull.contact_mm:g} mm",
         fontsize=11,
     )
-    legend_below(figure, 4)
-    return save_figure(figure, path)
+    canvas.legend_below(figure, 4)
+    return canvas.save_figure(figure, path)
 
 
 def _draw_plan(axes: Axes, block: MeshBlock, weakest: Weakest) -> None:
     hull = block.hull
-    axes.fill(*block.outline_m.T, color=ROCK, alpha=0.15, lw=0, label="block from above")
-    axes.fill(*hull.corners_m.T, facecolor="none", edgecolor=BLUE, lw=1.4, label="hull of contacts")
-    axes.plot(*hull.points_m.T, "o", ms=3.5, mfc="white", mec=BLUE, mew=0.8, label="contacts")
+    axes.fill(*block.outline_m.T, color=canvas.ROCK, alpha=0.15, lw=0, label="block from above")
+    axes.fill(
+        *hull.corners_m.T, facecolor="none", edgecolor=canvas.BLUE, lw=1.4, label="hull of contacts"
+    )
+    axes.plot(
+        *hull.points_m.T, "o", ms=3.5, mfc="white", mec=canvas.BLUE, mew=0.8, label="contacts"
+    )
     turn = math.radians(weakest.azimuth_deg)
     x = weakest.kr * hull.height_m
     tip = (x * math.cos(turn), x * math.sin(turn))
-    arrow = {"arrowstyle": "-|>", "color": RED, "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
+    arrow = {"arrowstyle": "-|>", "color": canvas.RED, "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tip, xytext=(0.0, 0.0), arrowprops=arrow, zorder=4)
     axes.plot(0.0, 0.0, "o", ms=5, color="black", zorder=5)
     write_near(axes, "C", (0.0, 0.0), (-9.0 * math.cos(turn), -9.0 * math.sin(turn)),
@@ -75,7 +69,7 @@ def _draw_plan(axes: Axes, block: MeshBlock, weakest: Weakest) -> None:
     first, second = ("xyz"[i] for i in (("xyz".index(block.up) + k) % 3 for k in (1, 2)))
     axes.set_xlabel(f"{first} of the mesh from the centre of mass [m]")
     axes.set_ylabel(f"{second} of the mesh from the centre of mass [m]")
-    light_grid(axes)
+    canvas.light_grid(axes)
 
 
 def _draw_polar(axes: PolarAxes, block: MeshBlock, weakest: Weakest) -> None:
@@ -84,12 +78,12 @@ def _draw_polar(axes: PolarAxes, block: MeshBlock, weakest: Weakest) -> None:
     turn = np.radians(_AZIMUTHS_DEG)
     lines = iter(_LINES)
     for hull in block.hulls:
-        style: dict[str, Any] = {"color": BLUE, "lw": 2.6, "alpha": 0.6}
+        style: dict[str, Any] = {"color": canvas.BLUE, "lw": 2.6, "alpha": 0.6}
         if hull is not block.hull:
             style = {"color": "#333333", "lw": 0.9, "ls": next(lines)}
         if hull.stands:
             axes.plot(turn, _kr(hull), label=f"contacts within {hull.contact_mm:g} mm", **style)
-    axes.plot(math.radians(weakest.azimuth_deg), weakest.kr, "o", ms=6, color=RED,
+    axes.plot(math.radians(weakest.azimuth_deg), weakest.kr, "o", ms=6, color=canvas.RED,
               label="weakest azimuth")  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_title("$k_r$ [g] towards each azimuth [deg]", fontsize=10)
@@ -97,7 +91,7 @@ def _draw_polar(axes: PolarAxes, block: MeshBlock, weakest: Weakest) -> None:
     # where the numbers have most space before they meet a curve
     axes.set_rlabel_position(float(_AZIMUTHS_DEG[_kr(block.hull).argmax()]))
     axes.yaxis.set_major_locator(MaxNLocator(4))
-    light_grid(axes)
+    canvas.light_grid(axes)
 
 
 def _kr(hull: ContactHull) -> NDArray[np.float64]:

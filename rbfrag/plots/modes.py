@@ -11,14 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import (
-    MODE_COLOURS,
-    in_own_style,
-    mode_title,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import halo
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
@@ -59,7 +52,7 @@ _WHOLE_CHART: dict[str, Any] = {
 _FINE_LEVELS = tuple(0.05 * i for i in range(1, 60))
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_modes(
     path: str | PathLike[str],
     *,
@@ -85,7 +78,7 @@ def plot_modes(
         alpha3_deg: angles of the toe of these blocks [deg], shape (m,).
         title: title of the figure; friction and dip if empty.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
@@ -99,7 +92,7 @@ def plot_modes(
         nan="raise",
     )
     shown = _pairs(alpha1_deg, alpha3_deg)
-    figure = new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
+    figure = canvas.new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
     chart = _Chart(axes, nodes, is_block, stability)
     _draw_regions(chart)
@@ -118,7 +111,7 @@ def plot_modes(
     figure.draw_without_rendering()  # the extents of texts are known once the layout is
     for lines, here in contours:
         _write_values(chart, lines, here, names)
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _title(phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool) -> str:
@@ -166,7 +159,7 @@ def _draw_regions(chart: _Chart) -> None:
     axes, nodes = chart.axes, chart.nodes
     axes.imshow(
         np.ma.masked_where(~chart.is_block, chart.stability.mode_code),
-        cmap=ListedColormap([MODE_COLOURS[mode] for mode in MODES]),
+        cmap=ListedColormap([canvas.MODE_COLOURS[mode] for mode in MODES]),
         norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
         alpha=0.30, zorder=1, **_WHOLE_CHART,
     )  # fmt: skip
@@ -198,7 +191,7 @@ def _draw_yields(chart: _Chart) -> list[tuple[ContourSet, NDArray[np.bool_]]]:
         lines = chart.axes.contour(
             chart.nodes, chart.nodes, np.ma.masked_where(~here, values),
             levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
-            colors=MODE_COLOURS[mode], linewidths=1.0, zorder=3,
+            colors=canvas.MODE_COLOURS[mode], linewidths=1.0, zorder=3,
         )  # fmt: skip
         drawn.append((lines, here))
     return drawn
@@ -209,7 +202,7 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
     for code, mode in enumerate(MODES):
         region = chart.of_mode(code)
         stable = region & chart.in_state(STABLE)
-        text = mode_title(mode)
+        text = canvas.mode_title(mode)
         if mode == "slump" and not back_fracture:
             text = "turns\nback"
         values = chart.stability.yield_acceleration[stable]

@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import (
-    BLUE,
-    in_own_style,
-    light_grid,
-    mode_title,
-    new_figure,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 
@@ -26,7 +19,7 @@ if TYPE_CHECKING:
 
 MOTION = "#7f7f7f"
 STRENGTH = "#c44e52"
-BLOCK = BLUE
+BLOCK = canvas.BLUE
 
 QUIET_BEFORE_S = 1.0
 QUIET_AFTER_S = 2.0
@@ -35,7 +28,7 @@ TALLEST_SHOWN = 6.0
 """Rotation over the critical angle beyond which a toppling block is of no interest."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_response(
     response: Response,
     path: str | os.PathLike[str],
@@ -80,7 +73,7 @@ def plot_response(
         _name_time(lower, response.toppled_s, "toppling inevitable", 0.97)
     lower.set_xlim(*_window(history.time_s, ratio, response))
     figure.suptitle(_title(title, reverse, _verdict(response, p2, kr)), fontsize=10)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def _name_balance(axes: Axes, ratio: float, name: str) -> None:
@@ -102,7 +95,7 @@ def _panels(
     history: ResponseHistory, strength: FloatArray, label: str, least_top: float
 ) -> tuple[Figure, Axes, Axes]:
     """Draw acceleration against strength; return the figure, its upper and its empty lower part."""
-    figure = new_figure(width_in=7.5, height_in=5.6)
+    figure = canvas.new_figure(width_in=7.5, height_in=5.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
     driving = history.k_h / (1.0 + history.k_v)
     upper.plot(history.time_s, driving, color=MOTION, lw=0.7, label="ground: $k_h/(1+k_v)$")
@@ -113,7 +106,7 @@ def _panels(
     upper.set_ylabel("acceleration [g]")
     upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
     lower.set_xlabel("time [s]")
-    light_grid(upper, lower)
+    canvas.light_grid(upper, lower)
     return figure, upper, lower
 
 
@@ -148,7 +141,7 @@ def _verdict(response: Response, p2: float, kr: float) -> str:
 ROTATION = "#b7791f"
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_motion(
     response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
 ) -> None:
@@ -184,7 +177,7 @@ def plot_motion(
             axes.axvline(part.begins_s, color="black", lw=0.9, ls=":")
     lower.set_xlim(*_motion_window(history, response))
     figure.suptitle(_title(title, reverse, _motion_verdict(response)), fontsize=10)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def _least_top(strength_g: FloatArray) -> float:
@@ -208,7 +201,7 @@ def _around(largest: float, least: float) -> tuple[float, float]:
 
 
 def _motion_verdict(response: Response) -> str:
-    kind = mode_title(response.kind)
+    kind = canvas.mode_title(response.kind)
     if response.started_s is None:
         return f"{kind}: the block never moves"
     if response.outcome is Outcome.TOPPLED:
@@ -223,7 +216,7 @@ def _motion_verdict(response: Response) -> str:
     return where
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_rocking(
     response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
 ) -> None:
@@ -265,11 +258,11 @@ def plot_rocking(
         _name_time(lower, response.toppled_s, "overturning certain", 0.03)
     lower.set_xlim(*_window(history.time_s, np.abs(ratio), response))
     figure.suptitle(_title(title, reverse, _rocking_verdict(response)), fontsize=10)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def _rocking_verdict(response: Response) -> str:
-    kind = mode_title(response.kind)
+    kind = canvas.mode_title(response.kind)
     if response.started_s is None:
         return f"{kind}: the block never lifts off its base"
     if response.outcome is Outcome.TOPPLED:

@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.plots.canvas import (
-    MODE_COLOURS,
-    MODE_LINES,
-    in_own_style,
-    light_grid,
-    mode_title,
-    new_figure,
-    open_corner,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.rockmasses.counts import (
     Crossing,
@@ -47,19 +37,19 @@ TITLE_WIDTH = 90
 """Letters of a line of the title, so that the label of a record is not cut at the edges."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path:
     """Draw the cumulative counts of blocks against PGA by mode, and the shares of the modes.
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
     compared; where two of them cross is marked.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     counts = mode_counts(realisations)
     present = [mode for mode, count in counts.items() if count.count]
     # Every bar is as wide as the name of its mode.
     width_in = 0.45 + 0.62 * len(present)
-    figure = new_figure(5.7 + width_in, 4.6)
+    figure = canvas.new_figure(5.7 + width_in, 4.6)
     yields = {mode: sorted_yields(realisations, mode) for mode in present}
     finite = np.concatenate(list(yields.values()))
     # A few blocks that hardly any earthquake moves would squeeze all the others to the left.
@@ -70,8 +60,8 @@ def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path
     axes, bars = figure.subplots(1, 2, width_ratios=[5.7, width_in])
     for mode in present:
         counted = cumulative_counts(realisations, mode, pga_g)
-        axes.plot(pga_g, counted, MODE_LINES[mode], color=MODE_COLOURS[mode], lw=1.8,
-                  label=mode_title(mode))  # fmt: skip
+        axes.plot(pga_g, counted, canvas.MODE_LINES[mode], color=canvas.MODE_COLOURS[mode], lw=1.8,
+                  label=canvas.mode_title(mode))  # fmt: skip
     shown = [crossing for crossing in crossings(realisations) if crossing.pga_g <= right]
     for crossing in shown:
         axes.plot(crossing.pga_g, crossing.count, "o", ms=6, mfc="white", mec="black", zorder=5)
@@ -82,21 +72,23 @@ def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("peak ground acceleration, PGA [g]")
     axes.set_ylabel("blocks with a yield acceleration below PGA")
-    light_grid(axes)
+    canvas.light_grid(axes)
     # Above the axes, because the curves may run anywhere.
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(present), fontsize=9, frameon=False
     )
 
     shares = [100.0 * counts[mode].share for mode in present]
-    bars.bar(range(len(shares)), shares, width=0.7, color=[MODE_COLOURS[mode] for mode in present])
+    bars.bar(
+        range(len(shares)), shares, width=0.7, color=[canvas.MODE_COLOURS[mode] for mode in present]
+    )
     for place, share in enumerate(shares):
         write_near(bars, f"{share:.1f} %", (place, share), (0, 2), movable=False, fontsize=8.5)
     _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
     figure.suptitle(_title(realisations), fontsize=10)
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _with_error(crossing: Crossing) -> str:
@@ -105,10 +97,12 @@ def _with_error(crossing: Crossing) -> str:
 
 
 def _name_bars(axes: Axes, modes: Sequence[ModeName | None]) -> None:
-    names = ["all" if mode is None else mode_title(mode).replace(" ", "\n") for mode in modes]
+    names = [
+        "all" if mode is None else canvas.mode_title(mode).replace(" ", "\n") for mode in modes
+    ]
     axes.set_xticks(range(len(names)), names, fontsize=9)
     axes.set_xlim(-0.6, len(names) - 0.4)
-    open_corner(axes)
+    canvas.open_corner(axes)
 
 
 def _title(realisations: Realisations) -> str:
@@ -127,28 +121,28 @@ PARTS = (
 """Parts of a bar: what they are made of, what they are called, and their colours."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95) -> Path:
     """Draw the share of the blocks that fail against the scale of the motion, by mode.
 
     Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at
     the scale nearest to that. With one scale there is that alone.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     by_scale = failures(shaken, level)
     bars_of = min(by_scale, key=lambda each: abs(np.log(each.scale)))
     width_in = 1.9 + 0.75 * (1 + len(bars_of.modes))
     if len(by_scale) > 1:
-        figure = new_figure(5.4 + width_in, 4.6)
+        figure = canvas.new_figure(5.4 + width_in, 4.6)
         curves, bars = figure.subplots(1, 2, width_ratios=[5.4, width_in])
         _draw_curves(curves, by_scale, level)
     else:
-        figure = new_figure(width_in + 1.2, 4.6)
+        figure = canvas.new_figure(width_in + 1.2, 4.6)
         bars = figure.subplots()
     _draw_bars(bars, bars_of)
     letters = min(TITLE_WIDTH, int(_LETTERS_AN_INCH * figure.get_figwidth()))
     figure.suptitle(_shaken_title(shaken, letters), fontsize=10)
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) -> None:
@@ -157,7 +151,11 @@ def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) ->
     _draw_share(axes, scales, [each.total for each in by_scale], "all blocks", "-", "#404040", 4.0)
     for mode in by_scale[0].modes:
         of_mode = [each.modes[mode] for each in by_scale]
-        label, line, colour = mode_title(mode), MODE_LINES[mode], MODE_COLOURS[mode]
+        label, line, colour = (
+            canvas.mode_title(mode),
+            canvas.MODE_LINES[mode],
+            canvas.MODE_COLOURS[mode],
+        )
         _draw_share(axes, scales, of_mode, label, line, colour, 1.8)
     unknown = np.array([each.total.open_of_all for each in by_scale])
     if unknown.any():
@@ -168,7 +166,7 @@ def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) ->
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("factor on the motion")
     axes.set_ylabel(f"share of all blocks that fail [%], {100.0 * level:g} % interval")
-    light_grid(axes)
+    canvas.light_grid(axes)
     axes.legend(loc="upper left", fontsize=9, frameon=False)
     above = axes.twiny()
     above.set_xlim(0.0, 1.02 * by_scale[-1].pga_g)

@@ -9,18 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import (
-    BLUE,
-    MODE_COLOURS,
-    RED,
-    ROCK,
-    in_own_style,
-    light_grid,
-    mode_title,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import write_near
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import words_of_mode
@@ -54,7 +43,7 @@ class YieldLine(NamedTuple):
     end_deg: float
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_rotation(
     block: Block,
     path: str | PathLike[str],
@@ -77,7 +66,7 @@ def plot_rotation(
     Raises:
         InputError: a block of another mode, a share out of range, too many of them.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
     judged = stability(block, **planes)  # type: ignore[arg-type]
     if judged.mode not in BY_MODE:
@@ -88,9 +77,9 @@ def plot_rotation(
     if not 1 <= len(shares) <= len(_LINES):
         raise InputError(f"{len(shares)} shares of the rotation: give 1 to {len(_LINES)}")
     law = BY_MODE[judged.mode]
-    figure = new_figure(7.0, 4.6)
+    figure = canvas.new_figure(7.0, 4.6)
     axes = figure.add_subplot()
-    colours = (MODE_COLOURS[judged.mode], BLUE, RED, ROCK)
+    colours = (canvas.MODE_COLOURS[judged.mode], canvas.BLUE, canvas.RED, canvas.ROCK)
     lines = []
     for share, style, colour in zip(shares, _LINES, colours, strict=False):
         end_deg = law.limit_deg(block, back_follows=share)
@@ -116,13 +105,13 @@ def plot_rotation(
     axes.margins(y=0.12)
     axes.set_xlabel(f"rotation of the block [deg], until {law.end}")
     axes.set_ylabel("yield acceleration [g]")
-    light_grid(axes)
+    canvas.light_grid(axes)
     axes.legend(fontsize=8.5, framealpha=0.9)
     axes.set_title(
-        f"{mode_title(judged.mode)}: $\\alpha_1$ = {block.alpha1_deg:.4g}, $\\alpha_3$ = "
+        f"{canvas.mode_title(judged.mode)}: $\\alpha_1$ = {block.alpha1_deg:.4g}, $\\alpha_3$ = "
         f"{block.alpha3_deg:.4g}, $\\beta$ = {beta_deg:g}, $\\varphi_1$ = {phi_deg:g}, "
         f"$\\varphi_2$ = {judged.phi_back_deg:g} deg",
         fontsize=10,
     )
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
     return tuple(lines)

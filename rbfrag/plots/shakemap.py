@@ -11,12 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import (
-    in_own_style,
-    new_figure,
-    plot_path,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.coast import draw_coast
 from rbfrag.plots.labels import as_written, write_near
 
@@ -32,7 +27,7 @@ LEAST = 1e-3
 _KM_PER_DEGREE = 111.195
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_shakemap(
     lon: FloatArray,
     lat: FloatArray,
@@ -52,7 +47,7 @@ def plot_shakemap(
         epicentre: longitude and latitude of the epicentre [deg].
         shape: rows and columns if the places are the nodes of a whole grid; points otherwise.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     if not np.isfinite(probability).any():
         raise InputError("there is no probability to draw")
     if shape is None:
@@ -62,7 +57,7 @@ def plot_shakemap(
     wide = max((east - west) * middle, 1e-3)
     tall = max(north - south, 1e-3)
     height = min(max(6.0 * tall / wide, 3.2), 8.0)
-    figure = new_figure(7.2, height + 0.6)
+    figure = canvas.new_figure(7.2, height + 0.6)
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import FuncFormatter
@@ -95,7 +90,7 @@ def plot_shakemap(
     axes.set_title("\n".join(lines), fontsize=10)
     bar = figure.colorbar(drawn, ax=axes, extend="min", label="probability of toppling", shrink=0.9)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    return save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _frame(

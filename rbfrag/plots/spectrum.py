@@ -15,16 +15,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import (
-    in_own_style,
-    legend_below,
-    light_grid,
-    logarithmic,
-    new_figure,
-    plot_path,
-    save_figure,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
@@ -48,7 +39,7 @@ def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
     return size
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_spectrum(
     motions: Sequence[GroundMotion],
     path: str | PathLike[str],
@@ -65,7 +56,7 @@ def plot_spectrum(
         p2: the figure spans at least these frequency parameters [1/s²].
         names: names of the motions in the legend; their labels if empty.
     """
-    plot_path(path)
+    canvas.plot_path(path)
     if not 1 <= len(motions) <= MOST_MOTIONS:
         raise InputError(
             f"{len(motions)} motions: a figure of spectra shows 1 to {MOST_MOTIONS} of them"
@@ -75,7 +66,7 @@ def plot_spectrum(
     if high < 4.0 * low:
         low, high = 0.5 * low, 2.0 * high
     sizes = np.geomspace(low, high, _POINTS)
-    figure = new_figure(7.2, 5.0)
+    figure = canvas.new_figure(7.2, 5.0)
     axes = figure.add_subplot()
     highest = 0.0
     for motion, name, colour in zip(motions, named, COLOURS, strict=False):
@@ -89,21 +80,21 @@ def plot_spectrum(
         highest = max(highest, motion.pgv_m_s)
     if highest <= 0.0:
         raise InputError("these motions topple no block of any size: there is nothing to draw")
-    logarithmic(axes, (1.0, 3.0), (1.0, 2.0, 5.0))
+    canvas.logarithmic(axes, (1.0, 3.0), (1.0, 2.0, 5.0))
     axes.set_xlim(low, high)
     bottom = max(_LOWEST_PART * highest, 0.8 * _lowest(axes))
     axes.set_ylim(bottom, 1.25 * highest)
     axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
     axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
-    light_grid(axes, which="both")
+    canvas.light_grid(axes, which="both")
     above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
     above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
-    written_numbers(above.xaxis, 1.0, 2.0, 5.0)
+    canvas.written_numbers(above.xaxis, 1.0, 2.0, 5.0)
     key = [(f"$X(p)$, {each}", LINES[each]) for each in polarities]
     for label, style in (*key, ("PGV, either polarity", ":")):
         axes.plot([], [], style, color="black", lw=1.2, label=label)
-    legend_below(figure, 2)
-    return save_figure(figure, path)
+    canvas.legend_below(figure, 2)
+    return canvas.save_figure(figure, path)
 
 
 def _lowest(axes: Axes) -> float:

@@ -13,25 +13,23 @@ from numpy.typing import NDArray
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.standing import Standing
 from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
-from rbfrag.plots.canvas import (
-    BLUE,
-    RED,
-    in_own_style,
-    legend_below,
-    light_grid,
-    new_figure,
-    open_corner,
-    plot_path,
-    save_figure,
-    written_numbers,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.hazard import measure_title
 from rbfrag.plots.labels import as_written, write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOURS = (BLUE, "#d98c1f", "#4c8f4c", "#8c2d4f", "#2c9fad", "#7a6fae", "#6b6b6b", "#b59a2e")
+_COLOURS = (
+    canvas.BLUE,
+    "#d98c1f",
+    "#4c8f4c",
+    "#8c2d4f",
+    "#2c9fad",
+    "#7a6fae",
+    "#6b6b6b",
+    "#b59a2e",
+)
 _LINES = ("-", "--", "-.", ":")
 _MOST_NAMED = 10
 """More curves are drawn alike, and of their branches those of most weight are named."""
@@ -40,14 +38,14 @@ _FACTORS = np.geomspace(1e-4, 1e4, 401)
 _LEAST_RATE = 1e-7
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_survival(
     curves: Sequence[HazardCurve], answer: SurvivalAnswer, path: str | PathLike[str]
 ) -> Path:
     """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights."""
-    plot_path(path)
+    canvas.plot_path(path)
     weighted = [one for one in answer.branches if one.weight is not None]
-    figure = new_figure(11.0 if weighted else 9.0, 4.6)
+    figure = canvas.new_figure(11.0 if weighted else 9.0, 4.6)
     ratios = (1.0, 1.0, 0.7) if weighted else (1.0, 1.0)
     panels = figure.subplots(1, len(ratios), width_ratios=ratios)
     _draw_curves(panels[0], curves, answer)
@@ -55,16 +53,16 @@ def plot_survival(
     if weighted:
         _draw_weights(panels[2], weighted)
     for axes in panels:
-        open_corner(axes)
-    light_grid(*panels[:2])
+        canvas.open_corner(axes)
+    canvas.light_grid(*panels[:2])
     who = "The block stands" if answer.blocks == 1 else f"All {answer.blocks} blocks stand"
     figure.suptitle(
         f"{who} after {answer.age_years:g} years with P = {answer.probability_standing:.3g} "
         f"({100 * answer.level:g} % interval {answer.ci_low:.2g} to {answer.ci_high:.2g})",
         fontsize=11,
     )
-    legend_below(figure, 4)
-    return save_figure(figure, path)
+    canvas.legend_below(figure, 4)
+    return canvas.save_figure(figure, path)
 
 
 def _style(i: int, curves: int) -> dict[str, Any]:
@@ -105,10 +103,12 @@ def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
     for percent, factor in ((5.0, answer.factor_5_percent), (50.0, answer.factor_50_percent)):
         axes.axhline(percent, color="#888888", lw=0.7, ls=":")
         if factor is not None:
-            axes.plot([factor], [percent], "o", color=RED, ms=6, zorder=3)
-            write_near(axes, f"{factor:.3g}", (factor, percent), (6, 5), color=RED, fontsize=9)
+            axes.plot([factor], [percent], "o", color=canvas.RED, ms=6, zorder=3)
+            write_near(
+                axes, f"{factor:.3g}", (factor, percent), (6, 5), color=canvas.RED, fontsize=9
+            )
     axes.set_ylim(0.0, 100.0)
-    written_numbers(axes.xaxis, 1.0)
+    canvas.written_numbers(axes.xaxis, 1.0)
     near = [one for one in (answer.factor_5_percent, answer.factor_50_percent) if one is not None]
     axes.set_xlim(max(min([0.1, *near]) / 3.0, 0.001), min(max([3.0, *near]) * 3.0, 1000.0))
     axes.set_xlabel("factor on all hazard rates")
@@ -130,7 +130,7 @@ def _draw_weights(axes: Axes, branches: Sequence[BranchSurvival]) -> None:
     before = [100.0 * (one.weight or 0.0) for one in branches]
     after = [100.0 * (one.weight_given_standing or 0.0) for one in branches]
     axes.barh(at - 0.2, before, 0.38, color="#bbbbbb", label="weight before")
-    axes.barh(at + 0.2, after, 0.38, color=RED, label="weight given standing")
+    axes.barh(at + 0.2, after, 0.38, color=canvas.RED, label="weight given standing")
     size = 10.0 if len(branches) <= 5 else 8.0
     axes.set_yticks(at, [_short(one.name) for one in branches], fontsize=size)
     axes.invert_yaxis()

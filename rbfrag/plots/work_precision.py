@@ -6,13 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Protocol
 
-from rbfrag.plots.canvas import (
-    in_own_style,
-    light_grid,
-    logarithmic,
-    new_figure,
-    save_figure,
-)
+from rbfrag.plots import canvas
 from rbfrag.plots.labels import write_near
 
 ROUNDING = 1e-16
@@ -55,7 +49,7 @@ class Point(Protocol):
         """Median time [s]."""
 
 
-@in_own_style
+@canvas.in_own_style
 def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -> None:
     """Draw time against error, a marker per method and setting, and write it to `path`.
 
@@ -65,7 +59,7 @@ def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -
     Args:
         points: measured methods; those of a family in the order of their settings.
     """
-    figure = new_figure(width_in=8.0, height_in=5.4)
+    figure = canvas.new_figure(width_in=8.0, height_in=5.4)
     axes = figure.subplots()
     families = list(dict.fromkeys(point.family for point in points))
     ours = peers = 0
@@ -93,10 +87,10 @@ def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -
             if p.of_use:
                 axes.scatter([x], [y], s=150, facecolors="none", edgecolors="black", zorder=4)
                 write_near(axes, "as used", (x, y), (0, -15), fontsize=8)
-    logarithmic(axes)
+    canvas.logarithmic(axes)
     axes.invert_xaxis()
     axes.set_xlabel("relative error of the peak rotation: median (marker) to worst (bar)")
     axes.set_ylabel("median time of one run [s]")
-    light_grid(axes)
+    canvas.light_grid(axes)
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)

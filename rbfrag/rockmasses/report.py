@@ -14,6 +14,13 @@ from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.scenario import Average, Scenario
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName
 
+COUNTS = ("count", "share", "has_model", "unstable", "in_domain")
+DRAWN = ("gamma_deg", "beta_deg", "phi_deg", "phi_back_deg", "s1_m", "s2_m")
+ANSWERS = (
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain", "reason",
+)  # fmt: skip
+"""Values of modes, realisations and scenarios that documents and tables show as they are."""
+
 NEAR_LIMIT = 0.01
 """Share of impossible realisations above which the description is doubted."""
 
@@ -62,18 +69,9 @@ def _scenario(answer: Scenario) -> dict[str, Any]:
         **answer.measures,
         "model": answer.model,
         "other_models": dict(answer.other_models),
-        "term": answer.term,
-        "method": answer.method,
-        "level": answer.level,
+        **{name: getattr(answer, name) for name in ("term", "method", "level")},
         "modes": {
-            mode.mode: {
-                "count": mode.count,
-                "share": mode.share,
-                "has_model": mode.has_model,
-                "unstable": mode.unstable,
-                "in_domain": mode.in_domain,
-                **_average(mode.covered),
-            }
+            mode.mode: {**{name: getattr(mode, name) for name in COUNTS}, **_average(mode.covered)}
             for mode in answer.modes
         },
         "covered_share": answer.covered_share,
@@ -140,27 +138,14 @@ def block_columns(
         "ky": only_blocks(stability.ky),
         "alpha1_deg": only_blocks(realisations.blocks.alpha1_deg),
         "alpha3_deg": only_blocks(realisations.blocks.alpha3_deg),
-        "gamma_deg": realisations.gamma_deg,
-        "beta_deg": realisations.beta_deg,
-        "phi_deg": realisations.phi_deg,
-        "phi_back_deg": realisations.phi_back_deg,
-        "s1_m": realisations.s1_m,
-        "s2_m": realisations.s2_m,
+        **{name: getattr(realisations, name) for name in DRAWN},
         "r3_m": only_blocks(realisations.blocks.r3_m),
     }
     if realisations.bonded.any():
         columns["cohesion_pa"] = realisations.cohesion_pa
     if answer is None:
         return columns | {"reason": realisations.reason}
-    return columns | {
-        "probability": answer.probability,
-        "ci_low": answer.ci_low,
-        "ci_high": answer.ci_high,
-        "event_low": answer.event_low,
-        "event_high": answer.event_high,
-        "in_domain": answer.in_domain,
-        "reason": answer.reason,
-    }
+    return columns | {name: getattr(answer, name) for name in ANSWERS}
 
 
 def toppling_blocks(

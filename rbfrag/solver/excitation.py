@@ -158,9 +158,7 @@ class Excitation:
 
 
 def excitation(
-    motion: GroundMotion,
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
+    motion: GroundMotion, vertical: GroundMotion | None = None, polarity: Polarity = "forward"
 ) -> Excitation:
     """Bring a horizontal motion and its optional vertical to common nodes.
 

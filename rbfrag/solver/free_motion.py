@@ -261,10 +261,7 @@ def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
 
 
 def _extremes(start: float, values: FloatArray) -> tuple[float, float]:
-    return (
-        float(values.min(initial=start)),
-        float(values.max(initial=start)),
-    )
+    return (float(values.min(initial=start)), float(values.max(initial=start)))
 
 
 def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FloatArray:

@@ -428,12 +428,7 @@ class ShakenMechanism:
 
 
 def shaken_mechanism(
-    block: Block,
-    *,
-    kind: str,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = None,
+    block: Block, *, kind: str, beta_deg: float, phi_deg: float, phi_back_deg: float | None = None
 ) -> ShakenMechanism:
     """Return the mechanism of a block whose failure mode is that of the kind.
 

@@ -6,6 +6,7 @@ import csv
 import math
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,23 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import CriticalResult, FloatArray, Part, Response, ResponseHistory
 
+RESPONSE_NUMBERS = (
+    "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s", "toppled_s",
+    "error_estimate", "steps", "samples_moved", "samples_total", "final_theta_rad",
+    "displacement_m", "peak_displacement_m", "centroid_displacement_m", "stopped_s",
+)  # fmt: skip
+OF_TWO_CORNERS = (
+    "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
+)  # fmt: skip
+"""Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
+
+STRENGTH_VALUES = (
+    "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "search_limit", "certified",
+    "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved", "reentrant", "n_runs",
+    "p2",
+)  # fmt: skip
+"""Values of a search for a strength in its JSON answer."""
+
 HISTORY_COLUMNS = (
     "time_s",
     "theta_rad",
@@ -25,41 +43,25 @@ HISTORY_COLUMNS = (
     "k_h_g",
     "k_v_g",
 )
+MOTION_COLUMNS = (
+    *HISTORY_COLUMNS, "displacement_m", "velocity_m_s", "centroid_x_m", "centroid_y_m",
+    "strength_g",
+)  # fmt: skip
+"""Columns of histories; the latter of models in which the block is displaced, empty where one
+does not apply."""
 
 
 def response_as_dict(response: Response) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract."""
-    answer = {
+    answer: dict[str, Any] = {
         "kind": response.kind,
         "outcome": response.outcome.value,
-        "peak_theta_n": response.peak_theta_n,
-        "peak_theta_rad": response.peak_theta_rad,
-        "critical_angle_deg": response.critical_angle_deg,
-        "started_s": response.started_s,
-        "toppled_s": response.toppled_s,
-        "error_estimate": response.error_estimate,
-        "steps": response.steps,
-        "samples_moved": response.samples_moved,
-        "samples_total": response.samples_total,
-        "final_theta_rad": response.final_theta_rad,
-        "displacement_m": response.displacement_m,
-        "peak_displacement_m": response.peak_displacement_m,
-        "centroid_displacement_m": response.centroid_displacement_m,
-        "stopped_s": response.stopped_s,
-        "mode_changes": [
-            {"time_s": change.time_s, "motion": change.motion} for change in response.mode_changes
-        ],
+        **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
+        "mode_changes": [asdict(change) for change in response.mode_changes],
         "warnings": list(response.warnings),
     }
-    # of a block with two corners only
     if response.impacts is not None:
-        answer |= {
-            "critical_backward_deg": response.critical_backward_deg,
-            "peak_forward_rad": response.peak_forward_rad,
-            "peak_backward_rad": response.peak_backward_rad,
-            "impacts": response.impacts,
-            "sensitive": response.sensitive,
-        }
+        answer |= {name: getattr(response, name) for name in OF_TWO_CORNERS}
     if response.parts:
         answer["parts"] = [_part(part) for part in response.parts]
     return answer
@@ -75,17 +77,6 @@ def _part(part: Part) -> dict[str, Any]:
         **response_as_dict(own),
         "end": None if end is None else end.as_dict(),
     }
-
-
-MOTION_COLUMNS = (
-    *HISTORY_COLUMNS,
-    "displacement_m",
-    "velocity_m_s",
-    "centroid_x_m",
-    "centroid_y_m",
-    "strength_g",
-)
-"""Columns for the models in which the block is displaced; empty where one does not apply."""
 
 
 def write_history(response: Response, path: str | os.PathLike[str]) -> None:
@@ -171,7 +162,7 @@ def critical_as_dict(
     elif "displacement_m" in result.of_kind:
         answer = _sliding(result)
     else:
-        answer = _strength(result)
+        answer = {name: getattr(result, name) for name in STRENGTH_VALUES}
     answer |= {"polarity": result.polarity, "pga_g": result.pga_g}
     answer["warnings"] = [*remarks, *result.warnings]
     if result.of_kind.get("scale") is not None:
@@ -190,26 +181,6 @@ def map_rows(result: CriticalResult) -> list[dict[str, Any]]:
             intervals.k_lo.tolist(), intervals.k_hi.tolist(), intervals.outcome, strict=True
         )
     ]
-
-
-def _strength(result: CriticalResult) -> dict[str, Any]:
-    return {
-        "kr_over_pga": result.kr_over_pga,
-        "lower": result.lower,
-        "upper": result.upper,
-        "kr": result.kr,
-        "y_m_s": result.y_m_s,
-        "status": result.status,
-        "search_limit": result.search_limit,
-        "certified": result.certified,
-        "k_up_over_pga": result.k_up_over_pga,
-        "undecided": result.undecided,
-        "island_width": result.island_width,
-        "kr_over_pga_resolved": result.kr_over_pga_resolved,
-        "reentrant": result.reentrant,
-        "n_runs": result.n_runs,
-        "p2": result.p2,
-    }
 
 
 def _sliding(result: CriticalResult) -> dict[str, Any]:

@@ -197,10 +197,7 @@ def wilson(failed: int, count: int) -> tuple[float, float]:
 
 def _checked(draws: object, seed: object) -> tuple[int, np.random.Generator]:
     """Return the number of draws and a generator, or refuse what is none."""
-    for name, value, least, most in (
-        ("draws", draws, 1, MOST_DRAWS),
-        ("seed", seed, 0, 2**63 - 1),
-    ):
+    for name, value, least, most in (("draws", draws, 1, MOST_DRAWS), ("seed", seed, 0, 2**63 - 1)):
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise InputError(f"{name} = {value!r}: give a whole number from {least} to {most}")
     assert isinstance(draws, int)

@@ -12,12 +12,7 @@ from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.free_rocking import TOPPLED, Corner
 from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.two_corners import (
-    IMPACT,
-    RockingRun,
-    Rules,
-    run_rocking,
-)
+from rbfrag.solver.integrator.two_corners import IMPACT, RockingRun, Rules, run_rocking
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.results import FloatArray, ResponseHistory
 

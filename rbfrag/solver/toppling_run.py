@@ -79,12 +79,7 @@ def respond(
 
 
 def simulate(
-    excited: Excitation,
-    *,
-    p2: float,
-    kr: float,
-    order: int = ORDER,
-    ph_max: float = PH_MAX,
+    excited: Excitation, *, p2: float, kr: float, order: int = ORDER, ph_max: float = PH_MAX
 ) -> Run:
     """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
     p = math.sqrt(p2)

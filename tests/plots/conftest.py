@@ -17,13 +17,14 @@ def caught(monkeypatch: pytest.MonkeyPatch) -> Callable[[ModuleType], list[Figur
 
     def watch(module: ModuleType) -> list[Figure]:
         figures: list[Figure] = []
-        save: Callable[..., Any] = vars(module)["save_figure"]
+        home = getattr(module, "canvas", module)
+        save: Callable[..., Any] = home.save_figure
 
         def keep(figure: Figure, path: object) -> object:
             figures.append(figure)
             return save(figure, path)
 
-        monkeypatch.setattr(module, "save_figure", keep)
+        monkeypatch.setattr(home, "save_figure", keep)
         return figures
 
     return watch

@@ -73,8 +73,8 @@ def drawn(monkeypatch):
         made.append(new_figure(*args))
         return made[-1]
 
-    new_figure = fit_module.new_figure
-    monkeypatch.setattr(fit_module, "new_figure", remember)
+    new_figure = fit_module.canvas.new_figure
+    monkeypatch.setattr(fit_module.canvas, "new_figure", remember)
     return made
 
 

@@ -45,7 +45,7 @@ def test_figure_shows_map_curve_and_values(
 ) -> None:
     motion, result = searched
     kept = []
-    monkeypatch.setattr(islands, "save_figure", lambda figure, path: kept.append(figure))
+    monkeypatch.setattr(islands.canvas, "save_figure", lambda figure, path: kept.append(figure))
     plot_islands(motion, result, tmp_path / "islands.png", title="made up")
     (figure,) = kept
     FigureCanvasAgg(figure).draw()

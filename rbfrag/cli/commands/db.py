@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from rbfrag.db.queries import DatabaseInfo, SuiteCount
 
 app = command_group(
-    "Upgrade, describe, check, export and merge databases.",
-    "Example:  rbfrag db info",
+    "Upgrade, describe, check, export and merge databases.", "Example:  rbfrag db info"
 )
 
 

@@ -22,9 +22,7 @@ NEXT = (
 
 @stacked
 def demo(
-    *,
-    context: typer.Context,
-    folder: str = option("Folder that the results are written to.", "."),
+    *, context: typer.Context, folder: str = option("Folder that the results are written to.", ".")
 ) -> None:
     """Run the whole chain from records to a prediction.
 

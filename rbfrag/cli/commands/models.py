@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -13,8 +14,7 @@ from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.stack import argument, command_group, stacked
 
 app = command_group(
-    "List, show and choose fitted fragility models.",
-    "Example:  rbfrag models show wls-pgv",
+    "List, show and choose fitted fragility models.", "Example:  rbfrag models show wls-pgv"
 )
 
 Name = Annotated[
@@ -100,7 +100,7 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         checks = check_models(connection, model_rows(connection))
     if json:
-        print_json([each.as_dict() for each in checks])
+        print_json([asdict(each) for each in checks])
     else:
         print_table(
             ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in checks]

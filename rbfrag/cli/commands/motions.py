@@ -27,6 +27,12 @@ SHORT = (
 )  # fmt: skip
 """Values of one motion that are shown without --verbose."""
 
+LABELS = (
+    "event", "station", "component", "orientation_deg", "is_vertical", "is_corrected", "recording",
+    "source_file", "trace_index",
+)  # fmt: skip
+"""What a motion's file says of it, shown under the same name."""
+
 STORED_LABELS = (
     "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
 )  # fmt: skip
@@ -155,20 +161,10 @@ def show(
     flags = quality_flags(ground)
     document: dict[str, Any] = {
         "name": ground.label,
-        "event": ground.event,
-        "station": ground.station,
-        "component": ground.component,
-        "orientation_deg": ground.orientation_deg,
-        "is_vertical": ground.is_vertical,
-        "is_corrected": ground.is_corrected,
-        "recording": ground.recording,
-        "source_file": ground.source_file,
-        "trace_index": ground.trace_index,
+        **{name: getattr(ground, name) for name in LABELS},
         "format": ground.file_format,
         "start_time": None if ground.start_time is None else ground.start_time.isoformat(),
-        "dt_s": ground.dt_s,
-        "npts": ground.npts,
-        "duration_s": ground.duration_s,
+        **{name: getattr(ground, name) for name in ("dt_s", "npts", "duration_s")},
         **asdict(ground.measures),
         **ground.spectral_accelerations,
         "processing_applied": ground.processing_applied,

@@ -56,10 +56,7 @@ def plot_fit(
     print_warnings(picture.warnings)
 
 
-@app.command(
-    "chart",
-    epilog="Example:  rbfrag plot chart --p2 3 --out chart.pdf",
-)
+@app.command("chart", epilog="Example:  rbfrag plot chart --p2 3 --out chart.pdf")
 @stacked
 def plot_chart(
     *,

@@ -62,8 +62,7 @@ class Blocks:
         metavar="LIST",
     )
     displacement: str | None = option(
-        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
-        metavar="LIST",
+        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
     )
 
 

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import (
-    check_files,
-    print_json,
-    print_table,
-    print_warnings,
-    write_table,
-)
+from rbfrag.cli.output import check_files, print_json, print_table, print_warnings, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
 from rbfrag.cli.parameters.stack import option, stacked

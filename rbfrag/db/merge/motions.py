@@ -164,11 +164,7 @@ def _is_taken(target: Connection, theirs: RowMapping) -> bool:
 
 def _earthquake_id(target: Connection, theirs: RowMapping, event_id: str, ledger: Ledger) -> int:
     key = {"event_id": event_id, "guessed": theirs["guessed"]}
-    known = {
-        "name": theirs["event_name"],
-        "magnitude": theirs["magnitude"],
-        "time": theirs["time"],
-    }
+    known = {"name": theirs["event_name"], "magnitude": theirs["magnitude"], "time": theirs["time"]}
     if insert_if_new(target, earthquake, {**key, **known}):
         ledger.added["earthquake"] += 1
     ours = target.execute(select(earthquake).filter_by(**key)).mappings().one()

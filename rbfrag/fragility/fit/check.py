@@ -37,10 +37,6 @@ class ModelCheck:
     state: State
     remark: str
 
-    def as_dict(self) -> dict[str, str]:
-        """Return the fields by name."""
-        return {"name": self.name, "state": self.state, "remark": self.remark}
-
 
 def selection_of(row: ModelRow) -> dict[str, Any]:
     """Return what a fit was asked to read: suite, vertical motion, doubtful PGD, rotation."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,18 +58,32 @@ class DependenceEstimate:
     seed: int
 
 
+class Blocks(TypedDict):
+    """Blocks with what they did, as a dependence is estimated from them; arrays of shape (n,).
+
+    Args:
+        probability: P of each block, predicted without its earthquake.
+        failed: 1 where it failed, 0 where not, NaN where that is not known.
+        earthquake: labels.
+        site: labels of the recordings within an earthquake.
+        component: labels of the horizontal components within a recording.
+        polarity: +1 or -1.
+        p2: squared frequency parameter p² [1/s²].
+        y_m_s: toppling velocity k_r g/p [m/s].
+    """
+
+    probability: ArrayLike
+    failed: ArrayLike
+    earthquake: ArrayLike
+    site: ArrayLike
+    component: ArrayLike
+    polarity: ArrayLike
+    p2: ArrayLike
+    y_m_s: ArrayLike
+
+
 def estimate_dependence(
-    probability: ArrayLike,
-    failed: ArrayLike,
-    earthquake: ArrayLike,
-    site: ArrayLike,
-    component: ArrayLike,
-    polarity: ArrayLike,
-    p2: ArrayLike,
-    y_m_s: ArrayLike,
-    *,
-    replicates: int = REPLICATES,
-    seed: int = 0,
+    *, replicates: int = REPLICATES, seed: int = 0, **blocks: Unpack[Blocks]
 ) -> DependenceEstimate:
     """Estimate the copula of failures from predictions and outcomes.
 
@@ -77,14 +92,6 @@ def estimate_dependence(
     an earthquake has more than 40,000 pairs of a kind, as many are drawn at random and weighted.
 
     Args:
-        probability: P of each block, predicted without its earthquake, shape (n,).
-        failed: 1 where it failed, 0 where not, NaN where that is not known, shape (n,).
-        earthquake: labels, shape (n,).
-        site: labels of the recordings within an earthquake, shape (n,).
-        component: labels of the horizontal components within a recording, shape (n,).
-        polarity: +1 or -1, shape (n,).
-        p2: squared frequency parameter p² [1/s²], shape (n,).
-        y_m_s: toppling velocity k_r g/p [m/s], shape (n,).
         replicates: number of resamples of earthquakes for the standard errors; 0 for none.
         seed: seed of the resamples and of pairs that are drawn.
 
@@ -92,9 +99,7 @@ def estimate_dependence(
         InputError: columns differ in length.
         FitError: too few earthquakes or pairs; the message says which.
     """
-    tables = PairTables.of(
-        probability, failed, earthquake, site, component, polarity, p2, y_m_s, seed=seed
-    )
+    tables = PairTables.of(seed=seed, **blocks)
     estimate, events = tables.likeliest(), tables.earthquakes.size
     generator = np.random.default_rng(seed)
     resampled = []
@@ -142,14 +147,14 @@ def dependence_of_fit(
     for name in block.stored:
         alike &= data.values[name] == data.values[name].max()
     return estimate_dependence(
-        held_out.ravel(),
-        np.where(data.read & alike[:, None], data.failed, np.nan).ravel(),
-        each(data.event),
-        each(data.recording),
-        each(data.motion),
-        each(data.polarity),
-        size.ravel(),
-        strength.ravel(),
+        probability=held_out.ravel(),
+        failed=np.where(data.read & alike[:, None], data.failed, np.nan).ravel(),
+        earthquake=each(data.event),
+        site=each(data.recording),
+        component=each(data.motion),
+        polarity=each(data.polarity),
+        p2=size.ravel(),
+        y_m_s=strength.ravel(),
         seed=seed,
     )
 
@@ -171,24 +176,13 @@ class PairTables:
     own: PairTable
 
     @classmethod
-    def of(
-        cls,
-        probability: ArrayLike,
-        failed: ArrayLike,
-        earthquake: ArrayLike,
-        site: ArrayLike,
-        component: ArrayLike,
-        polarity: ArrayLike,
-        p2: ArrayLike,
-        y_m_s: ArrayLike,
-        *,
-        seed: int = 0,
-    ) -> PairTables:
+    def of(cls, *, seed: int = 0, **blocks: Unpack[Blocks]) -> PairTables:
         """Return the tables of all pairs (see `estimate_dependence`)."""
-        real = [
-            np.asarray(one, dtype=np.float64) for one in (probability, failed, polarity, p2, y_m_s)
-        ]
-        labels = [np.asarray(one).astype(str) for one in (earthquake, site, component)]
+        numeric = (blocks["probability"], blocks["failed"], blocks["polarity"], blocks["p2"],
+                   blocks["y_m_s"])  # fmt: skip
+        nested = blocks["earthquake"], blocks["site"], blocks["component"]
+        real = [np.asarray(one, dtype=np.float64) for one in numeric]
+        labels = [np.asarray(one).astype(str) for one in nested]
         if len({one.shape for one in (*real, *labels)}) != 1 or real[0].ndim != 1:
             raise InputError("the columns that a dependence is estimated from differ in length")
         p, did, side, size, y = real

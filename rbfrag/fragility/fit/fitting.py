@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Required, TypedDict
 
 import numpy as np
 
@@ -42,6 +42,21 @@ class Fitted:
     result: MethodResult
 
 
+class FitOptions(TypedDict, total=False):
+    """What :func:`fit` takes beside its data."""
+
+    kind: str
+    term: Required[str]
+    method: str | None
+    suite: str | None
+    name: str | None
+    vertical: Vertical
+    seed: int
+    estimate_m: bool
+    doubtful_pgd: bool
+    rotation_deg: float | None
+
+
 def fit(
     source: str | PathLike[str] | Connection | CombinationTable | FitSource | None = None,
     *,
@@ -56,30 +71,12 @@ def fit(
     doubtful_pgd: bool = False,
     rotation_deg: float | None = None,
 ) -> FitReport:
-    """Fit a fragility model; nothing is stored.
+    """Fit a fragility model as :func:`rbfrag.fit` does, but store nothing.
 
     Args:
         source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
             the current folder), or the data themselves (critical values alone carry ``wls`` and
-            ``lognormal``).
-        kind: what the blocks do: any kind that campaigns store.
-        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``.
-        method: method of fitting. Blocks known by p² and k_r: ``wls`` and ``lognormal`` (of
-            critical values, for a term that is one number), ``logistic`` (of outcomes, the same
-            terms), ``weibull`` and ``bounded`` (of outcomes, the terms with PGV), ``record`` and
-            ``power`` (``xp``). Sliding: ``displacement``; slumping: ``capacity`` (``pgv`` and
-            ``pgv_pga``); rocking: ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``,
-            or the only one that there is for the kind.
-        suite: suite of motions to fit (connection only); None for all motions.
-        name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
-            such as ``sliding-pgv``.
-        vertical: ``without`` or ``with`` vertical motion, or ``both`` (connection only).
-        seed: seed of the bootstrap by earthquake.
-        estimate_m: estimate the exponent M of y = k_r g/p^M instead of M = 1 (``lognormal`` and
-            ``logistic``).
-        doubtful_pgd: True to let ``pgd_tm`` read the PGD of records that are flagged for an
-            implausible final velocity or displacement (connection only).
-        rotation_deg: slumping: the rotation that counts as failure [deg]; None past recovery.
+            ``lognormal``), of which `suite`, `vertical` and `doubtful_pgd` choose nothing.
 
     Returns:
         The report; ``report.model.row`` is what the database stores.

@@ -10,18 +10,18 @@ v0 has a floor, so that v(x) > 0 for every x >= 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit.clusters import bootstrap, cr3, left_out
+from rbfrag.fragility.fit.clusters import bootstrap, left_out
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData
-from rbfrag.fragility.fit.result import CLUSTERED, MethodResult, few_events, scatter_of
-from rbfrag.fragility.fit.scores import score_intervals, scores_of
+from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import Method, arrays
 from rbfrag.fragility.methods.wls import (
@@ -284,9 +284,6 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     samples, unstable = event_bootstrap(
         bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
     )
-    names = form.parameters
-    spread = dict(zip(names, samples.std(axis=0, ddof=1).tolist(), strict=True))
-    judged = data.judged
     in_sample = probabilities(method, form, data, fit.parameters)
     # An earthquake with censored points only has no share in the fit: it is left out already.
     held_out, density = in_sample.copy(), np.empty(y.size)
@@ -302,35 +299,25 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     with np.errstate(divide="ignore", invalid="ignore"):
         ln_residual = np.where(data.observed & (mean > 0.0) & (data.y > 0.0),
                                np.log(data.y / mean), np.nan)  # fmt: skip
-    return MethodResult(
-        coefficients=dict(zip(names, fit.parameters.tolist(), strict=True)),
-        steps=steps,
-        standard_errors=dict(zip(names, np.sqrt(np.diag(cr3(steps))).tolist(), strict=True)),
+    result = method_result(
+        data,
+        Estimates(form.parameters, fit.parameters, steps, samples, seed),
+        in_sample,
+        held_out,
+        ln_residual=ln_residual,
         scores={
             "log_density_in_sample": float(_log_density(fit.parameters, x, y).mean()),
             "log_density_held_out": float(density.mean()),
-            **scores_of(judged, in_sample, held_out),
         },
         details={
-            "judged_on": judged.source,
-            "judged_outcomes": int(judged.known.sum()),
-            "score_intervals": score_intervals(judged, held_out, seed=seed),
-            "scatter_ln_y": scatter_of(data, ln_residual),
             "naive_standard_errors": dict(
                 zip(("c0", "c1"), clustered.naive_errors.tolist(), strict=True)
             ),
             "intercept_m_s": float(clustered.line[0]),
             "slope": float(clustered.line[1]),
-            "standard_error_kinds": dict.fromkeys(names, CLUSTERED),
             "cr1_standard_errors": dict(
                 zip(("c0", "c1"), np.sqrt(np.diag(clustered.covariance)).tolist(), strict=True)
             ),
-            "bootstrap": {
-                "standard_errors": spread,
-                "replicates": REPLICATES,
-                "not_stable": unstable,
-                "seed": seed,
-            },
             "r_squared_weighted": clustered.r_squared,
             "residual_sd_m_s": float(residuals.std(ddof=2)),
             "standardised_residual_sd": float((residuals / np.sqrt(variance)).std(ddof=2)),
@@ -340,9 +327,10 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
             "variance_bins": int(bins.starts.size),
             "variance_floor_share": FLOOR_FRACTION,
         },
-        warnings=tuple(_warnings(data, fit, x, len(others), unstable)),
-        held_out=held_out,
+        warnings=_warnings(data, fit, x, unstable),
     )
+    drawn = {**cast("Mapping[str, object]", result.details["bootstrap"]), "not_stable": unstable}
+    return replace(result, details={**result.details, "bootstrap": drawn})
 
 
 def event_bootstrap(
@@ -399,9 +387,7 @@ def _log_density(b: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + squares), dtype=np.float64)
 
 
-def _warnings(
-    data: FitData, fit: LineFit, x: FloatArray, n_events: int, unstable: int
-) -> list[str]:
+def _warnings(data: FitData, fit: LineFit, x: FloatArray, unstable: int) -> list[str]:
     result = []
     n_censored = int(data.censored.sum())
     if n_censored:
@@ -416,7 +402,6 @@ def _warnings(
             f"{unstable} of {REPLICATES} bootstrap fits did not become stable: the standard "
             "errors of the bootstrap are rough"
         )
-    result += few_events(n_events)
     doubtful = negative_probability(fit.parameters.tolist(), x, arrays()) > NEGATIVE_LIMIT
     doubtful_part = float(np.mean(doubtful))
     if doubtful_part > 0.0:

@@ -110,7 +110,7 @@ def method_result(
             "scatter_ln_y": None if ln_residual is None else scatter_of(data, ln_residual),
             **(details or {}),
         },
-        warnings=(*few_events(data.events), *warnings),
+        warnings=(*few_events(len(estimates.steps)), *warnings),
         held_out=held_out,
     )
 

@@ -17,12 +17,7 @@ from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.text.file import read_text
-from rbfrag.motions.text.record_file import (
-    Field,
-    RecordFile,
-    Trace,
-    positive_number,
-)
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace, positive_number
 from rbfrag.motions.text.times import sampling_interval
 from rbfrag.motions.units import acceleration_unit
 
@@ -177,8 +172,7 @@ def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
     mark = _mark(top)
     if _has_decimal_commas(top) or (mark == ";" and "," in top):
         raise file.error(
-            f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005",
-            first,
+            f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005", first
         )
     rows = [(number, line.split(mark)) for number, line in numbered]
     fields = rows[0][1]
@@ -206,7 +200,7 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     if indexed is None and dt_s is None:
         raise file.error(
             "the file holds one column and states no sampling interval: give it in seconds, "
-            f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
+            f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005"
         )
     if indexed is None:
         assert dt_s is not None
@@ -214,7 +208,7 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     if dt_s is not None and dt_s != indexed[0]:
         raise file.error(
             f"{indexed[1]} beside the file says dt = {indexed[0]:g} s, not {dt_s:g}: "
-            "leave --dt out, or correct one of them",
+            "leave --dt out, or correct one of them"
         )
     return indexed[0], f"the file states no dt; {indexed[0]:g} s is from {indexed[1]}"
 
@@ -306,10 +300,7 @@ def _check_columns(file: RecordFile, header: Header) -> None:
             _check_units(file, number, [match[1] for match in _BRACKETS.finditer(line)])
             continue
         if (unit := _TIME_UNIT.search(line)) and unit[1].lower() not in _SECONDS:
-            raise file.error(
-                f"the times are in {unit[1]!r}: convert them to seconds",
-                number,
-            )
+            raise file.error(f"the times are in {unit[1]!r}: convert them to seconds", number)
         acceleration = _ACCELERATION.search(line)
         other = _OTHER_QUANTITY.search(line)
         if other and not acceleration:

@@ -91,12 +91,7 @@ def _labels(motion: GroundMotion) -> dict[str, object]:
     labels["start_time"] = None if motion.start_time is None else motion.start_time.isoformat()
     labels["remarks"] = list(motion.remarks)
     kept = {name: value for name, value in labels.items() if value not in (None, "", [])}
-    return {
-        **kept,
-        "dt_s": motion.dt_s,
-        "npts": motion.npts,
-        "samples_sha256": motion.sha256,
-    }
+    return {**kept, "dt_s": motion.dt_s, "npts": motion.npts, "samples_sha256": motion.sha256}
 
 
 def _motion(file: RecordFile, span: range) -> Trace:

@@ -48,9 +48,7 @@ def common_shape(given: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tu
 
 
 def in_chunks(
-    formula: Callable[..., Any],
-    inputs: Sequence[NDArray[Any]],
-    outputs: Sequence[NDArray[Any]],
+    formula: Callable[..., Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]
 ) -> None:
     """Fill the outputs with what a formula makes of the inputs, chunk by chunk.
 

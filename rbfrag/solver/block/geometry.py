@@ -154,12 +154,7 @@ class Block:
 
     @classmethod
     def from_polygon(
-        cls,
-        vertices_m: Sequence[Sequence[float]],
-        heel: int,
-        back: int,
-        toe: int,
-        gamma_deg: float,
+        cls, vertices_m: Sequence[Sequence[float]], heel: int, back: int, toe: int, gamma_deg: float
     ) -> Block:
         """Return a block of any outline.
 

@@ -123,12 +123,7 @@ def _check_base(points: tuple[Point, ...], heel: int, toe: int, tolerance: float
 
 
 def _on_back_plane(
-    points: tuple[Point, ...],
-    back: int,
-    heel: int,
-    cot: float,
-    gamma_deg: float,
-    tolerance: float,
+    points: tuple[Point, ...], back: int, heel: int, cot: float, gamma_deg: float, tolerance: float
 ) -> list[int]:
     """Return the vertices on the back plane, after proving that the block rests against it."""
     # distances from the plane through the back contact, into the block positive

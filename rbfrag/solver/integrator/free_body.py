@@ -15,13 +15,7 @@ from typing import NamedTuple
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
-from rbfrag.solver.integrator.impulses import (
-    CONVERGED,
-    Corners,
-    Velocity,
-    Work,
-    after_impulses,
-)
+from rbfrag.solver.integrator.impulses import CONVERGED, Corners, Velocity, Work, after_impulses
 from rbfrag.solver.integrator.one_freedom.state import Record
 from rbfrag.solver.results import FloatArray
 
@@ -113,13 +107,7 @@ ROWS = 8
 
 @inner_kernel
 def one_step(
-    corners: Corners,
-    frame: Frame,
-    at: Motion,
-    h: float,
-    a: float,
-    w: float,
-    work: Work,
+    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: Work
 ) -> tuple[Motion, int]:
     """Take one step; return where it leads and what touched, as bits.
 

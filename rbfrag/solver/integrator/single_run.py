@@ -33,13 +33,7 @@ from rbfrag.solver.integrator.state import (
     excitation_over,
     time_of_jump,
 )
-from rbfrag.solver.integrator.taylor import (
-    MACHINE_EPSILON,
-    even_parts,
-    taylor_step,
-    turn,
-    value,
-)
+from rbfrag.solver.integrator.taylor import MACHINE_EPSILON, even_parts, taylor_step, turn, value
 from rbfrag.solver.results import FloatArray
 
 STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
@@ -417,13 +411,7 @@ def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float
 
 @inner_kernel
 def verdict(
-    nodes: Nodes,
-    last: int,
-    lost: bool,
-    moving: bool,
-    state: State,
-    known: Known,
-    theta_c: float,
+    nodes: Nodes, last: int, lost: bool, moving: bool, state: State, known: Known, theta_c: float
 ) -> tuple[int, float, float, float]:
     """Return outcome, peak, time of the verdict and error of a run that reached node `last`."""
     n = nodes.k_h.size

@@ -23,13 +23,7 @@ from rbfrag.solver.integrator.events import (
     keeps_direction,
     simple_turn,
 )
-from rbfrag.solver.integrator.free_rocking import (
-    STABLE,
-    TOPPLED,
-    Corner,
-    Offset,
-    after_record,
-)
+from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED, Corner, Offset, after_record
 from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
 from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
 from rbfrag.solver.integrator.single_run import step_errors

@@ -158,12 +158,7 @@ def move_slot(
 
 @kernel
 def run_batch(
-    nodes: Nodes,
-    kr: FloatArray,
-    p: FloatArray,
-    ph_max: float,
-    whole: IntArray,
-    real: FloatArray,
+    nodes: Nodes, kr: FloatArray, p: FloatArray, ph_max: float, whole: IntArray, real: FloatArray
 ) -> None:
     """Run blocks over one record, order 8, side by side.
 

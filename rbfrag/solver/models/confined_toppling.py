@@ -93,8 +93,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         def after_rocking(exit: Exit) -> Ending:
             if exit.reason == "upper":
                 return Ending(
-                    Outcome.CONTACT_LOST,
-                    f"at {exit.time_s:.3f} s the heel meets its plane again",
+                    Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the heel meets its plane again"
                 )
             return _seated_with_a_gap(site, block, exit, standstill)
 

@@ -305,10 +305,7 @@ def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None
     """Return the greatest rotation forward and backward [rad]; None where it has none."""
     if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
         return None, None
-    return (
-        None if run.side > 0 else run.forward.x,
-        None if run.side < 0 else run.backward.x,
-    )
+    return (None if run.side > 0 else run.forward.x, None if run.side < 0 else run.backward.x)
 
 
 def error_of(run: RockingRun, outcome: Outcome) -> float:

@@ -52,13 +52,7 @@ from rbfrag.solver.kind import (
 )
 from rbfrag.solver.mechanism import MechanismKind
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import (
-    SEARCH_LIMIT,
-    CriticalResult,
-    FloatArray,
-    Outcome,
-    Polarity,
-)
+from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, FloatArray, Outcome, Polarity
 from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
 
 THRESHOLDS_M = (0.01, 0.05, 0.15, 0.30)

@@ -55,13 +55,7 @@ from rbfrag.solver.kind import (
 )
 from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import (
-    SEARCH_LIMIT,
-    CriticalResult,
-    FloatArray,
-    Outcome,
-    no_intervals,
-)
+from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, FloatArray, Outcome, no_intervals
 from rbfrag.solver.search.scale import (
     BRACKET,
     SCAN_RATIO,

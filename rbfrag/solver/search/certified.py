@@ -127,12 +127,7 @@ def surely_topples_below(
 
 
 def certified_map(
-    excitation: Excitation,
-    *,
-    p2: float,
-    bottom: float,
-    full: bool,
-    map_depth: float = MAP_DEPTH,
+    excitation: Excitation, *, p2: float, bottom: float, full: bool, map_depth: float = MAP_DEPTH
 ) -> CertifiedMap:
     """Give verdicts from K_up down to the first toppling block, or to `bottom`.
 

@@ -180,9 +180,7 @@ class ScaledKind(MechanismKind):
                     f"{self.kind}"
                 )
         rules = scan_rules(
-            search_limit,
-            options.pop("scan_ratio", SCAN_RATIO),
-            options.pop("bracket", BRACKET),
+            search_limit, options.pop("scan_ratio", SCAN_RATIO), options.pop("bracket", BRACKET)
         )
         shaken = shaken_mechanism(options.pop("block"), kind=self.kind, **options)
         shaking = Shaking(motion, vertical, polarity)

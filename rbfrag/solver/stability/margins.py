@@ -37,46 +37,34 @@ class Margin:
     mode: ModeName
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What the mode of a block depends on besides its own angles.
+def margins(
+    block: Block, finding: Finding, limit_deg: float, phi_for: Callable[[float], float]
+) -> tuple[Margin, ...]:
+    """Return the nearest boundaries in both directions of φ, α1 and α3, nearest first.
+
+    A parallelogram stays one when an angle changes, so that γ changes with it; a polygon keeps
+    its γ.
 
     Args:
-        beta_deg: dip of the base [deg].
-        phi_deg: friction angle of the base [deg].
         limit_deg: angle of the resultant at which the base slides [deg]; phi_deg unless a
             bond helps.
         phi_for: the friction angle [deg] with which the base slides at a given angle of the
             resultant [deg].
     """
-
-    beta_deg: float
-    phi_deg: float
-    limit_deg: float
-    back_fracture: bool
-    phi_for: Callable[[float], float]
-
-
-def margins(block: Block, around: Surroundings) -> tuple[Margin, ...]:
-    """Return the nearest boundaries in both directions of φ, α1 and α3, nearest first.
-
-    A parallelogram stays one when an angle changes, so that γ changes with it; a polygon keeps
-    its γ.
-    """
-    a1, a3, limit = block.alpha1_deg, block.alpha3_deg, around.limit_deg
+    a1, a3, limit, backed = block.alpha1_deg, block.alpha3_deg, limit_deg, finding.back_fracture
     confined = block.confines
 
     def mode(alpha1: float, alpha3: float, limit_deg: float) -> int:
-        if not around.back_fracture:
-            beta = around.beta_deg
+        if not backed:
+            beta = finding.beta_deg
             return int(mode_code_without_back(alpha1, alpha3, limit_deg, beta, SCALAR))
         closed = alpha1 + alpha3 < 0.0 if block.is_parallelogram else confined
         return int(mode_code(alpha1, alpha3, limit_deg, closed, SCALAR))
 
     now = mode(a1, a3, limit)
-    normal1 = [-a3] if block.is_parallelogram and around.back_fracture else []
-    normal3 = [-a1] if block.is_parallelogram and around.back_fracture else []
-    beta = [] if around.back_fracture else [around.beta_deg]
+    normal1 = [-a3] if block.is_parallelogram and backed else []
+    normal3 = [-a1] if block.is_parallelogram and backed else []
+    beta = [] if backed else [finding.beta_deg]
 
     result = [
         *_both_ways("alpha1", a1, [limit, *normal1, *beta], -90.0, a3, now,
@@ -85,14 +73,14 @@ def margins(block: Block, around: Surroundings) -> tuple[Margin, ...]:
                     lambda value: mode(a1, value, limit)),
     ]  # fmt: skip
     # In φ the boundaries lie where the base slides at α1 and at α3; only the order counts.
-    phi1, phi3 = around.phi_for(a1), around.phi_for(a3)
+    phi1, phi3 = phi_for(a1), phi_for(a3)
 
     def mode_at_phi(phi_deg: float) -> int:
         if phi_deg < phi1:
             return mode(a1, a3, -91.0)
         return mode(a1, a3, 0.5 * (a1 + a3) if phi_deg < phi3 else 91.0)
 
-    result += _both_ways("phi", around.phi_deg, [phi1, phi3], 0.0, 90.0, now, mode_at_phi)
+    result += _both_ways("phi", finding.phi_deg, [phi1, phi3], 0.0, 90.0, now, mode_at_phi)
     return tuple(sorted(result, key=lambda margin: abs(margin.change_deg)))
 
 
@@ -130,10 +118,12 @@ class Finding:
     """What the warnings are about; the fields are those of the answer.
 
     Args:
+        mode: failure mode.
         k: yield acceleration of the mode.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg].
+        back_fracture: whether there is a back plane.
         backward: whether the block turns back about its heel for want of a back plane.
         untenable: whether the back contact cannot hold the block.
         lifts: whether the bond of the base would have to bear tension at the yield.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,6 @@ from rbfrag.solver.quantity import (
 from rbfrag.solver.stability.margins import (
     Finding,
     Margin,
-    Surroundings,
     degrees_of,
     margins,
     warnings_about,
@@ -37,6 +36,8 @@ from rbfrag.solver.stability.modes import (
     state_code,
     yield_coefficient,
 )
+
+YIELDS = ("kr", "ky", "ks", "kct", "yield_acceleration")
 
 
 @dataclass(frozen=True)
@@ -137,15 +138,6 @@ def stability(
         back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3,
     )  # fmt: skip
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
-    around = Surroundings(
-        beta_deg=beta_deg,
-        phi_deg=finding.phi_deg,
-        limit_deg=degrees_of(planes.limit) if bond else finding.phi_deg,
-        back_fracture=back_fracture,
-        phi_for=partial(
-            _friction_that_slides_at, beta_deg=beta_deg, weight=planes.weight, bond=bond
-        ),
-    )
     own = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
         mode=finding.mode,
@@ -161,7 +153,12 @@ def stability(
         phi_back_deg=finding.phi_back_deg,
         kv=vertical_g(kv),
         back_fracture=back_fracture,
-        margins=margins(block, around),
+        margins=margins(
+            block,
+            finding,
+            degrees_of(planes.limit) if bond else finding.phi_deg,
+            partial(_friction_that_slides_at, beta_deg=beta_deg, weight=planes.weight, bond=bond),
+        ),
         cohesion=_cohesion(planes, bond) if bond else None,
         warnings=warnings_about(block, finding),
     )
@@ -270,38 +267,17 @@ def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
 
     A yield acceleration that no number expresses is None; the state says why.
     """
-    answer: dict[str, Any] = {
+    own = ("alpha1_deg", "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m",
+           "area_m2", "shape_factor")  # fmt: skip
+    bond = None if stability.cohesion is None else asdict(stability.cohesion)
+    return {
         "mode": stability.mode,
         "state": stability.state,
         "p2": block.p2,
-        "kr": finite_or_none(stability.kr),
-        "ky": finite_or_none(stability.ky),
-        "ks": finite_or_none(stability.ks),
-        "kct": finite_or_none(stability.kct),
-        "yield_acceleration": finite_or_none(stability.yield_acceleration),
-        "alpha1_deg": block.alpha1_deg,
-        "alpha3_deg": block.alpha3_deg,
-        "gamma_deg": block.gamma_deg,
-        "r1_m": block.r1_m,
-        "r2_m": block.r2_m,
-        "r3_m": block.r3_m,
-        "s1_m": block.s1_m,
-        "s2_m": block.s2_m,
-        "area_m2": block.area_m2,
-        "shape_factor": block.shape_factor,
+        **{name: finite_or_none(getattr(stability, name)) for name in YIELDS},
+        **{name: getattr(block, name) for name in own},
         "delta_deg": stability.delta_deg,
-        "margins": [
-            {"variable": m.variable, "change_deg": m.change_deg, "mode": m.mode}
-            for m in stability.margins
-        ],
-        "cohesion": None,
+        "margins": [asdict(margin) for margin in stability.margins],
+        "cohesion": bond and {name: finite_or_none(value) for name, value in bond.items()},
         "warnings": list(stability.warnings),
     }
-    if stability.cohesion is not None:
-        answer["cohesion"] = {
-            "ratio": stability.cohesion.ratio,
-            "ky": finite_or_none(stability.cohesion.ky),
-            "phi_equivalent_deg": stability.cohesion.phi_equivalent_deg,
-            "ky_equivalent": finite_or_none(stability.cohesion.ky_equivalent),
-        }
-    return answer
