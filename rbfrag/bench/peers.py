@@ -17,12 +17,11 @@ from importlib.util import find_spec
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.bench.cases import Case
 from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Solver = Literal["RK45", "DOP853", "LSODA"]
 
 STABLE, TOPPLED = "stable", "toppled"

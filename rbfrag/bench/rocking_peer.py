@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.bench.cases import Case
 from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
 from rbfrag.solver.integrator.two_corners import PAST_BALANCE
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.rocking_run import REST_SPEED
-
-FloatArray = NDArray[np.float64]
 
 HALVINGS = 52
 """Of a step, to the rounding of where an impact is in it."""

@@ -74,12 +74,9 @@ def record_length(
             excited, excitation_s = timed(lambda record=record: excitation(record))  # type: ignore[misc]
             case = Case(record, "forward", excited, p2, kr)
             _, run_s = timed(lambda case=case: taylor_run(case))  # type: ignore[misc]
-            rows.append(LengthRow(lengthened, longer.size, _moved(case), run_s, excitation_s))
+            moved = simulate(case.excitation, p2=case.p2, kr=case.kr).samples_moved
+            rows.append(LengthRow(lengthened, longer.size, moved, run_s, excitation_s))
     return tuple(rows)
-
-
-def _moved(case: Case) -> int:
-    return simulate(case.excitation, p2=case.p2, kr=case.kr).samples_moved
 
 
 def workers(

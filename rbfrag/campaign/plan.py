@@ -285,7 +285,9 @@ def _task(
     moves = motion.motion.pga_g > 0.0  # without motion k/PGA says nothing
     critical = None if there is None else there.kr_over_pga
     lacks_grid = there is None or (
-        not there.gridded and there.status != "outside_model" and _has_grid(motion, planned)
+        not there.gridded
+        and there.status != "outside_model"
+        and len(model_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
     )
     task = Task(
         planned=planned,
@@ -307,10 +309,6 @@ def _task(
         critical_k_over_pga=critical,
     )
     return task if task.asks else None
-
-
-def _has_grid(motion: MotionPlan, planned: PlannedCase) -> bool:
-    return len(model_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
 
 
 def _histories(there: KnownCombination | None, wanted: Wanted) -> Iterable[float]:

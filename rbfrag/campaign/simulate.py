@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from sqlalchemy import Engine
@@ -169,9 +169,10 @@ def simulate(
             "map_depth": depth if full_map else None,
         }
         run = _Run(engine, plan, todo)
+        work = (_with_samples(engine, each, depth) for each in todo.motions)
         workforce.carry_out(
-            engine, settings, run_work, _work(engine, todo, depth), len(todo.motions), run.take,
-            total=run.total, resumed=run.resumed, started=started,
+            engine, settings, run_work, work, len(todo.motions), run.take, total=run.total,
+             resumed=run.resumed, started=started,
         )  # fmt: skip
     return run.summary(time.perf_counter() - started)
 
@@ -278,11 +279,6 @@ def _wanted(
         histories=checked_ratios(histories, "--store-responses"),
         critical_history="critical" in selected,
     )
-
-
-def _work(engine: Engine, todo: Todo, map_depth: float) -> Iterator[MotionWork]:
-    for each in todo.motions:
-        yield _with_samples(engine, each, map_depth)
 
 
 def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> MotionWork:

@@ -10,8 +10,7 @@ from sqlalchemy import Connection, case, select
 
 from rbfrag.db.schema import combination, outcome_interval
 from rbfrag.errors import InputError
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 TOPPLES = 1.0
 SAFE = 0.0

@@ -18,8 +18,8 @@ from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 UNKNOWN = 0

@@ -16,8 +16,8 @@ from scipy.special import ndtri
 
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import COMPONENTS, Placement
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 REPLICATES = 8

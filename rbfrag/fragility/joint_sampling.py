@@ -17,8 +17,8 @@ from scipy.special import ndtri
 
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import COMPONENTS, Placement, checked
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MOST_AT_ONCE = 2000

@@ -21,12 +21,12 @@ from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.frames import Tabular
 from rbfrag.solver.kinds import KINDS, mode_of_kind
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 T = TypeVar("T")
 
 Texts = NDArray[np.object_]

@@ -21,9 +21,8 @@ from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import SINGLE, BlockParameters, Bound, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
-
-FloatArray = NDArray[np.float64]
 
 REACH = 5.5
 """The outermost point of each normal variable, in standard deviations."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from rbfrag.errors import InputError
@@ -44,10 +44,6 @@ def export_motions(
     if chosen == "at2" and len(motions) > 1:
         raise InputError(f"an AT2 file holds one motion, not {len(motions)}: export a CSV")
     lines = peer_at2.write(motions[0]) if chosen == "at2" else rbfrag_csv.write(motions)
-    _write(target, lines)
-    return chosen
-
-
-def _write(target: Path, lines: Iterator[str]) -> None:
     with written_whole(target) as draft, draft.open("w", newline="\n", encoding="utf-8") as file:
         file.writelines(f"{line}\n" for line in lines)
+    return chosen

@@ -22,8 +22,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 def rectangular_lobe(f: ArrayLike) -> FloatArray:

@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import halo
 from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.contour import ContourSet
     from matplotlib.text import Text
-
-FloatArray = NDArray[np.float64]
 
 MOST_POINTS = 300
 """More blocks than these are drawn as a histogram."""

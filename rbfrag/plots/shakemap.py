@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.coast import draw_coast
 from rbfrag.plots.labels import as_written, write_near
+from rbfrag.solver.results import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
-
-FloatArray = NDArray[np.float64]
 
 LEAST = 1e-3
 """Smaller probabilities are left white."""

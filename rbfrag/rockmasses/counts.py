@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
-
-FloatArray = NDArray[np.float64]
 
 QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
 """Quantiles of the yield acceleration that are reported."""

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 Law = Literal["constant", "normal", "lognormal", "uniform", "von_mises", "measured"]
 

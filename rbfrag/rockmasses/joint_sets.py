@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.rockmasses.distributions import Distribution
 from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
-
-FloatArray = NDArray[np.float64]
 
 REALISATIONS = 20_000
 """Blocks that are drawn when nothing else is asked for."""
@@ -157,8 +156,10 @@ class RockMass:
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
         """Return n values of every variable, each from its own stream of random numbers."""
+        streams = {key: VARIABLES[key].stream for key in self.variables}
+        seeds = {key: np.random.SeedSequence(seed, spawn_key=(k,)) for key, k in streams.items()}
         return {
-            key: law.sample(n, _generator(seed, VARIABLES[key].stream))
+            key: law.sample(n, np.random.default_rng(seeds[key]))
             for key, law in self.variables.items()
         }
 
@@ -339,10 +340,6 @@ def checked_seed(value: object, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST_SEED:
         raise InputError(f"{name} = {value!r}: give a whole number from 0 to {_LARGEST_SEED}")
     return value
-
-
-def _generator(seed: int, stream: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
 
 
 def _law(key: str, variable: Variable, description: object) -> Distribution:

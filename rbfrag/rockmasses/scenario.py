@@ -22,10 +22,9 @@ from rbfrag.question.question import predict
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.quantity import positive
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.at_rest import slump_at_rest
 from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
-
-FloatArray = NDArray[np.float64]
 
 MODELLED: tuple[ModeName, ...] = ("topple",)
 """Modes that a fragility model answers for."""

@@ -18,11 +18,9 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner, model_of_mode
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import Outcome
+from rbfrag.solver.results import FloatArray, Outcome
 from rbfrag.solver.stability import modes as mechanism
 from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP, TOPPLE, ModeName
-
-FloatArray = NDArray[np.float64]
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
@@ -200,7 +198,6 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
         back_fracture=work.back_fracture,
         cohesive=one["cohesion_pa"] > 0.0,
         yield_g=one["yield_g"],
-        settings={},
     )
     return model_of_mode(MODES[work.mode_code[j]]).runner(site)
 

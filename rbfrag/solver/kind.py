@@ -33,6 +33,7 @@ from rbfrag.solver.results import (
     SearchPoints,
 )
 from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.single import Stability
 
 SHAKING = ("vertical", "polarity", "search_limit")
 """Options of every search."""
@@ -59,11 +60,27 @@ class BlockOnPlanes:
     beta_rad: float
     phi_rad: float
     phi_back_rad: float
-    back_fracture: bool
-    cohesive: bool
     yield_g: float | None
-    settings: Mapping[str, Any]
+    back_fracture: bool = True
+    cohesive: bool = False
+    settings: Mapping[str, Any] = field(default_factory=dict)
     p2: float | None = None
+
+    @classmethod
+    def of(
+        cls, block: Block, judged: Stability, mode: ModeName | None, settings: Mapping[str, Any]
+    ) -> BlockOnPlanes:
+        """Return a block whose stability is known, as a model of a mode sees it."""
+        return cls(
+            block,
+            math.radians(judged.beta_deg),
+            math.radians(judged.phi_deg),
+            math.radians(judged.phi_back_deg),
+            judged.yield_acceleration if judged.mode == mode else None,
+            judged.back_fracture,
+            judged.cohesion is not None,
+            settings,
+        )
 
     @property
     def centroid_m(self) -> tuple[float, float]:

@@ -456,16 +456,7 @@ def shaken_mechanism(
             f"the block is {judged.state} in its mode, {words_of_mode(judged.mode)} (yield "
             f"{judged.yield_acceleration:.4g} g): no earthquake decides about it"
         )
-    site = BlockOnPlanes(
-        block=block,
-        beta_rad=math.radians(judged.beta_deg),
-        phi_rad=math.radians(judged.phi_deg),
-        phi_back_rad=math.radians(judged.phi_back_deg),
-        back_fracture=True,
-        cohesive=False,
-        yield_g=judged.yield_acceleration,
-        settings={},
-    )
+    site = BlockOnPlanes.of(block, judged, judged.mode, {})
     mechanism = model.mechanism(site)
     equation = mechanism.first.forward
     return ShakenMechanism(

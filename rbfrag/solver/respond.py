@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -108,10 +108,11 @@ def respond(
         if beta_deg is None or (phi_deg is None and not free_standing):
             name = "beta_deg" if beta_deg is None else "phi_deg"
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+        rough_deg = 0.5 * (90.0 + max(block.alpha1_deg, block.alpha3_deg, 0.0))  # it does not slip
         judged = stability(
             block,
             beta_deg=beta_deg,
-            phi_deg=_rough_deg(block) if phi_deg is None else phi_deg,
+            phi_deg=rough_deg if phi_deg is None else phi_deg,
             phi_back_deg=phi_back_deg,
             back_fracture=back_fracture and not free_standing,
             cohesion_pa=cohesion_pa,
@@ -191,7 +192,9 @@ class _Shaken:
                 raise InputError("gap_s goes with a list of motions: it is the rest between them")
             if isinstance(self.vertical, list | tuple):
                 raise InputError("vertical is a list: one motion has one vertical motion")
-            return run(_one(self.motion), _vertical(self.vertical), self.start)
+            return run(
+                as_motion(cast("MotionLike", self.motion)), _vertical(self.vertical), self.start
+            )
         if not (self.vertical is None or isinstance(self.vertical, list | tuple)):
             raise InputError("vertical is one motion: of a list of motions it is a list, too")
         motions = Motions(
@@ -204,32 +207,14 @@ class _Shaken:
         )
 
 
-def _one(given: Any) -> GroundMotion:
-    return as_motion(given)
-
-
 def _vertical(given: Any) -> GroundMotion | None:
     return None if given is None else as_motion(given, "vertical")
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:
     """Return a block of which frequency parameter [1/s²] and yield acceleration [g] are known."""
-    return BlockOnPlanes(
-        block=None,
-        beta_rad=0.0,
-        phi_rad=0.5 * math.pi,
-        phi_back_rad=0.5 * math.pi,
-        back_fracture=True,
-        cohesive=False,
-        yield_g=kr,
-        settings=settings,
-        p2=p2,
-    )
-
-
-def _rough_deg(block: Block) -> float:
-    """Return a friction angle with which a block does not slip [deg]."""
-    return 0.5 * (90.0 + max(block.alpha1_deg, block.alpha3_deg, 0.0))
+    rough_rad = 0.5 * math.pi
+    return BlockOnPlanes(None, 0.0, rough_rad, rough_rad, kr, settings=settings, p2=p2)
 
 
 def _site(
@@ -238,16 +223,7 @@ def _site(
     """Return the block on its planes as the model that its mode calls for, or another, sees it."""
     if not model.free_standing:
         _refuse_what_no_motion_decides(judged)
-    return BlockOnPlanes(
-        block=block,
-        beta_rad=math.radians(judged.beta_deg),
-        phi_rad=math.radians(judged.phi_deg),
-        phi_back_rad=math.radians(judged.phi_back_deg),
-        back_fracture=judged.back_fracture,
-        cohesive=judged.cohesion is not None,
-        yield_g=judged.yield_acceleration if model.mode == judged.mode else None,
-        settings=settings,
-    )
+    return BlockOnPlanes.of(block, judged, model.mode, settings)
 
 
 def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
@@ -272,15 +248,9 @@ def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> Block
             f"ky = {ky:g} on a plane of beta_deg = {beta_deg:g} means a friction angle of "
             f"{math.degrees(phi_rad):.4g} degrees: it must be from 0 to below 90"
         )
+    beta_rad = math.radians(beta_deg)
     return BlockOnPlanes(
-        block=None,
-        beta_rad=math.radians(beta_deg),
-        phi_rad=phi_rad,
-        phi_back_rad=phi_rad,
-        back_fracture=False,
-        cohesive=False,
-        yield_g=ky,
-        settings=settings,
+        None, beta_rad, phi_rad, phi_rad, ky, back_fracture=False, settings=settings
     )
 
 

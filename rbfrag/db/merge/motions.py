@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from sqlalchemy import Connection, RowMapping, Select, func, select
@@ -27,7 +26,8 @@ def merge_motions(merge: Merge) -> None:
     source, target, ledger = merge.source, merge.target, merge.ledger
     ids = merge.motions
     left: set[int] = set()
-    for theirs in list(source.execute(_motions().order_by(*_key())).mappings()):
+    in_order = _motions().order_by(motion.c.samples_sha256, motion.c.dt_s)
+    for theirs in list(source.execute(in_order).mappings()):
         ours = _find(target, theirs)
         if ours is None:
             ids[theirs["id"]] = _add(source, target, theirs, ledger)
@@ -74,10 +74,6 @@ def merge_suites(merge: Merge) -> None:
             values = {"suite_id": our_id, "motion_id": merge.motions[motion_id]}
             new = insert_if_new(target, suite_motion, values)
             (ledger.added if new else ledger.same)["suite_motion"] += 1
-
-
-def _key() -> tuple[Any, ...]:
-    return (motion.c.samples_sha256, motion.c.dt_s)
 
 
 def _motions() -> Select[Any]:
@@ -205,12 +201,7 @@ def _compare_labels(
         say("motion", _name(ours), "event_id", ours["event_id"], theirs["event_id"])
     else:
         _earthquake_id(target, theirs, theirs["event_id"], ledger)
-    for column, here, there in _differing_labels(ours, theirs):
-        decisive = stated and column == "is_vertical"
-        (ledger.conflict if decisive else ledger.keep)("motion", _name(ours), column, here, there)
-
-
-def _differing_labels(ours: RowMapping, theirs: RowMapping) -> Iterator[tuple[str, object, object]]:
     for column in ("recording", "station", *_LABELS):
         if ours[column] != theirs[column]:
-            yield column, ours[column], theirs[column]
+            say = ledger.conflict if stated and column == "is_vertical" else ledger.keep
+            say("motion", _name(ours), column, ours[column], theirs[column])

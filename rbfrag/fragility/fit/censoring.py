@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.fit.scores import CLIP, Judged
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_FOLLOWED = 0.2

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.fit.likelihood import Likelihood
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 def event_derivatives(rows: Likelihood, b: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
 from rbfrag.fragility.fit.censoring import score_bounds, unknown_shares
@@ -27,8 +26,7 @@ from rbfrag.fragility.fit.outcomes import parameter_names
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import Form, Method, arrays
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 REPLICATES = 400
 _LN_SIGMA = "ln_sigma"
@@ -54,8 +52,9 @@ def fit_lognormal(
     """
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     usable = (data.x > 0.0) & (data.y > 0.0)
-    rows, start = censored_line(*_line(form, names, _of(data, usable)), data.observed[usable],
-                                data.event[usable])  # fmt: skip
+    values = {name: value[usable] for name, value in data.values.items()}
+    line = _line(form, names, values)
+    rows, start = censored_line(*line, data.observed[usable], data.event[usable])
     theta, _ = maximise(rows, start)
     # Olsen's parameters put the scatter last
     place = names.index(_LN_SIGMA)
@@ -203,10 +202,6 @@ def probabilities(method: Method, form: Form, data: FitData, b: FloatArray) -> F
         eta = form.eta(b.tolist(), data.blocks, arrays()).eta
         p = np.asarray(method.link.probability(eta, arrays()), dtype=np.float64)
     return np.array(np.broadcast_to(np.nan_to_num(p, nan=0.0), data.failed.shape))
-
-
-def _of(data: FitData, chosen: NDArray[np.bool_]) -> dict[str, FloatArray]:
-    return {name: value[chosen] for name, value in data.values.items()}
 
 
 def _line(

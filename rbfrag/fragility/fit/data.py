@@ -26,13 +26,12 @@ from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import SPECTRAL, Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.results import FloatArray
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
     from rbfrag.db.queries import Vertical
-
-FloatArray = NDArray[np.float64]
 
 FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10

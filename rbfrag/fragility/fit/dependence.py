@@ -22,8 +22,8 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.pair_tables import KINDS, PairRows, PairTable, pair_table
 from rbfrag.fragility.methods import BlockParameters
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 REPLICATES = 60

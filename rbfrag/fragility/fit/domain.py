@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.domain import INSIDE, ratios_of
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 def ranges_of(values: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:

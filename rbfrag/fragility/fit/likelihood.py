@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
 from rbfrag.fragility.methods import Link, arrays
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Chosen = NDArray[np.bool_]
 
 TOLERANCE = 1e-10

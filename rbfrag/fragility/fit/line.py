@@ -30,8 +30,7 @@ from rbfrag.fragility.methods.wls import (
     negative_probability,
     variance_m2_s2,
 )
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 REPLICATES = 400
 

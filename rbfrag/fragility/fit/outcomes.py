@@ -22,8 +22,7 @@ from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import LOGLOG, Form, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 REPLICATES = 200
 FEWEST_FAILURES = 20

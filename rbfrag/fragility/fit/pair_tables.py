@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
+
 Indices = NDArray[np.intp]
 
 KINDS = OTHER_SITE, OTHER_COMPONENT, SAME_COMPONENT = (0, 1, 2)

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
 from rbfrag.fragility.fit.scores import nested_scatter, score_intervals, scores_of
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 CLUSTERED = "clustered by earthquake, CR3 (each earthquake left out in turn)"
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
+
 Mask = NDArray[np.bool_]
 
 CLIP = 1e-4

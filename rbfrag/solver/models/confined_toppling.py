@@ -109,6 +109,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
 
     confined = equation(site)
+    critical_rad = math.radians(block.alpha3_deg) - site.beta_rad
     return Mechanism(
         first=Phase(
             name="topples against its back plane",
@@ -121,7 +122,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             highest=min(square, flat),
         ),
         rotates=True,
-        critical=_positive(math.radians(block.alpha3_deg) - site.beta_rad),
+        critical=critical_rad if critical_rad > 0.0 else None,
         goes_on=True,
         until_landing=True,
         at_toe=True,
@@ -202,10 +203,6 @@ def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit, slipped_at
         f"{seated}; the rest of the record rocks and slides it on from there",
         in_place=False,
     )
-
-
-def _positive(angle_rad: float) -> float | None:
-    return angle_rad if angle_rad > 0.0 else None
 
 
 class ConfinedToppling(ScaledKind):

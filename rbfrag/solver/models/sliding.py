@@ -215,16 +215,7 @@ def slide_m(excited: Excitation, ky: float) -> float:
 def level_plane(ky: float) -> BlockOnPlanes:
     """Return a block that slides on a level plane, of yield acceleration `ky` [g]."""
     friction_rad = math.atan(ky)
-    return BlockOnPlanes(
-        block=None,
-        beta_rad=0.0,
-        phi_rad=friction_rad,
-        phi_back_rad=friction_rad,
-        back_fracture=False,
-        cohesive=False,
-        yield_g=ky,
-        settings={},
-    )
+    return BlockOnPlanes(None, 0.0, friction_rad, friction_rad, ky, back_fracture=False)
 
 
 class Sliding(MechanismKind):

@@ -129,7 +129,8 @@ class ScaleSearch:
         """
         rows: list[tuple[float, float, IntervalOutcome]] = []
         before: ScaledRun | None = None
-        at_rest = () if self.starts is None else (_at_rest(self.starts),)
+        rests = () if self.starts is None else (self.starts,)
+        at_rest = [ScaledRun(scale, 0.0, Outcome.STABLE, "safe", "") for scale in rests]
         seen = [run for run in self.runs if self.scale is not None or run.scale <= self.scale_limit]
         for run in sorted((*seen, *at_rest), key=lambda each: -each.scale):
             word = _MAP_WORDS.get(run.verdict)
@@ -268,10 +269,6 @@ def first_motion(excited: Excitation, yield_g: float) -> float | None:
     """
     most = float(np.max(excited.k_h - yield_g * (excited.w - 1.0)))
     return yield_g / most if most > 0.0 else None
-
-
-def _at_rest(scale: float) -> ScaledRun:
-    return ScaledRun(scale, 0.0, Outcome.STABLE, "safe", "")
 
 
 def rotation_rad(rotation_deg: float | None, shaken: ShakenMechanism) -> float:
