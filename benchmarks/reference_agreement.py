@@ -7,7 +7,8 @@ import math
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.motions import motion_rows
-from rbfrag.db.queries import Vertical, combination_table
+from rbfrag.db.queries import combination_table
+from rbfrag.db.rows import Vertical
 
 AGREES = 1e-9
 """Relative difference of critical values that processors may make."""

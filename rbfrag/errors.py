@@ -30,7 +30,7 @@ Python escapes them, so that no input can steer a terminal.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from os import PathLike, fspath
 from typing import ClassVar
 
@@ -89,6 +89,19 @@ class InputError(RbfragError, ValueError):
 
 class UnknownFieldError(InputError, TypeError):
     """A keyword that is none."""
+
+    @classmethod
+    def refuse(cls, given: Iterable[str], known: type, what: str) -> None:
+        """Refuse keywords that are no keys of a TypedDict.
+
+        Args:
+            what: what they are said of, such as "a fit".
+        """
+        for name in given:
+            if name not in known.__annotations__:
+                raise cls(
+                    f"{name[:60]} is no option of {what}: it has {', '.join(known.__annotations__)}"
+                )
 
 
 class MotionFileError(InputError):

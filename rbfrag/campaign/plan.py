@@ -13,9 +13,8 @@ from rbfrag.campaign.worker import PlannedCase, Task
 from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
 from rbfrag.db.keys import combination_key
 from rbfrag.db.motions import motion_rows
-from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import known_responses
-from rbfrag.db.rows import MotionRow
+from rbfrag.db.rows import MotionRow, Vertical
 from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import NDArray
 
 from rbfrag.campaign.shake_rockmass import shake
 from rbfrag.campaign.summary import CampaignProgress
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.files import as_path
 from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.measures import spectral
@@ -19,13 +19,14 @@ from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.question.fields import ShakingFields
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns
 from rbfrag.rockmasses.scenario import Scenario, scenario
-from rbfrag.rockmasses.shaking import DISPLACEMENT_M, FailureLimits, ShakenMass
+from rbfrag.rockmasses.shaking import FailureLimits, ShakenMass
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,27 +75,35 @@ class RockMassAnswer(Tabular):
         return f"RockMassAnswer({self.blocks.n_blocks} blocks: {counts})"
 
 
+class RockMassQuestion(ShakingFields[float | None], total=False):
+    """What may be asked of the blocks of a rock mass."""
+
+    sa_g: Mapping[float, float] | None
+    motion: MotionLike | None
+    vertical: MotionLike | None
+    polarity: Polarity
+    scales: Sequence[float]
+    displacement_m: float | None
+    rotation_deg: float | None
+    model: Model | None
+    level: float
+    db: str | PathLike[str] | None
+    jobs: int | None
+    on_progress: Callable[[CampaignProgress], None] | None
+
+
+ANSWERED_BY = ("model", "level", "db", "displacement_m", "rotation_deg")
+SHAKEN_BY = ("scales", "polarity", "jobs", "on_progress")
+FAILS_BY = ("displacement_m", "rotation_deg")
+"""Which of these a fragility model, a motion and the failure by a motion take."""
+
+
 def rockmass(
     mass: str | PathLike[str] | RockMass | Mapping[str, object],
     *,
     n: int | None = None,
     seed: int | None = None,
-    pgv_m_s: float | None = None,
-    pga_g: float | None = None,
-    tm_s: float | None = None,
-    pgd_m: float | None = None,
-    sa_g: Mapping[float, float] | None = None,
-    motion: MotionLike | None = None,
-    vertical: MotionLike | None = None,
-    polarity: Polarity = "forward",
-    scales: Sequence[float] = (1.0,),
-    displacement_m: float | None = None,
-    rotation_deg: float | None = None,
-    model: Model | None = None,
-    level: float = 0.95,
-    db: str | PathLike[str] | None = None,
-    jobs: int | None = None,
-    on_progress: Callable[[CampaignProgress], None] | None = None,
+    **question: Unpack[RockMassQuestion],
 ) -> RockMassAnswer:
     """Draw blocks from two fracture sets, with their modes, yields and failures.
 
@@ -109,17 +118,18 @@ def rockmass(
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
         pgd_m: peak ground displacement [m].
-        sa_g: spectral accelerations [g] by period [s], as in :func:`rbfrag.predict`.
+        sa03_g, sa10_g, sa20_g, sa30_g: spectral accelerations [g]; or all of them as sa_g, by
+            their period [s], as in :func:`rbfrag.predict`.
         motion: accelerogram, or its file, that every block is run under in its own mode.
         vertical: vertical motion of the same recording, upward positive.
-        polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
-        scales: factors on the motion.
+        polarity: ``forward`` (positive samples drive out of the slope; if left out) or ``reverse``.
+        scales: factors on the motion; the motion itself if left out.
         displacement_m: a slide fails beyond this displacement [m]; None for 0.05 with a motion,
             and with measures for an answer of toppling alone.
         rotation_deg: a slump, or a topple against the back plane, fails beyond this rotation
             [deg]; None for past recovery only.
         model: as in :func:`rbfrag.predict`.
-        level: confidence level of the intervals.
+        level: confidence level of the intervals; 0.95 if left out.
         db: as in :func:`rbfrag.predict`.
         jobs: worker processes; None for one a processor where there is work for them.
         on_progress: called as blocks are run.
@@ -129,31 +139,26 @@ def rockmass(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
+    UnknownFieldError.refuse(question, RockMassQuestion, "a rock mass")
     blocks = _rock_mass(mass).realise(n, seed)
-    stated = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
-    if sa_g is not None:
-        stated |= spectral(sa_g)
-    measures = {name: value for name, value in stated.items() if value is not None}
-    checked_level(level)
+    asked: dict[str, Any] = {name: each for name, each in question.items() if each is not None}
+
+    def of(names: Iterable[str]) -> dict[str, Any]:
+        return {name: asked[name] for name in names if name in asked}
+
+    measures = of(ShakingFields.__annotations__) | spectral(asked.get("sa_g", {}))
+    level, motion = checked_level(asked.get("level", 0.95)), asked.get("motion")
     if motion is not None and measures:
         raise InputError(
             f"motion does not go with {next(iter(measures))}: give the accelerogram, or the "
             "measures that a fragility model answers for"
         )
-    answer = ran = None
-    if measures:
-        answer = scenario(
-            blocks, measures, model=model, level=level, db=db, displacement_m=displacement_m,
-            rotation_deg=rotation_deg,
-        )  # fmt: skip
+    answer = scenario(blocks, measures, **of(ANSWERED_BY)) if measures else None
+    vertical = as_motion(asked["vertical"], "vertical") if "vertical" in asked else None
+    ran = None
     if motion is not None:
-        distance_m = DISPLACEMENT_M if displacement_m is None else displacement_m
-        ran = shake(
-            blocks, as_motion(motion), scales=scales,
-            vertical=None if vertical is None else as_motion(vertical, "vertical"),
-            polarity=polarity, limits=FailureLimits(distance_m, rotation_deg), jobs=jobs,
-            on_progress=on_progress,
-        )  # fmt: skip
+        limits = FailureLimits(**of(FAILS_BY))
+        ran = shake(blocks, as_motion(motion), vertical=vertical, limits=limits, **of(SHAKEN_BY))
     elif vertical is not None:
         raise InputError("vertical goes with a motion: give motion, too")
     return RockMassAnswer(blocks, answer, ran, level)

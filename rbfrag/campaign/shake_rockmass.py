@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from typing import Unpack
 
 from rbfrag.campaign.executors.local import run_locally
 from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.polarity import Polarity
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.shaking import (
     CHUNK,
     BlockOutcomes,
-    FailureLimits,
     ShakenMass,
+    ShakingOptions,
     plan_shaking,
     run_blocks,
 )
@@ -30,22 +30,18 @@ def shake(
     blocks: Realisations,
     motion: GroundMotion,
     *,
-    scales: Sequence[float] = (1.0,),
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
-    limits: FailureLimits | None = None,
     jobs: int | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
+    **shaking: Unpack[ShakingOptions],
 ) -> ShakenMass:
     """Run every block of a rock mass that a motion moves, each in its own mode.
 
     The answer does not depend on the number of workers.
 
     Args:
-        vertical: vertical motion of the same recording, upward positive; scaled likewise.
-        polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
         jobs: worker processes; None for one per processor, where there is work enough for them.
         on_progress: called at the beginning and after each chunk of work; counts blocks.
+        shaking: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`.
 
     Raises:
         InputError: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`; `jobs` below 1;
@@ -54,9 +50,7 @@ def shake(
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs must be at least 1, not {jobs}")
-    plan = plan_shaking(
-        blocks, motion, scales=scales, vertical=vertical, polarity=polarity, limits=limits
-    )
+    plan = plan_shaking(blocks, motion, **shaking)
     total = int(plan.places.size)
     workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))
     if jobs is None and total < WORTH_A_PROCESS:

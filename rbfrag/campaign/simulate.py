@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 from sqlalchemy import Engine
 
@@ -37,10 +37,10 @@ from rbfrag.db.campaigns import (
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
-from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
+from rbfrag.db.rows import Vertical
 from rbfrag.db.spectra import store_spectrum
-from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.errors import InputError, UnknownFieldError, WorkFailedError
 from rbfrag.solver.kind import Case, model_of_kind
 from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.quantity import positive
@@ -49,34 +49,41 @@ from rbfrag.solver.results import MAP_DEPTH, CriticalResult
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""
 
-OPTIONS = {
+DESCRIBED = {
     "p2": "--p2",
     "rotations_deg": "--rotation",
     "displacements_m": "--displacement",
     "family": "family",
     "restitution_factors": "--restitution-factor",
+}
+OPTIONS = DESCRIBED | {
     "grid": "--grid",
     "store_responses": "--store-responses",
     "full_map": "--map",
 }
-"""What may be asked of a kind, as the command line calls it."""
+"""What may be asked of a kind, as the command line calls it; the former describe its blocks."""
+
+
+class CampaignOptions(TypedDict, total=False):
+    """What a campaign runs and stores."""
+
+    suite: str | None
+    p2: Sequence[float] | None
+    rotations_deg: Sequence[float | None] | None
+    displacements_m: Sequence[float] | None
+    family: Sequence[Any] | None
+    restitution_factors: Sequence[float] | None
+    vertical: Vertical
+    grid: int | Sequence[float] | None
+    store_responses: Sequence[float | Literal["critical"]] | None
+    full_map: bool
+    map_depth: float
 
 
 def simulate(
     db: str | os.PathLike[str] | None = None,
     *,
     kind: str = "toppling",
-    suite: str | None = None,
-    p2: Sequence[float] | None = None,
-    rotations_deg: Sequence[float | None] | None = None,
-    displacements_m: Sequence[float] | None = None,
-    family: Sequence[Any] | None = None,
-    restitution_factors: Sequence[float] | None = None,
-    vertical: Vertical = "without",
-    grid: int | Sequence[float] | None = None,
-    store_responses: Sequence[float | Literal["critical"]] | None = None,
-    full_map: bool = False,
-    map_depth: float = MAP_DEPTH,
     sequence: bool = False,
     seed: int = 1,
     draws: int = 1,
@@ -84,6 +91,7 @@ def simulate(
     scheduler: str | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
     stopped: Stopped = never,
+    **asked: Unpack[CampaignOptions],
 ) -> CampaignSummary:
     """Store critical values and outcomes of every motion x vertical x polarity x block.
 
@@ -106,7 +114,8 @@ def simulate(
         family: slumping: the blocks; None for `rbfrag.solver.models.slumping.FAMILY`.
         restitution_factors: rocking: factors on the restitution of the rectangle, 1 - 1.5 sin² α
             (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
-        vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
+        vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
+            or ``both``.
         grid: toppling: run more blocks for themselves: at these k_r/PGA, or at that many from
             0.99 down to 0.01, equally spaced in the logarithm.
         store_responses: toppling: keep the motion in time of blocks of these k_r/PGA;
@@ -130,17 +139,20 @@ def simulate(
         WorkFailedError: a worker died; what was finished is stored.
         StoppedError: `stopped` said so; what was finished is stored.
     """
+    UnknownFieldError.refuse(asked, CampaignOptions, "a campaign")
     check_workers(jobs, scheduler)
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
-    blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
-              "family": family, "restitution_factors": restitution_factors}  # fmt: skip
-    described = {name: value for name, value in blocks.items() if value is not None}
+    suite, vertical = asked.get("suite"), asked.get("vertical", "without")
+    full_map, histories = asked.get("full_map", False), asked.get("store_responses")
+    given: dict[str, Any] = {
+        name: each for name, each in asked.items() if each is not None and each is not False
+    }
+    described = {name: given[name] for name in DESCRIBED if name in given}
     if sequence:
         refuse_kind(kind)
-    extras = {"grid": grid, "store_responses": store_responses, "full_map": full_map or None}
-    cases = _cases(kind, described, [name for name, given in extras.items() if given is not None])
-    wanted = _wanted(grid, store_responses, full_map)
-    depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
+    cases = _cases(kind, described, [name for name in OPTIONS if name in given])
+    wanted = _wanted(asked.get("grid"), histories, full_map)
+    depth = positive(asked.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
     if sequence:
         if vertical != "without" or full_map:
             one = "--map" if full_map else "--vertical"
@@ -165,19 +177,19 @@ def simulate(
             "vertical": vertical,
             **{name: list(value) for name, value in described.items() if name != "family"},
             "grid": list(wanted.blocks),
-            "store_responses": list(map(str, store_responses or ())),
+            "store_responses": list(map(str, histories or ())),
             "map_depth": depth if full_map else None,
         }
         run = _Run(engine, plan, todo)
         work = (_with_samples(engine, each, depth) for each in todo.motions)
         workforce.carry_out(
             engine, settings, run_work, work, len(todo.motions), run.take, total=run.total,
-             resumed=run.resumed, started=started,
+            resumed=run.resumed, started=started,
         )  # fmt: skip
     return run.summary(time.perf_counter() - started)
 
 
-def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple[Case, ...]:
+def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[Case, ...]:
     """Ask the kind for its combinations; it refuses the options of others."""
     known = {name: model for name, model in KINDS.items() if model.campaign}
     if kind not in known:
@@ -185,7 +197,7 @@ def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple
         raise InputError(
             f"--kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}"
         )
-    for name in [*described, *extras]:
+    for name in given:
         if name not in known[kind].campaign_options:
             owners = [each for each, model in known.items() if name in model.campaign_options]
             raise InputError(

@@ -36,6 +36,10 @@ _OF_ROWS = (
     "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *MEASURES, "source_file",
     "trace_index", "file_format", "processing", "source_sha256", "start_time",
 )  # fmt: skip
+_LABELS = (
+    "station", "component", "orientation_deg", "is_vertical", "recording", "source_file",
+    "trace_index", "file_format",
+)  # fmt: skip
 _NUMBERS = ("orientation_deg", "dt_s", "npts", *MEASURES, "trace_index")
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
@@ -173,15 +177,8 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
     return GroundMotion(
         np.frombuffer(blob, dtype="<f8").astype(np.float64),
         row["dt_s"],
-        station=row["station"],
+        **{name: row[name] for name in _LABELS},
         event=row["event_name"] or row["event_id"],
-        component=row["component"],
-        orientation_deg=row["orientation_deg"],
-        is_vertical=row["is_vertical"],
-        recording=row["recording"],
-        source_file=row["source_file"],
-        trace_index=row["trace_index"],
-        file_format=row["file_format"],
         remarks=tuple(_listed(row, "remarks")),
         is_corrected=_is_corrected(row),
         is_partial="partial" in _listed(row, "flags"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable
+from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable, Vertical
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -28,8 +28,6 @@ from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION
-
-Vertical = Literal["without", "with", "both"]
 
 
 @dataclass(frozen=True)
@@ -91,11 +89,7 @@ def combination_table(
     smaller natural key). Of blocks that slide it is that of the first motion, whose grid carries
     the displacements. Versions of the numerics never mix.
 
-    Args:
-        rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
-            and of kinds that know none.
-        doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
-            final velocity or displacement; by default it is NaN, so that no fit reads it.
+    Options are those of :class:`rbfrag.db.rows.Selection`.
 
     Returns:
         Columns of equal length, sorted by natural key: equal databases give equal tables.

@@ -7,7 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypedDict
+
+Vertical = Literal["without", "with", "both"]
+
+
+class Selection(TypedDict, total=False):
+    """Which combinations of a kind are read.
+
+    Args:
+        suite: only motions of this suite.
+        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
+        rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
+            and of kinds that know none.
+        doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
+            final velocity or displacement; by default it is NaN, so that no fit reads it.
+    """
+
+    suite: str | None
+    vertical: Vertical
+    rotation_deg: float | None
+    doubtful_pgd: bool
+
 
 if TYPE_CHECKING:
     import numpy as np

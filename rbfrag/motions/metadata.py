@@ -203,25 +203,16 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
             acceleration_unit(text("units"))
         except InputError as error:
             raise MotionFileError(table, str(error), line=line) from None
+    most = LARGEST_MAGNITUDE
     return TraceMetadata(
-        file=text("file"),
         line=line,
         trace_index=int(index) if index else None,
-        event_id=text("event_id"),
         units=text("units") or text("file_units") or None,
         is_vertical=_TRUTH[vertical.lower()],
-        companion_group=text("companion_group"),
-        magnitude=number(
-            "magnitude",
-            lambda value: abs(value) <= LARGEST_MAGNITUDE,
-            f"a number up to {LARGEST_MAGNITUDE:g}",
-        ),
-        processing=text("processing"),
-        earthquake=text("earthquake"),
+        magnitude=number("magnitude", lambda m: abs(m) <= most, f"a number up to {most:g}"),
         year=text("year") or None,
-        station=text("station"),
-        component=text("component"),
         dt_s=number("dt_s", lambda value: value > 0.0, "a positive number of seconds"),
+        **{name: text(name) for name in ("file", "processing", *NAMES)},
     )
 
 

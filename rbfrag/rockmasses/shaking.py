@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -301,6 +302,15 @@ class ShakenMass(ShakingPlan):
     rotation_rad: FloatArray
     runs: int
     about: Mapping[tuple[ModeName, str], int]
+
+
+class ShakingOptions(TypedDict, total=False):
+    """How a motion acts on a rock mass, as :func:`plan_shaking` takes it."""
+
+    scales: Sequence[float]
+    vertical: GroundMotion | None
+    polarity: Polarity
+    limits: FailureLimits | None
 
 
 def plan_shaking(

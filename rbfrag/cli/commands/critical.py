@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import (
@@ -34,6 +35,24 @@ SHORT = ("kr", "kr_over_pga", "scale", "y_m_s", "pga_g")
 """Values that are shown without --verbose."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Searched:
+    """What is searched for."""
+
+    p2: float | None = option("Toppling: frequency parameter p² of the block [1/s²].")
+    kind: str | None = option(
+        "toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
+        "the kind of the failure mode of a shape."
+    )
+    rotation: float | None = option(
+        "Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
+        "failure past recovery."
+    )
+    displacement: str | None = option(
+        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
+    )
+
+
 @stacked
 def critical(
     *,
@@ -41,18 +60,7 @@ def critical(
     shape: ShapeOptions,
     direction: options.Direction,
     reading: options.Reading,
-    p2: float | None = option("Toppling: frequency parameter p² of the block [1/s²]."),
-    kind: str | None = option(
-        "toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
-        "the kind of the failure mode of a shape."
-    ),
-    rotation: float | None = option(
-        "Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
-        "failure past recovery."
-    ),
-    displacement: str | None = option(
-        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
-    ),
+    searched: Searched,
     full_map: bool = option(
         "Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
         False,
@@ -76,8 +84,9 @@ def critical(
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.results import MAP_DEPTH
 
-    of_shape = _searched_block(shape, kind)
-    model = _chosen_kind(kind, of_shape, displacement)
+    p2, rotation, displacement = searched.p2, searched.rotation, searched.displacement
+    of_shape = _searched_block(shape, searched.kind)
+    model = _chosen_kind(searched.kind, of_shape, displacement)
     given = {
         "--p2": p2 is not None or "p2" in of_shape,
         "--map": full_map,

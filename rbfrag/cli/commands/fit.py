@@ -30,6 +30,15 @@ class Data:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """How the model is stored, and what its bootstrap draws."""
+
+    name: str | None = option("Name of the model. Default: method-term.")
+    seed: int = option("Seed of the bootstrap by earthquake.", 0)
+    replace: bool = option("Replace a stored model of the same name.", False)
+
+
 @stacked
 def fit(
     *,
@@ -61,9 +70,7 @@ def fit(
     free_m: bool = option(
         "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).", False
     ),
-    name: str | None = option("Name of the model. Default: method-term.", show_default=False),
-    seed: int = option("Seed of the bootstrap by earthquake.", 0),
-    replace: bool = option("Replace a stored model of the same name.", False),
+    stored: Stored,
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
@@ -81,12 +88,12 @@ def fit(
         method=method,
         suite=data.suite,
         vertical=data.vertical,  # type: ignore[arg-type]
-        name=name,
-        seed=seed,
+        name=stored.name,
+        seed=stored.seed,
         estimate_m=free_m,
         doubtful_pgd=data.doubtful_pgd,
         rotation_deg=rotation,
-        replace=replace,
+        replace=stored.replace,
     )
     print_report(report, printing)
 

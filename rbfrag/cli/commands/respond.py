@@ -43,8 +43,8 @@ EXAMPLE = "Example:  rbfrag respond record.AT2 --height 2.4 --width 0.5 --plot r
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sliding:
-    """How a block slides."""
+class Model:
+    """How a block slides or rocks, and by which model."""
 
     two_way: bool = option("Sliding: the block may slide up the base too.", False)
     horizontal: bool = option(
@@ -52,15 +52,13 @@ class Sliding:
         "block does.",
         False,
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rocking:
-    """How a free-standing block rocks."""
-
     restitution: float | None = option(
         "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
         "angular momentum leaves at each corner."
+    )
+    kind: str | None = option(
+        "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
+        "that of the block's failure mode; of a block that topples with --no-back, rocking."
     )
 
 
@@ -130,8 +128,7 @@ def respond(
     *,
     motions: options.Motions,
     block: BlockOptions,
-    sliding: Sliding,
-    rocking: Rocking,
+    model: Model,
     drawn: Draws,
     direction: Directions,
     files: Files,
@@ -139,10 +136,6 @@ def respond(
     ky: float | None = option(
         "Yield acceleration coefficient tan(phi - beta) [g] of a block that slides on a "
         "plane of dip --beta (default 0), whatever its shape."
-    ),
-    kind: str | None = option(
-        "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
-        "that of the block's failure mode; of a block that topples with --no-back, rocking."
     ),
     db: options.Db = None,
     printing: options.Printing,
@@ -165,7 +158,7 @@ def respond(
     if drawn.draws is not None:
         from rbfrag.solver.respond_draws import respond_draws
 
-        possible, remarks = _possible(drawn, block, ky, kind)
+        possible, remarks = _possible(drawn, block, ky, model.kind)
         if len(motions) > 1:
             raise InputError("--draws runs blocks under one motion: leave the others out")
         one = direction.each(1)[0]
@@ -175,18 +168,18 @@ def respond(
             ground,
             vertical=upward,
             polarity=direction.polarity if direction.reverse else drawn.polarity,  # type: ignore[arg-type]
-            two_way=sliding.two_way,
-            horizontal=sliding.horizontal,
+            two_way=model.two_way,
+            horizontal=model.horizontal,
             draws=drawn.draws,
             seed=drawn.seed,
             displacement_m=drawn.displacement,
-            **{"restitution": rocking.restitution, **possible},
+            **{"restitution": model.restitution, **possible},
         )
         _show_shares(
             replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=printing.json
         )
         return
-    body, what, remarks = _body(block, ky, kind)
+    body, what, remarks = _body(block, ky, model.kind)
     if files.film is not None:
         if body is None:
             raise InputError(
@@ -210,9 +203,9 @@ def respond(
             vertical=upwards if several else upwards[0],
             polarity=direction.polarity,
             gap_s=direction.gap,
-            two_way=sliding.two_way,
-            horizontal=sliding.horizontal,
-            restitution=rocking.restitution,
+            two_way=model.two_way,
+            horizontal=model.horizontal,
+            restitution=model.restitution,
             history=any((files.csv, files.plot, files.film)),
             **what,
         )

@@ -108,6 +108,20 @@ class Limits:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """What is written."""
+
+    out: str | None = option(
+        "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
+    )
+    excel_text: bool = option(options.EXCEL_TEXT, False)
+    plot: str | None = option(
+        "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
+        "shares that fail (.png, .pdf, .svg)."
+    )
+
+
 @stacked
 def rockmass(
     *,
@@ -120,14 +134,7 @@ def rockmass(
     measures: options.Measures,
     answering: options.Answering,
     reading: options.Reading,
-    out: str | None = option(
-        "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
-    ),
-    excel_text: bool = option(options.EXCEL_TEXT, False),
-    plot: str | None = option(
-        "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
-        "shares that fail (.png, .pdf, .svg)."
-    ),
+    files: Files,
     printing: options.Printing,
 ) -> None:
     """Draw blocks from two fracture sets; print their modes and yields.
@@ -139,7 +146,7 @@ def rockmass(
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
     from rbfrag.fragility.measures import SPECTRAL
 
-    check_files(table=out, plot=plot, excel_text=excel_text)
+    check_files(table=files.out, plot=files.plot, excel_text=files.excel_text)
     ground = upward = None
     about: list[str] = []
     if shaken.motion is not None:
@@ -160,12 +167,12 @@ def rockmass(
         )  # fmt: skip
     document = answer.as_dict()
     document["warnings"] += about
-    if out is not None:
-        write_table(answer.table_columns(), out, excel_text=excel_text)
-    if plot is not None:
+    if files.out is not None:
+        write_table(answer.table_columns(), files.out, excel_text=files.excel_text)
+    if files.plot is not None:
         from rbfrag.plots.plot import rockmass as draw
 
-        draw(answer, plot)
+        draw(answer, files.plot)
     if printing.json:
         print_json(document)
         return

@@ -21,7 +21,7 @@ from rbfrag.cli.parameters.stack import option, stacked
 
 if TYPE_CHECKING:
     from rbfrag.campaign.summary import CampaignProgress
-    from rbfrag.db.queries import Vertical
+    from rbfrag.db.rows import Vertical
     from rbfrag.fragility.conditional import ConditionalShare
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
@@ -86,6 +86,32 @@ class Sequence:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """What is stored of each motion."""
+
+    vertical: str = option(
+        "Horizontal motions alone, with the vertical one of their recording, or both.",
+        "without",
+        metavar="without|with|both",
+    )
+    full_map: bool = option(
+        "Toppling and slumping: store the intervals of strength that fail and that do not, too.",
+        False,
+        word="--map",
+    )
+    grid: str | None = option(
+        "Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
+        "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
+        metavar="N|LIST",
+    )
+    store_responses: str | None = option(
+        "Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
+        "values, or the word critical for the critical block of each combination.",
+        metavar="LIST",
+    )
+
+
 @stacked
 def simulate(
     *,
@@ -93,26 +119,7 @@ def simulate(
     suite: options.Suite = None,
     kind: str = option("What the blocks do: toppling, rocking, slumping or sliding.", "toppling"),
     blocks: Blocks,
-    vertical: str = option(
-        "Horizontal motions alone, with the vertical one of their recording, or both.",
-        "without",
-        metavar="without|with|both",
-    ),
-    full_map: bool = option(
-        "Toppling and slumping: store the intervals of strength that fail and that do not, too.",
-        False,
-        word="--map",
-    ),
-    grid: str | None = option(
-        "Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
-        "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
-        metavar="N|LIST",
-    ),
-    store_responses: str | None = option(
-        "Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
-        "values, or the word critical for the critical block of each combination.",
-        metavar="LIST",
-    ),
+    stored: Stored,
     sequence: Sequence,
     db: options.Db = None,
     printing: options.Printing,
@@ -138,6 +145,7 @@ def simulate(
     from rbfrag.campaign.interrupt import stopped_by_interrupts
     from rbfrag.campaign.simulate import simulate as run
 
+    histories = stored.store_responses
     check_files(table=sequence.out)
     say_when_compiling()
     with stopped_by_interrupts() as stopped, ProgressBar("simulate", "combinations") as bar:
@@ -154,10 +162,10 @@ def simulate(
             rotations_deg=None if blocks.rotation is None else _rotations(blocks.rotation),
             displacements_m=_numbers(blocks.displacement, "--displacement"),
             restitution_factors=_numbers(blocks.restitution_factor, "--restitution-factor"),
-            vertical=cast("Vertical", vertical),  # any other word is refused
-            grid=None if grid is None else _grid(grid),
-            store_responses=None if store_responses is None else _blocks(store_responses),
-            full_map=full_map,
+            vertical=cast("Vertical", stored.vertical),  # any other word is refused
+            grid=None if stored.grid is None else _grid(stored.grid),
+            store_responses=None if histories is None else _blocks(histories),
+            full_map=stored.full_map,
             sequence=sequence.sequence,
             seed=sequence.seed,
             draws=sequence.draws,

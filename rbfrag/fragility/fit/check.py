@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model
+from rbfrag.db.rows import Selection
 from rbfrag.errors import FitError, InputError, ModelError
 from rbfrag.fragility.fit.data import FitSource, fit_data, read_source
 from rbfrag.fragility.fit.fitting import fit_source
@@ -38,7 +39,7 @@ class ModelCheck:
     remark: str
 
 
-def selection_of(row: ModelRow) -> dict[str, Any]:
+def selection_of(row: ModelRow) -> Selection:
     """Return what a fit was asked to read: suite, vertical motion, doubtful PGD, rotation."""
     diagnostics = cast("Mapping[str, Any]", row.diagnostics)
     return {

@@ -12,12 +12,12 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.db.rows import CombinationTable
+from rbfrag.db.rows import CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.censoring import censoring_weights
@@ -31,7 +31,6 @@ from rbfrag.solver.results import FloatArray
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
-    from rbfrag.db.queries import Vertical
 
 FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10
@@ -132,32 +131,19 @@ def read_source(
     block: BlockParameters = TOPPLING_BLOCK,
     *,
     kind: str | None = None,
-    rotation_deg: float | None = None,
-    suite: str | None = None,
-    vertical: Vertical = "without",
-    doubtful_pgd: bool = False,
+    **selection: Unpack[Selection],
 ) -> FitSource:
     """Read critical values, spectra and outcomes of one kind from the database.
 
     Args:
         block: what describes the kind's block.
         kind: response kind; None for the one that `block` stands for.
-        rotation_deg: the rotation that counts as failure [deg], of kinds that have one; None for
-            failure past recovery.
-        doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
     from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
     from rbfrag.db.spectra import spectrum_values
 
     kind_read = kind or block.kind
-    table = combination_table(
-        connection,
-        kind=kind_read,
-        rotation_deg=rotation_deg,
-        suite=suite,
-        vertical=vertical,
-        doubtful_pgd=doubtful_pgd,
-    )
+    table = combination_table(connection, kind=kind_read, **selection)
     spectra = spectrum_values(connection)
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
     grid = outcome_grid(connection, table.combination_id)

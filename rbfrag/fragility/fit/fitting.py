@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Required, TypedDict
+from typing import TYPE_CHECKING, Required, Unpack
 
 import numpy as np
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.db.rows import CombinationTable
+from rbfrag.db.rows import CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
@@ -25,8 +25,6 @@ from rbfrag.fragility.model import FragilityModel
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
-
-    from rbfrag.db.queries import Vertical
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +40,15 @@ class Fitted:
     result: MethodResult
 
 
-class FitOptions(TypedDict, total=False):
+class FitOptions(Selection, total=False):
     """What :func:`fit` takes beside its data."""
 
     kind: str
     term: Required[str]
     method: str | None
-    suite: str | None
     name: str | None
-    vertical: Vertical
     seed: int
     estimate_m: bool
-    doubtful_pgd: bool
-    rotation_deg: float | None
 
 
 def fit(
@@ -63,20 +57,17 @@ def fit(
     kind: str = "toppling",
     term: str,
     method: str | None = None,
-    suite: str | None = None,
     name: str | None = None,
-    vertical: Vertical = "without",
     seed: int = 0,
     estimate_m: bool = False,
-    doubtful_pgd: bool = False,
-    rotation_deg: float | None = None,
+    **selection: Unpack[Selection],
 ) -> FitReport:
     """Fit a fragility model as :func:`rbfrag.fit` does, but store nothing.
 
     Args:
         source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
             the current folder), or the data themselves (critical values alone carry ``wls`` and
-            ``lognormal``), of which `suite`, `vertical` and `doubtful_pgd` choose nothing.
+            ``lognormal``), of which the selection chooses nothing.
 
     Returns:
         The report; ``report.model.row`` is what the database stores.
@@ -86,17 +77,11 @@ def fit(
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
     chosen, of_term = method_of_kind(kind, method), intensity_term(term)
-    _refuse_unfit(chosen, of_term, kind, estimate_m, rotation_deg)
+    _refuse_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
     if seed < 0:
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
-    selection: dict[str, Any] = {
-        "suite": suite,
-        "vertical": vertical,
-        "doubtful_pgd": doubtful_pgd,
-        "rotation_deg": rotation_deg,
-    }
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif source is None or isinstance(source, str | PathLike):
@@ -163,7 +148,7 @@ def fit_source(
     name: str | None = None,
     seed: int = 0,
     estimate_m: bool = False,
-    selection: Mapping[str, object] | None = None,
+    selection: Selection | None = None,
     shared: bool = True,
 ) -> Fitted:
     """Fit a model and keep its held-out probabilities.
@@ -171,7 +156,7 @@ def fit_source(
     Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
     estimated too, which a study of scores has no use for.
     """
-    table, chosen = source.table, dict(selection or {})
+    table, chosen = source.table, selection or {}
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)

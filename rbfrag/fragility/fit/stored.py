@@ -7,7 +7,7 @@ from typing import Unpack
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.fit.fitting import FitOptions
 from rbfrag.fragility.fit.fitting import fit as fit_model
 from rbfrag.fragility.fit.report import FitReport
@@ -60,6 +60,7 @@ def fit(
             f"db = {type(db).__name__}: give a path or URL; what stores nothing and takes a "
             "connection or a table is rbfrag.fragility.fit.fitting.fit"
         )
+    UnknownFieldError.refuse(question, FitOptions, "a fit")
     if question.get("term") is None:
         raise InputError(
             "term is missing: name the measure that the model reads, as fit(db, term='pgv'): one "

@@ -26,20 +26,9 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import mul
 from typing import Any
 
+from rbfrag.fragility import methods
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.methods import (
-    ABOVE_TWICE_PGV,
-    LOGLOG,
-    NOT_LIFTED,
-    OF_OUTCOME,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-    SizeFactor,
-    log_strength,
-)
+from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor, log_strength
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -100,7 +89,7 @@ def _of_pga(a: float, *periods: str) -> Form:
     ]
     return Form(
         ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_r", *names), _with_spectrum(*periods), 0,
-        (NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
+        (methods.NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
         terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/r)", *terms),
         where=_OF_PGA + (r",\ Q_T = \mathrm{SA}(T)\,T/(2\pi\,\mathrm{PGA})" if periods else ""),
     )  # fmt: skip
@@ -108,7 +97,7 @@ def _of_pga(a: float, *periods: str) -> Form:
 
 _OF_PGA, _OF_VELOCITY = r"r = k_r/\mathrm{PGA}", "v = y/2x"
 _PERIOD_S = {measure: period_s for period_s, measure in SPECTRAL.items()}
-_BOUNDS = (NOT_LIFTED, ABOVE_TWICE_PGV)
+_BOUNDS = (methods.NOT_LIFTED, methods.ABOVE_TWICE_PGV)
 _OF_SIZE = SizeFactor(0.18, 0.06)
 _TERMS = ("1", r"\ln(1/r)", r"\ln(1 - r)", r"\ln(1 - v)", r"\ln z")
 _WHERE = rf"{_OF_PGA},\ {_OF_VELOCITY},\ z = p\,x/(\mathrm{{PGA}}\,g)"
@@ -116,17 +105,17 @@ _NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
 
 METHOD = Method(
     name="bounded",
-    block=TOPPLING_BLOCK,
-    link=LOGLOG,
+    block=methods.TOPPLING_BLOCK,
+    link=methods.LOGLOG,
     forms={
         "pgv": Form(
             ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
-            _pgv, 0, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+            _pgv, 0, (methods.ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
             terms=("1", r"\ln(1/v)", r"\ln(1 - v)", r"\ln p", r"\ln^2 p"), where=_OF_VELOCITY,
         ),
         "pgv_kr": Form(
             ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_share", "b_ln_1_minus_share", "b_strength"),
-            _pgv_kr, 0, (ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
+            _pgv_kr, 0, (methods.ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
             terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/v)", r"\ln(1 - v)", "k'"),
             where=_OF_VELOCITY + r",\ k' = \ln(1 + k_r/0.3)",
         ),
@@ -142,6 +131,6 @@ METHOD = Method(
         ),
     },
     reads="outcomes",
-    meaning=OF_OUTCOME,
+    meaning=methods.OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
 )  # fmt: skip

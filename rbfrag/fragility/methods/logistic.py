@@ -18,17 +18,8 @@ from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    LOGIT,
-    OF_OUTCOME,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-    SizeFactor,
-    log_strength,
-)
+from rbfrag.fragility import methods
+from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor, log_strength
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -67,8 +58,8 @@ _OF_SIZE = SizeFactor(0.18, 0.06)
 
 METHOD = Method(
     name="logistic",
-    block=TOPPLING_BLOCK,
-    link=LOGIT,
+    block=methods.TOPPLING_BLOCK,
+    link=methods.LOGIT,
     forms={
         "pgv": _form(_OF_SIZE),
         "pga_tm": _form(_OF_SIZE),
@@ -80,7 +71,7 @@ METHOD = Method(
         "sa30": _of_period(-0.08),
     },
     reads="outcomes",
-    meaning=OF_OUTCOME,
+    meaning=methods.OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
     exponent="b_ln_p",
 )

@@ -21,17 +21,8 @@ from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    LOGIT,
-    NOT_LIFTED,
-    BlockParameters,
-    Bound,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-    SizeFactor,
-)
+from rbfrag.fragility import methods
+from rbfrag.fragility.methods import BlockParameters, Bound, Eta, Form, Method, Numbers, SizeFactor
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST_RESTITUTION = 1e-6
@@ -54,7 +45,7 @@ BLOCK = BlockParameters(
     "rocking",
     "kr",
     "p2",
-    NOT_LIFTED._replace(
+    methods.NOT_LIFTED._replace(
         text="is not below PGA: without vertical motion the ground cannot lift this block, which "
         "cannot overturn: P = 0 by mechanics, not by the model"
     ),
@@ -110,7 +101,7 @@ _OF_VELOCITY = ("b0", "b_ln_y_over_x", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_l
 METHOD = Method(
     name="overturning",
     block=BLOCK,
-    link=LOGIT,
+    link=methods.LOGIT,
     forms={
         "pgv_pga": Form(
             ("b0", "b_logit_r", "b_ln_z", "b_s", "b_s_logit_r"),

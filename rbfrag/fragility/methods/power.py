@@ -11,17 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    ABOVE_SPECTRUM,
-    COMPLEMENT,
-    OF_OUTCOME,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-    SizeFactor,
-)
+from rbfrag.fragility import methods
+from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -31,19 +22,19 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
 
 METHOD = Method(
     name="power",
-    block=TOPPLING_BLOCK,
-    link=COMPLEMENT,
+    block=methods.TOPPLING_BLOCK,
+    link=methods.COMPLEMENT,
     forms={
         "xp": Form(
             ("b0", "b_ln_xp_over_y"),
             _eta,
             3,
-            (ABOVE_SPECTRUM,),
+            (methods.ABOVE_SPECTRUM,),
             size_factor=SizeFactor(0.30),
             terms=("1", r"\ln(x/y)"),
         )
     },
     reads="outcomes",
-    meaning=OF_OUTCOME,
+    meaning=methods.OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
 )

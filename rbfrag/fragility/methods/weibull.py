@@ -15,18 +15,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    ABOVE_TWICE_PGV,
-    LOGLOG,
-    NOT_LIFTED,
-    OF_OUTCOME,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-    SizeFactor,
-)
+from rbfrag.fragility import methods
+from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -55,24 +45,24 @@ _WHERE = r"r = k_r/\mathrm{PGA},\ z = p\,x/(\mathrm{PGA}\,g)"
 
 METHOD = Method(
     name="weibull",
-    block=TOPPLING_BLOCK,
-    link=LOGLOG,
+    block=methods.TOPPLING_BLOCK,
+    link=methods.LOGLOG,
     forms={
         "pgv": Form(
-            ("b0", "b_logit_share"), _pgv, 1, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+            ("b0", "b_logit_share"), _pgv, 1, (methods.ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
             terms=("1", r"\ln\frac{1 - v}{v}"), where="v = y/2x",
         ),
         "pgv_pga": Form(
-            ("b0", "b_logit_r", "b_ln_z"), _pgv_pga, 1, (NOT_LIFTED,), size_factor=_OF_SIZE,
+            ("b0", "b_logit_r", "b_ln_z"), _pgv_pga, 1, (methods.NOT_LIFTED,), size_factor=_OF_SIZE,
             terms=_TERMS, where=_WHERE,
         ),
         "pgv_pga_tm": Form(
-            ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"), _pgv_pga_tm, 1, (NOT_LIFTED,),
+            ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"), _pgv_pga_tm, 1, (methods.NOT_LIFTED,),
             size_factor=_OF_SIZE, terms=(*_TERMS, r"\ln z_T"),
             where=_WHERE + r",\ z_T = p\,T_m/2\pi",
         ),
     },
     reads="outcomes",
-    meaning=OF_OUTCOME,
+    meaning=methods.OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
 )  # fmt: skip

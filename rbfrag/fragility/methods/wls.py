@@ -11,16 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    NORMAL,
-    OF_CRITICAL,
-    TOPPLING_BLOCK,
-    Eta,
-    FittedVariance,
-    Form,
-    Method,
-    Numbers,
-)
+from rbfrag.fragility import methods
+from rbfrag.fragility.methods import Eta, FittedVariance, Form, Method, Numbers
 
 NEGATIVE_LIMIT = 0.025
 """Probability of a negative critical velocity above which a straight line is doubted."""
@@ -88,11 +80,11 @@ _QUADRATIC = Form(
 
 METHOD = Method(
     name="wls",
-    block=TOPPLING_BLOCK,
-    link=NORMAL,
+    block=methods.TOPPLING_BLOCK,
+    link=methods.NORMAL,
     forms={"pgv": _LINE, "pga_tm": _LINE, "pgd_tm": _QUADRATIC, "xp": _LINE},
     reads="critical",
-    meaning=OF_CRITICAL,
+    meaning=methods.OF_CRITICAL,
     fit="rbfrag.fragility.fit.line:fit_wls",
     doubts=_doubts,
     fitted_variance=FittedVariance(mean_m_s, variance_m2_s2),
