@@ -103,7 +103,6 @@ def drawn_pairs(
 
     Args:
         without: ids of motions that are no second ones here.
-        draws: first motions for each second one.
     """
     pairs = []
     for second in rows:

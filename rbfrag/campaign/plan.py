@@ -36,7 +36,6 @@ class Wanted:
         full_map: the map of the intervals that fail and that do not.
         blocks: k/PGA of blocks to run for themselves, falling.
         histories: k/PGA of blocks whose motion in time is to be kept, falling.
-        critical_history: keep that of each critical block.
     """
 
     full_map: bool = False

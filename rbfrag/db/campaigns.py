@@ -69,10 +69,7 @@ class KnownCombination:
 
     Args:
         kr_over_pga: its critical value, if one was found.
-        certified: whether that is proven.
         reentrant: whether a safe island lies below it; None where no map was made.
-        gridded: whether the blocks of the kind's grid are stored.
-        mapped: whether a map of intervals is stored.
     """
 
     id: int

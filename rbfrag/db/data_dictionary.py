@@ -19,7 +19,6 @@ class ColumnMeaning:
     Args:
         type: ``integer``, ``number`` (float64), ``true/false``, ``text`` or ``array`` (float64).
         unit: its unit; empty for none, ``k_r/PGA`` for a k_r over the motion's PGA in g.
-        may_be_missing: whether a row may have no value.
         refers_to: the table and column it points to; empty for none.
     """
 

@@ -120,7 +120,6 @@ def table_digests(
 
     Args:
         columns: names of the columns that the rows fill; the others are NULL.
-        rows: their values, in the order of `columns`.
     """
     filled = dict(zip(columns, zip(*rows, strict=True), strict=True))
     missing = (None,) * len(rows)

@@ -66,7 +66,6 @@ def load_model(
     Args:
         name: its name; None for the default of a kind
             (:func:`rbfrag.db.model_file.recommended`).
-        kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.

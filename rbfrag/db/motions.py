@@ -79,7 +79,6 @@ def add_motion(
         component: component; when empty, the motion's own.
         processing: what was done to the samples, in words.
         flags: quality signs, such as ``event_guessed``.
-        suite: suite to put the motion into; made when new.
 
     Returns:
         The motion's id, and True when it was not there before.

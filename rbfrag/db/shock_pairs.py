@@ -92,11 +92,7 @@ class ShockPairRow(NamedTuple):
 
 @dataclass(frozen=True)
 class StoredShockPair:
-    """One stored block under two motions.
-
-    Args:
-        processor: the processor and numba of its campaign.
-    """
+    """One stored block under two motions."""
 
     id: int
     processor: object

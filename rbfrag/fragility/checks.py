@@ -67,12 +67,7 @@ _ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s":
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found about a question.
-
-    Args:
-        name: the value concerned.
-        text: what is wrong and what to do.
-    """
+    """One thing found about a question."""
 
     holds: Any
     name: str

@@ -182,7 +182,6 @@ class Spread(NamedTuple):
     """How the fitted points scatter: an ellipsoid in the logarithms of block and measures.
 
     Args:
-        centre: mean logarithms.
         packed: inverse covariance of the logarithms on and below its diagonal, row by row, those
             off it doubled.
         radius2: squared distance within which the share `INSIDE` of the points lies.

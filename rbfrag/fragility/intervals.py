@@ -25,7 +25,6 @@ class Quantiles(NamedTuple):
     """What an interval of one confidence level reaches to.
 
     Args:
-        normal: quantile of the normal distribution.
         student: Student's quantile as a polynomial in w = 4/ν - 1, highest power first.
     """
 

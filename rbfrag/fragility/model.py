@@ -75,10 +75,7 @@ class FragilityModel:
     """One fitted fragility model: a stored row in the form that answers.
 
     Args:
-        form: the method's formula on that term.
         event_spread: what one earthquake may do; None where it is not known.
-        vertical: whether it was fitted with vertical motion.
-        notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
         unknown: how many outcomes that it was fitted to are not known; None where all are.
         data: the database that it is stored in, as people call it; None of a row by itself.

@@ -64,11 +64,7 @@ class TraceMetadata:
 
 @dataclass(frozen=True)
 class MotionMetadata:
-    """The rows of a metadata table, found by file and trace.
-
-    Args:
-        rows: every row, in the table's order.
-    """
+    """The rows of a metadata table, found by file and trace."""
 
     path: str
     rows: tuple[TraceMetadata, ...]

@@ -225,7 +225,6 @@ def spectrum_as_dict(
     """Return the answer under the keys of the JSON contract.
 
     Args:
-        motion: the motion as the caller names it.
         p2: frequency parameters [1/s²].
     """
     return {

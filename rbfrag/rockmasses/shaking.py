@@ -119,11 +119,9 @@ class BlocksToRun:
     """Some stable blocks of a rock mass and the scales at which they move; shapes (k,) and (m, k).
 
     Args:
-        place: places of the blocks among the realisations.
         numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
             ``phi_deg``, ``phi_back_deg`` and ``cohesion_pa`` [Pa], as :class:`Realisations`
             has them.
-        back_fracture: whether there is a plane behind them.
     """
 
     place: NDArray[np.intp]
@@ -140,7 +138,6 @@ class BlockOutcomes:
     """What became of them, shapes (m, k).
 
     Args:
-        place: as in :class:`BlocksToRun`.
         code: places in :data:`OUTCOMES`; ``at_rest`` where a block was not run.
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
@@ -227,7 +224,6 @@ class ShakingPlan:
             block is still to be run.
         moves: which block moves, and is to be run, at which scale, shape (scales, n).
         pga_g: PGA at each scale [g].
-        warnings: sentences about the motion.
     """
 
     realisations: Realisations

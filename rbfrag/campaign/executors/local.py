@@ -95,7 +95,6 @@ def run_locally(
     Args:
         do: what is done to each chunk of work; a function of a module.
         after_a_death: what to do next when a worker process has died.
-        stopped: says whether to end after the chunks in hand.
     """
     if workers <= 1:
         for item in work:

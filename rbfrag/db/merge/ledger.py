@@ -65,8 +65,6 @@ class Merge:
 
     Args:
         target: the database that is merged into, inside the caller's transaction.
-        motions: the row id here of each motion there.
-        campaigns: the row id here of each campaign there.
         other_bits: of motions made from the same samples of a file by the same filter, whose
             last bits another machine rounded otherwise: the sha256 of the samples here, by the
             row id there.

@@ -47,7 +47,6 @@ class DependenceEstimate:
     Args:
         errors: standard error of each by its name, from resamples of earthquakes.
         pairs: number of pairs read of other sites, other components of a site, same component.
-        seed: seed of resamples and of the pairs drawn.
     """
 
     dependence: Dependence
@@ -93,7 +92,6 @@ def estimate_dependence(
 
     Args:
         replicates: number of resamples of earthquakes for the standard errors; 0 for none.
-        seed: seed of the resamples and of pairs that are drawn.
 
     Raises:
         InputError: columns differ in length.
@@ -127,9 +125,7 @@ def dependence_of_fit(
     that differ in more than size and strength those are read that have the most of it.
 
     Args:
-        block: what describes its blocks.
         held_out: probabilities of the blocks of the grid without their earthquake, shape (n, m).
-        seed: of pairs drawn and of resamples.
 
     Raises:
         FitError: too few earthquakes or pairs, or it is not known which motions are of one site.
@@ -268,7 +264,6 @@ def _own(
     """Return ρ_o as a share of what is left, λ_v, λ_o and λ_y of greatest likelihood.
 
     Args:
-        own: of pairs of one component.
         times: how often each earthquake counts.
         shared: ρ_e + ρ_s and λ_e.
     """
@@ -303,7 +298,6 @@ def _least(
 
     Args:
         shares: how many of its arguments are shares.
-        most: greatest share.
     """
     low, high = (float(np.log(length)) for length in LENGTHS)
     bounds = [(0.0, most) if k < shares else (low, high) for k in range(len(starts[0]))]

@@ -96,7 +96,6 @@ def bin_variances(
 
     Args:
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
-        multiplicity: how many times each point counts.
     """
     counts = bins.sums(multiplicity)
     used = counts > 0.0
@@ -129,7 +128,6 @@ def fit_variance(
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
         multiplicity: how many times each point counts (a resampled earthquake counts
             several times or not at all).
-        degree: degree of v(x).
         previous: v0, v1[, v2] of the iteration before; None for equal relative weights.
     """
     from scipy.optimize import nnls
@@ -153,8 +151,6 @@ class LineFit:
 
     Args:
         parameters: c0 [m/s], c1, v0, v1[, v2].
-        iterations: how many times line and variance were fitted.
-        converged: whether they became stable.
     """
 
     parameters: FloatArray
@@ -185,10 +181,7 @@ def iterate(
     """Fit line and variance in turn until both are stable.
 
     Args:
-        bins: bins over the rising intensities.
         y: critical toppling velocities [m/s], in the order of ``bins.x``.
-        multiplicity: how many times each point counts.
-        degree: degree of the variance polynomial.
         start: parameters to start from; None starts with ordinary least squares.
     """
     x = bins.x
@@ -348,9 +341,7 @@ def event_bootstrap(
     is drawn again. The bins are kept.
 
     Args:
-        bins: bins over the rising intensities.
         y: critical toppling velocities [m/s].
-        events: number of each point's earthquake.
 
     Returns:
         The parameters, and how many replicates did not become stable.

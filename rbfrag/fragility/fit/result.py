@@ -22,8 +22,6 @@ class MethodResult:
     Args:
         coefficients: value of each parameter by name, in the order of the formula.
         steps: change of the parameters without each earthquake, shape (G, k).
-        scores: how well the model predicts, by name.
-        details: everything else the report states, JSON-able.
         held_out: probability of each block of the grid by a fit without its earthquake,
             shape (n, m).
     """

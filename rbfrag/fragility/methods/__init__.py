@@ -232,11 +232,7 @@ class BlockParameters:
         return float(value) if isinstance(value, int | float) else None
 
     def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return arrays with what a block has of itself where an option is NaN.
-
-        Args:
-            values: the question, arrays that numpy can broadcast.
-        """
+        """Return arrays with what a block has of itself where an option is NaN."""
         import numpy as np
 
         filled = dict(values)
@@ -322,7 +318,6 @@ class Form:
             functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
             (docs/evidence/model-choice.md).
-        bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
         wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and

@@ -86,7 +86,6 @@ class Trace:
         component: its name; direction and sense are what it says, or else what `axis` says.
         axis: a name that says more of the direction.
         recording: id that the components of a recording share; None for event and station.
-        start: text with the time of the first sample.
         remarks: what else a user should see.
         is_partial: True where more is missing than `count` tells.
         remark_if_partial: what a user should see besides where samples are missing.

@@ -30,7 +30,6 @@ class Runs:
         started_s: time of the first lift-off [s]; NaN where the block never moves.
         verdict_s: time at which toppling (or the throw) was certain [s]; NaN where it was not.
         error_rad: estimated bound on the error of the peak rotation [rad].
-        samples_moved: sample intervals that had to be integrated.
     """
 
     outcome: IntArray

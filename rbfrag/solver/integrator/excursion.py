@@ -79,7 +79,6 @@ def order_lost(
     """Whether D may be negative between the states of one step and tan(phi) = tangent.
 
     Args:
-        shaking: the excitation over the step.
         s0: sin(phi) at its start.
         c0: cos(phi) there.
         s1: sin(phi) at its end.
@@ -164,7 +163,6 @@ def integrate_excursion(
     """Integrate an excursion until the block impacts, topples or the stop comes.
 
     Args:
-        kr: rocking acceleration coefficient.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
             kr the rotation rate cannot become negative, so that no impact is looked for.
         stop: where it ends; the last node for none.

@@ -112,8 +112,6 @@ def one_step(
     """Take one step; return where it leads and what touched, as bits.
 
     Args:
-        frame: the block on its slope.
-        at: motion at the start.
         h: length of the step [s].
         a: driving acceleration in its middle [g].
         w: 1 + k_v there.
@@ -245,11 +243,9 @@ def run_free(
 
     Args:
         record: the excitation; a time may repeat.
-        frame: the block on its slope.
         start_s: where in the record the run begins [s].
         h: greatest step [s].
         stop_at_landing: whether an impact of the whole base ends the run.
-        work: what the steps write to.
         history: shape (8, k) for what is kept; (8, 0) for nothing.
     """
     time_s, k_h, w, last = record.time_s, record.k_h, record.w, record.last

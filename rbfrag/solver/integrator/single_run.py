@@ -169,7 +169,6 @@ def step_errors(
     Args:
         order: degree N of U.
         ph: p times the step length.
-        shaking: over the step.
         turned: theta(1) - theta(0).
         highest: U[N - 2], U[N - 1] and U[N].
 
@@ -205,13 +204,10 @@ class Crossing(NamedTuple):
     """What the rest of an interval brought.
 
     Args:
-        state: of the block at its end.
-        known: of the trajectory.
         impact_at: fraction of the interval at which the block closes its contact, or -1; `state`
             then holds the rate of the impact.
         verdict_at: fraction at the end of the first step past which it has toppled, or -1.
         verdict_error: `known.error` there.
-        filled: rows of the history that are filled.
     """
 
     state: State
@@ -324,7 +320,6 @@ class Closed(NamedTuple):
     """What follows an impact, which closes the contact of the block.
 
     Args:
-        known: of the trajectory.
         hidden: whether the error hides what comes then.
         moving: whether motion restarts at once.
     """
@@ -341,10 +336,7 @@ def after_impact(
     """Return what follows an impact at (i, tau).
 
     Args:
-        i: the interval.
-        tau: fraction of it.
         stuck: whether the block has not moved since it was there last.
-        known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
     """
     # k_h - (1 + k_v) k_r, a straight line: at both ends of the interval, and here
@@ -364,7 +356,6 @@ def errors_after_impact(
     """Carry the errors through an impact, which takes away theta' and with it its error.
 
     Args:
-        known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
         threshold: k_h - (1 + k_v) k_r there.
 

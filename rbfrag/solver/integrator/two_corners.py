@@ -67,9 +67,6 @@ class RockingRun(NamedTuple):
         error: estimated error of the rotation where the run ended [rad].
         started_s: first motion [s].
         verdict_s: when overturning, or the throw, was certain [s].
-        impacts: impacts within the record.
-        samples_moved: sample intervals in which the block moved.
-        history_length: columns of the history that are filled.
     """
 
     outcome: int
@@ -89,7 +86,6 @@ class Crossing(NamedTuple):
     """What the rest of an interval brought.
 
     Args:
-        state: of the block at its end.
         off: estimated error of it.
         peak: greatest rotation about the present corner.
         impact_at: fraction of the interval at which the block hits its base, or -1; `state` then
@@ -146,7 +142,6 @@ def cross_interval(
     """Integrate from a place to the end of its interval, or to an impact before it.
 
     Args:
-        corner: the corner that the block turns about.
         side: 1 for the toe, -1 for the heel.
         start: state, its error, and the greatest rotation about this corner so far.
         lifting: the threshold is being crossed from below: the first step holds no impact.
@@ -341,8 +336,6 @@ def run_rocking(
 
     Args:
         tail_max_q: greatest k_h/(1 + k_v) from each node on, rest after the record included.
-        toe: the corner of forward rotation.
-        heel: that of backward rotation.
         rows: history to be filled with time, rotation (forward positive), its rate and node
             (`EVENT` or `IMPACT` between nodes), shape (4, m); (4, 0) for none. With one, the run
             goes on after the verdict until the block lies beyond recovery.

@@ -93,8 +93,6 @@ def border(
         high: the greater k_r, which does otherwise.
         width: relative width to end with.
         rest: node at which blocks are at rest.
-        table: as for `follow`.
-        work: counts what it costs.
 
     Returns:
         A k_r that does as `low` and a greater one that does as `high`.

@@ -71,8 +71,6 @@ class CertifiedMap:
         verdict: SAFE, TOPPLES, UNKNOWN or ORDERLESS of `rbfrag.solver.search.march`, shape (n,).
         point: a k_r of an undecided interval whose block topples, or NaN, shape (n,).
         complete: False when the step budget ended the search early.
-        runs: trajectories integrated.
-        steps: integration steps taken.
     """
 
     k_up: float

@@ -85,7 +85,6 @@ def critical_of(
         displacement_m: the distance on a level plane [m]; 0 for the strength that first moves.
         search_limit: least k_y/PGA looked at.
         tolerance: width of the bracket, k_y/PGA.
-        warnings: sentences about the motion.
     """
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")

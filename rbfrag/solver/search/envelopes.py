@@ -140,7 +140,6 @@ def decide(
         k1: smallest k_r.
         k2: greatest k_r.
         margin: the bounding trajectories are integrated with k1 (1 - margin) and k2 (1 + margin).
-        check: check D >= 0 on the way.
         table: excursions from rest of a k_r <= k1.
         rest: node at which all blocks are at rest, and from which on the table counts.
     """

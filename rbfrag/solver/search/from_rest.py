@@ -100,7 +100,6 @@ def first_change(
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
         first: number of the first block to look at.
         topples: what the others do.
-        table: as for `follow`.
 
     Returns:
         The number, m where there is none.

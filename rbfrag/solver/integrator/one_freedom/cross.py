@@ -50,7 +50,6 @@ class Crossing(NamedTuple):
         kind: `PASSED`, or the event.
         condition: which condition failed, if it is `BROKEN`.
         peak: greatest x so far.
-        filled: columns of the history that are filled.
     """
 
     kind: int
@@ -102,8 +101,7 @@ def cross_interval(
         tau: where in it the motion is.
         own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
         peak: greatest x so far.
-        history: as for the phase.
-        filled: columns of it that are filled.
+        filled: columns of the history that are filled.
     """
     # an equation that is the same everywhere is solved exactly by one step, whatever its length
     order, parts = rules.order, 1
@@ -168,8 +166,6 @@ def arrive(
         u: Taylor coefficients of U.
         order: degree of U.
         own: rate of the block's own time [1/s].
-        state: state at the start.
-        step: length and accelerations.
     """
     x_end = rotation(state.x, u, order, 1.0)
     leading = 0  # of the coefficients are zero

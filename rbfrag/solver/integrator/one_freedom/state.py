@@ -83,7 +83,7 @@ class State(NamedTuple):
 
     Args:
         x: position.
-        rate: its rate [1/s].
+        rate: rate of the position [1/s].
         cos: cos x; 1 where the equation is the same everywhere, which x then does not enter.
         sin: sin x; 0 there.
         error_x: bound on the error of the position.
@@ -106,10 +106,8 @@ class Entry(NamedTuple):
     """Where and how a phase is entered, or was left: the end of one is the entry of the next.
 
     Args:
-        place: where in the record.
         free_s: time after the record [s].
-        x: position.
-        rate: its rate [1/s].
+        rate: rate of the position [1/s].
         error_x: bound on the error of the position.
         error_rate: bound on the error of the rate.
     """
@@ -154,9 +152,7 @@ class PhaseRun(NamedTuple):
         started_s: first motion [s].
         stopped_s: last standstill [s].
         certain_s: time from which nothing in the rest of the record turns the motion back [s].
-        samples_moved: sample intervals in which the block moved.
         impacts: impacts at the lowest position that stopped the block.
-        history_length: columns of the history that are filled.
     """
 
     stop: int
@@ -260,8 +256,6 @@ def certain_since(
     of all that is to come exceeds the resistance where it is.
 
     Args:
-        since_s: the time so far, or NaN.
-        now_s: the present.
         driving: factor of k_h in the equation of forward motion.
         resistance: factor of 1 + k_v in it.
         least_q: least k_h/(1 + k_v) from now on.
