@@ -35,8 +35,9 @@ def block_reasons(
     """Return why blocks wait for no earthquake, in the words of `predict`; empty for those that do.
 
     Args:
-        values: parameters of the block, and options and standard deviations if there are any, by the names
-            of :func:`rbfrag.predict`, shape (m,) each; an option may be NaN for the block's own.
+        values: parameters of the block, options and standard deviations, if there are any, by the
+            names of :func:`rbfrag.predict`, shape (m,) each; an option may be NaN for the block's
+            own.
     """
     reasons = np.full(values[block.strength].shape, "", dtype=object)
 
