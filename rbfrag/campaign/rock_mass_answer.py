@@ -141,20 +141,20 @@ def rockmass(
     """
     UnknownFieldError.refuse(question, RockMassQuestion, "a rock mass")
     blocks = _rock_mass(mass).realise(n, seed)
-    asked: dict[str, Any] = {name: each for name, each in question.items() if each is not None}
+    given: dict[str, Any] = {name: each for name, each in question.items() if each is not None}
 
     def of(names: Iterable[str]) -> dict[str, Any]:
-        return {name: asked[name] for name in names if name in asked}
+        return {name: given[name] for name in names if name in given}
 
-    measures = of(ShakingFields.__annotations__) | spectral(asked.get("sa_g", {}))
-    level, motion = checked_level(asked.get("level", 0.95)), asked.get("motion")
+    measures = of(ShakingFields.__annotations__) | spectral(given.get("sa_g", {}))
+    level, motion = checked_level(given.get("level", 0.95)), given.get("motion")
     if motion is not None and measures:
         raise InputError(
             f"motion does not go with {next(iter(measures))}: give the accelerogram, or the "
             "measures that a fragility model answers for"
         )
     answer = scenario(blocks, measures, **of(ANSWERED_BY)) if measures else None
-    vertical = as_motion(asked["vertical"], "vertical") if "vertical" in asked else None
+    vertical = as_motion(given["vertical"], "vertical") if "vertical" in given else None
     ran = None
     if motion is not None:
         limits = FailureLimits(**of(FAILS_BY))

@@ -91,7 +91,7 @@ def simulate(
     scheduler: str | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
     stopped: Stopped = never,
-    **asked: Unpack[CampaignOptions],
+    **request: Unpack[CampaignOptions],
 ) -> CampaignSummary:
     """Store critical values and outcomes of every motion x vertical x polarity x block.
 
@@ -139,20 +139,20 @@ def simulate(
         WorkFailedError: a worker died; what was finished is stored.
         StoppedError: `stopped` said so; what was finished is stored.
     """
-    UnknownFieldError.refuse(asked, CampaignOptions, "a campaign")
+    UnknownFieldError.refuse(request, CampaignOptions, "a campaign")
     check_workers(jobs, scheduler)
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
-    suite, vertical = asked.get("suite"), asked.get("vertical", "without")
-    full_map, histories = asked.get("full_map", False), asked.get("store_responses")
+    suite, vertical = request.get("suite"), request.get("vertical", "without")
+    full_map, histories = request.get("full_map", False), request.get("store_responses")
     given: dict[str, Any] = {
-        name: each for name, each in asked.items() if each is not None and each is not False
+        name: each for name, each in request.items() if each is not None and each is not False
     }
     described = {name: given[name] for name in DESCRIBED if name in given}
     if sequence:
         refuse_kind(kind)
     cases = _cases(kind, described, [name for name in OPTIONS if name in given])
-    wanted = _wanted(asked.get("grid"), histories, full_map)
-    depth = positive(asked.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
+    wanted = _wanted(request.get("grid"), histories, full_map)
+    depth = positive(request.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
     if sequence:
         if vertical != "without" or full_map:
             one = "--map" if full_map else "--vertical"
