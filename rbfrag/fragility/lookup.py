@@ -117,9 +117,10 @@ def find_model(
     if type(model) is FragilityModel:
         chosen = model
     elif model is None:
-        return _suited(tuple(given), db, kind, rotation_deg)[0]
+        return suited_models(given, db, kind=kind, rotation_deg=rotation_deg)[0]
     elif isinstance(model, str):
-        chosen = _named(model, db)
+        store = _store(db)
+        chosen = store.model(store.row(model))
     elif isinstance(model, ModelRow):
         chosen = _of_row(model)
     else:
@@ -159,21 +160,10 @@ def suited_models(
 
     Arguments as for :func:`find_model`.
     """
-    return list(_suited(tuple(given), db, kind, rotation_deg))
-
-
-def _suited(
-    given: tuple[str, ...],
-    db: str | PathLike[str] | None,
-    kind: str | None,
-    rotation_deg: float | None,
-) -> list[FragilityModel]:
-    store = _store(db)
-    key = (given, kind, rotation_deg)
-    before = store.suited.get(key)
-    if before is None:
-        before = store.suited[key] = _suited_in(store, given, kind, rotation_deg)
-    return before
+    store, key = _store(db), (tuple(given), kind, rotation_deg)
+    if key not in store.suited:
+        store.suited[key] = _suited_in(store, *key)
+    return [*store.suited[key]]
 
 
 def _suited_in(
@@ -309,11 +299,6 @@ def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
         if shipped is not None:
             return shipped, True
     return place, False
-
-
-def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
-    store = _store(db)
-    return store.model(store.row(name))
 
 
 def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
