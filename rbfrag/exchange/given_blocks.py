@@ -12,7 +12,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows, Blocks, read_blocks
 from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.methods import TOPPLING_BLOCK
-from rbfrag.question.answers import blocks_of_arrays
+from rbfrag.fragility.unusable import refuse_elements
+from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import (
     has_shape,
     kinds_by_numbers,
@@ -55,7 +56,7 @@ def given_blocks(
         (group,) = described.groups
         rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
         return replace(rows, remarks=described.remarks)
-    blocks_of_arrays(given)  # refuses what columns of a table may state
+    refuse_elements(block_reasons_of(*blocks_of_arrays(given)))
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, known.values()))
     except ValueError:

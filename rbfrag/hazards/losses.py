@@ -29,6 +29,7 @@ from rbfrag.hazards.joint_rate import NO_LAW
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import NOTABLE, rise_in_words
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
+from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
 Run = Callable[[Iterator[Part], int], Iterator[PartCounts]]
@@ -153,6 +154,17 @@ class LossAnswer(Tabular):
     def has_losses(self) -> bool:
         """Whether the blocks state what a failure costs."""
         return self.portfolio.loss is not None
+
+    @property
+    def kinds(self) -> list[str]:
+        """How the blocks of each row fail that can be used."""
+        _, first = np.unique(self.portfolio.row, return_index=True)
+        return [self.portfolio.models[i].kind for i in self.portfolio.model[first].tolist()]
+
+    @property
+    def modes(self) -> list[str]:
+        """Failure mode of the blocks of each of these rows."""
+        return [mode_of_kind(kind) for kind in self.kinds]
 
     @property
     def average_annual_failures(self) -> float:

@@ -168,11 +168,7 @@ _LEVELS, _MOST_BLOCKS, _NOTABLE_RISE = 129, 256, 1e-3
 
 
 def rise_in_words(
-    model: FragilityModel,
-    numbers: Mapping[str, FloatArray],
-    low: float,
-    high: float,
-    effect: str = "what it adds there is too much",
+    model: FragilityModel, numbers: Mapping[str, FloatArray], low: float, high: float
 ) -> tuple[str, ...]:
     """Return what is to be said where a model's P rises again towards weak shaking; () nowhere.
 
@@ -181,7 +177,6 @@ def rise_in_words(
         numbers: what it reads of blocks, by field, shape (m,) each.
         low: least value of its measure that counts, above zero.
         high: greatest.
-        effect: what becomes of the answer.
     """
     if len(model.term.inputs) > 1 or not 0.0 < low < high:
         return ()
@@ -196,7 +191,7 @@ def rise_in_words(
     if not rises.any():
         return ()
     level = float(x[p[rises].argmin(axis=1)].max())
-    return (rises_below(model, level, effect),)
+    return (rises_below(model, level, "P is too high there"),)
 
 
 def rises_below(model: FragilityModel, level: float, effect: str) -> str:

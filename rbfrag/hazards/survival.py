@@ -27,6 +27,7 @@ from rbfrag.hazards.standing import Age, Standing, weights_given_standing
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
+from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
 
@@ -121,6 +122,11 @@ class SurvivalAnswer(Tabular):
     level: float
     warnings: tuple[str, ...]
     standing: Standing = field(repr=False)
+
+    @property
+    def mode(self) -> str:
+        """Failure mode of the blocks; empty for a fragility of the caller's."""
+        return mode_of_kind(self.kind or "")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

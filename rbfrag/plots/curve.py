@@ -210,7 +210,7 @@ def draw_curve(
 def rise_of_curve(model: FragilityModel, block: Mapping[str, float]) -> tuple[str, ...]:
     """Return what is to be said where the curve rises again towards weak shaking."""
     numbers = {name: np.array([value]) for name, value in block.items()}
-    return rise_in_words(model, numbers, 1e-3, 10.0, "the curve is too high there")
+    return rise_in_words(model, numbers, 1e-3, 10.0)
 
 
 def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | None:

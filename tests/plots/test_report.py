@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ from rbfrag.fragility.lookup import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.report import sheet
 from rbfrag.plots.report.contents import RateQuestion, contents_of
-from rbfrag.solver.described import DescribedBlock
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 
 __all__ = ["refuses", "shell"]
 
 ROCK = rbfrag.Block.rectangle(2.4, 0.5)
+SLIDES = {
+    "height_m": 2.5, "width_m": 2.5, "beta_deg": 20.0, "phi_deg": 32.0, "displacement_m": 0.1,
+}  # fmt: skip
 SHAPE = ("--height", "2.4", "--width", "0.5", "--dip", "3", "--phi", "35", "--pgv", "0.6")
 CURVE = "pgv_m_s,annual_rate\n0.05,0.08\n0.1,0.03\n0.2,0.009\n0.4,0.0022\n0.8,0.0004\n1.6,5e-5\n"
 
@@ -36,7 +39,7 @@ def words_of(path: Path) -> str:
         text = pages[0].extract_text()
     else:
         text = re.sub(r"<(style|svg).*?</\1>", " ", path.read_text("utf-8"), flags=re.DOTALL)
-        text = re.sub(r"</?sub>", "_", text).replace("k_r_", "k_r")
+        text = re.sub(r"<sub>(.)</sub>", r"_\1", text)
         text = html.unescape(re.sub(r"<[^>]*>", " ", text))
     return " ".join(text.split())
 
@@ -101,7 +104,7 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--kind", "sliding"), "kind sliding"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--hazard", "no.csv"), "no.csv: no such"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--years", "10"), "--years goes with"),
-        (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "its mode is slide"),
+        (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "state --displacement"),
     ],
 )
 def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], words: str) -> None:
@@ -119,28 +122,50 @@ def test_notes_are_sentences_and_symbols_have_their_index(tmp_path: Path) -> Non
     assert "rectangle of this p² and k<sub>r</sub>" in page
 
 
+def test_reports_of_blocks_that_slide_and_slump(shell: Shell) -> None:
+    Path("curve.csv").write_text(CURVE)
+    hazard = ("--hazard", "curve.csv", "--component", "rotd50")
+    slides = ("--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
+              "--displacement", "0.1")  # fmt: skip
+    slumps = ("--ks", "0.2", "--ps2", "3")
+    for block, pictures, words in (
+        (slides, 3, ("fails by sliding", "slid further than 0.1 m", "displacement that is")),
+        (slumps, 2, ("fails by slumping", "p_s² 3 1/s²", "velocity, y = k_s g/p_s")),
+    ):
+        told = shell.json("report", *block, "--pgv", "0.6", *hazard, "--out", "a.html")
+        assert told["probability"] == shell.json("predict", *block, "--pgv", "0.6")["probability"]
+        rate = shell.json("hazard", "curve.csv", *block, "--component", "rotd50")
+        assert told["hazard"]["annual_rate"] == rate["annual_rate"]
+        page = Path("a.html").read_text("utf-8")
+        assert page.count("<svg") == pictures
+        assert "Design chart" not in page
+        for text in words:
+            assert text in words_of(Path("a.html")), text
+
+
 def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:
     assert ".docx" in refuses("report", *SHAPE, "--out", "a.docx")
 
 
 @pytest.mark.parametrize(
-    ("given", "kind", "with_rate"),
+    ("block", "given", "with_rate"),
     [
-        ({"pgv_m_s": 0.6, "pga_g": 0.5}, None, True),
-        ({"pgv_m_s": 0.6}, "rocking", False),
-        ({"sa10_g": 0.5, "pga_g": 0.6}, "rocking", False),
-        ({"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6}, None, False),
+        ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5}, True),
+        ({"block": ROCK, "kind": "rocking"}, {"pgv_m_s": 0.6}, False),
+        ({"block": ROCK, "kind": "rocking"}, {"sa10_g": 0.5, "pga_g": 0.6}, False),
+        ({"block": ROCK}, {"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6}, False),
+        (SLIDES, {"pgv_m_s": 0.6, "pga_g": 0.5}, True),
+        ({"ky": 0.2, "displacement_m": 0.1}, {"pgv_m_s": 0.6}, False),
+        ({"ks": 0.2, "ps2": 3.0}, {"pgv_m_s": 0.6}, True),
     ],
 )
 def test_nothing_on_the_sheet_covers_anything(
-    given: dict[str, float], kind: str | None, with_rate: bool, tmp_path: Path
+    block: dict[str, Any], given: dict[str, float], with_rate: bool, tmp_path: Path
 ) -> None:
     (tmp_path / "curve.csv").write_text(CURVE)
     curve = tmp_path / "curve.csv" if with_rate else None
-    contents = contents_of(
-        DescribedBlock(ROCK, {"beta_deg": 0.0}), given, kind=kind, model=None, level=0.95, db=None,
-        rate=RateQuestion(curve, component="single"),
-    )  # fmt: skip
+    rate = RateQuestion(curve, meaning={"component": "single"})
+    contents = contents_of({**block, **given}, rate)
     with rc_context(sheet._RC):
         figure = sheet.new_figure(8.27, 11.69)
         sheet._draw(figure, contents, "A title", "today")
@@ -159,10 +184,7 @@ def test_nothing_on_the_sheet_covers_anything(
 
 
 def test_a_long_title_has_lines_and_its_dollars(tmp_path: Path) -> None:
-    contents = contents_of(
-        DescribedBlock(ROCK, {"beta_deg": 0.0}), {"pgv_m_s": 0.6}, kind=None, model=None,
-        level=0.95, db=None, rate=RateQuestion(None),
-    )  # fmt: skip
+    contents = contents_of({"block": ROCK, "pgv_m_s": 0.6})
     title = "Blocks above the road, at costs of $5 and $6 a day, " * 4
     figure = sheet.new_figure(8.27, 11.69)
     sheet._draw(figure, contents, title, "1 May 2026")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from rbfrag.cli.output import print_json, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlockOptions, StandingOptions
 from rbfrag.cli.parameters.stack import option, stacked
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
@@ -35,8 +34,7 @@ class Hazard:
 def report(
     *,
     out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
-    block: BlockOptions,
-    standing: StandingOptions,
+    given: options.Block,
     measures: options.Measures,
     rate: Hazard,
     meaning: options.Curve,
@@ -48,22 +46,16 @@ def report(
 
     It has the answer in a sentence, the block to scale, a table of what was asked, the design
     chart and the fragility curve with the block on them, with --hazard the annual rate, and the
-    versions of program, model and data. The same question gives the same file. Blocks that topple
-    or rock; of others  rbfrag predict  tells.
+    versions of program, model and data. The same question gives the same file.
     """
     from rbfrag.plots.report.contents import RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
-    numbers = {"p2": block.p2, "kr": block.kr, "restitution": standing.restitution}
-    given = {name: value for name, value in numbers.items() if value is not None}
-    contents = write_report(
-        out, block.described(), {**given, **measures}, kind=standing.kind,
-        rate=RateQuestion(
-            rate.hazard, meaning.imt, meaning.site, meaning.component, meaning.convert,
-            meaning.convert_sigma, rate.years,
-        ),
-        title=heading.title or TITLE, date=heading.date, **answering,
-    )  # fmt: skip
+    with given.named():
+        contents = write_report(
+            out, {**given, **measures}, RateQuestion(rate.hazard, rate.years, vars(meaning)),
+            title=heading.title or TITLE, date=heading.date, **answering,
+        )  # fmt: skip
     if json:
         rates = None if contents.rate is None else contents.rate.document
         print_json({"file": out, **contents.document, "hazard": rates})

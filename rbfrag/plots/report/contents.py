@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from os import PathLike
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Unpack
 
-from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import SYMBOLS, block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.report import as_dict, beyond_in_words, once_in, rate_in_words
 from rbfrag.plots.canvas import mode_title
+from rbfrag.plots.curve import rise_of_curve
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
-from rbfrag.question.blocks import toppling_block
+from rbfrag.question.blocks import Shape, shape_of
 from rbfrag.question.document import prediction_document
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import model_for
+from rbfrag.question.question import described
+from rbfrag.question.words import number_in_words
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.described import DescribedBlock
-from rbfrag.solver.kinds import facts_of
-from rbfrag.solver.quantity import positive
+from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
-
-_ROUGH_DEG = 89.0
-"""Friction of a block that is taken not to slide, for its drawing."""
 
 _MEASURES = {
     "pgv_m_s": ("peak ground velocity, PGV", "m/s"),
@@ -43,6 +41,9 @@ _MEASURES = {
         name: (f"spectral acceleration, SA({period:g} s)", "g") for period, name in SPECTRAL.items()
     },
 }
+
+SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
+"""A symbol with its index, k_r for example."""
 
 Rows = tuple[tuple[str, str], ...]
 
@@ -55,21 +56,13 @@ class RateQuestion:
 
     Args:
         curve: the hazard curve or its file; None where the question is of one shaking alone.
-        imt: measure of the curve to take of a file that holds several.
-        site: its site, likewise.
-        component: what its horizontal component means.
-        convert: conversion of a spectral acceleration to PGV.
-        convert_sigma: standard deviation of that.
         years: period of the probability [a].
+        meaning: keywords that say which curve is meant and what its levels mean.
     """
 
     curve: CurveLike | None = None
-    imt: str | None = None
-    site: str | None = None
-    component: str | None = None
-    convert: str | None = None
-    convert_sigma: float | None = None
     years: float = 50.0
+    meaning: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +80,20 @@ class Rate:
     document: dict[str, Any]
 
 
+class Drawing(NamedTuple):
+    """A block to draw.
+
+    Args:
+        block: the block.
+        stability: how it stands.
+        title: what the drawing is of.
+    """
+
+    block: Block
+    stability: Stability
+    title: str
+
+
 @dataclass(frozen=True, eq=False)
 class Contents:
     """All that a report says.
@@ -96,9 +103,7 @@ class Contents:
         tables: rows of name and value under headings.
         remarks: warnings.
         versions: program, model and data.
-        block: the block that is drawn.
-        stability: how it stands.
-        drawn: what the drawing is of, as its title.
+        drawing: the block that is drawn; None where its shape is not known.
         numbers: numbers of the block that the model reads.
         measures: the shaking, by name.
         model: the model that answered.
@@ -111,9 +116,7 @@ class Contents:
     tables: tuple[Table, ...]
     remarks: tuple[str, ...]
     versions: tuple[str, ...]
-    block: Block
-    stability: Stability
-    drawn: str
+    drawing: Drawing | None
     numbers: dict[str, float]
     measures: dict[str, float]
     model: FragilityModel
@@ -134,97 +137,65 @@ class Contents:
 
 
 def contents_of(
-    described: DescribedBlock | None,
-    given: Mapping[str, float],
-    *,
-    kind: str | None,
-    rate: RateQuestion,
-    model: str | None,
-    level: float,
-    db: str | PathLike[str] | None,
+    given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[AnsweringFields]
 ) -> Contents:
     """Answer a question about one block.
 
     Args:
-        described: the block by its shape; None for one that `given` has p2 and kr of.
-        given: numbers of the block and measures of the motion, by the names of `predict`.
-        kind: how it fails; None for toppling, or rocking where no plane backs the shape.
-        rate: the question of a rate.
-        model: name of the model; None for the best one.
-        level: of all intervals.
-        db: database of the models.
+        given: fields of the block, with ``kind``, and measures of the motion.
+        rate: the question of a rate; None for one shaking alone.
+        answering: model, level and database, as for :func:`rbfrag.predict`.
 
     Raises:
-        InputError: a question that cannot be answered, or a kind that no report is made of.
+        InputError: a question that cannot be answered.
     """
-    remarks: tuple[str, ...] = ()
-    if described is not None:
-        others = {name: value for name, value in given.items() if name not in STATED}
-        blocks = toppling_block(described, others, kind)
-        (group,) = blocks.groups
-        measures = {name: value for name, value in given.items() if name in STATED}
-        kind, remarks, given = group.kind, blocks.remarks, {**group.numbers, **measures}
-    kind = block_of(given, kind).kind if kind is None else kind
-    if set(TOPPLING_BLOCK.names) - set(facts_of(kind).parameters):
-        raise InputError(
-            f"no report is made of kind {kind}: its curves are not drawn; ask  rbfrag predict"
-        )
-    if missing := [name for name in TOPPLING_BLOCK.names if name not in given]:
-        raise InputError(
-            f"{missing[0]} is missing: a report is of a block by p2 and kr, or by its shape, such "
-            "as height and width"
-        )
-    document = prediction_document(
-        given, kind=kind, model=model, level=level, db=db, remarks=remarks
-    )
-    chosen = find_model(document["model"], given, db, kind=kind)
-    numbers = {name: given[name] for name in given if name not in STATED}
+    stated = {name: value for name, value in given.items() if name not in (*STATED, "kind")}
     measures = {name: given[name] for name in STATED if name in given}
-    answered = _rate(numbers, kind, rate, level, db)
-    block, stands, drawn = _drawn(described, numbers, free=facts_of(kind).free_standing)
+    shape, blocks = shape_of(stated), described(stated, given.get("kind"))
+    (group,) = blocks.groups
+    known = {**group.numbers, **measures}
+    how: dict[str, Any] = {**answering}
+    document = prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how)
+    facts = facts_of(document["kind"])
+    numbers = dict(group.numbers)
+    model = model_for({**answering, "model": document["model"]}, [*known], facts.kind)
+    answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), answering)
+    about_rate: tuple[str, ...] = ()
+    if answered is not None:
+        about_rate = (rate_in_words(answered.document), *beyond_in_words(answered.answer))
     warnings = [*document["warnings"], *(answered.document["warnings"] if answered else ())]
     return Contents(
         sentences=(
             *prediction_in_words(document),
-            *(
-                (rate_in_words(answered.document), *beyond_in_words(answered.answer))
-                if answered
-                else ()
-            ),
-            *block_in_words(document["method"], given),
+            *about_rate,
+            *block_in_words(document["method"], known),
         ),
-        tables=tuple(_tables(described, kind, numbers, measures, document, answered)),
-        remarks=tuple(dict.fromkeys(warnings)),
-        versions=tuple(_versions(chosen, answered, document["data"])),
-        block=block,
-        stability=stands,
-        drawn=drawn,
+        tables=(
+            ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
+            ("Shaking", _shaking_rows(measures)),
+            *_answer_tables(document, answered),
+        ),
+        remarks=tuple(dict.fromkeys((*warnings, *rise_of_curve(model, numbers)))),
+        versions=tuple(_versions(model, answered, document["data"])),
+        drawing=_drawing(shape, numbers, free=facts.free_standing),
         numbers=numbers,
         measures=measures,
-        model=chosen,
-        held=_held(chosen, numbers, measures),
+        model=model,
+        held=_held(model, numbers, measures),
         document=document,
         rate=answered,
     )
 
 
 def _rate(
-    numbers: Mapping[str, float],
-    kind: str,
-    question: RateQuestion,
-    level: float,
-    db: str | PathLike[str] | None,
+    block: Mapping[str, Any], question: RateQuestion, answering: AnsweringFields
 ) -> Rate | None:
     if question.curve is None:
         return None
-    curves = as_curves(
-        question.curve, imt=question.imt, site=question.site, convert=question.convert
-    )
-    answer = hazard(
-        curves, numbers["p2"], numbers["kr"], component=question.component, years=question.years,
-        convert=question.convert, convert_sigma=question.convert_sigma, kind=kind,
-        restitution=numbers.get("restitution"), level=level, db=db,
-    )  # fmt: skip
+    curves = as_curves(question.curve, **question.meaning)
+    # another model reads the curve's measure alone
+    how: dict[str, Any] = {name: v for name, v in answering.items() if name != "model"}
+    answer = hazard(curves, years=question.years, **block, **question.meaning, **how)
     return Rate(curves[0], answer, as_dict([curves[0]], [[None]], [answer]))
 
 
@@ -232,68 +203,73 @@ def _held(
     model: FragilityModel, numbers: Mapping[str, float], measures: Mapping[str, float]
 ) -> HeldMeasures | None:
     """Return what the design chart holds; None for a model that has none."""
-    if model.term.name not in (*ONE_NUMBER_TERMS, *MORE_TERMS):
+    others = dict(numbers)
+    if model.term.name not in (*ONE_NUMBER_TERMS, *MORE_TERMS) or not all(
+        others.pop(name, 0.0) for name in TOPPLING_BLOCK.names
+    ):
         return None
     read = {
         name: measures[name]
         for name in ("pga_g", "tm_s")
         if name in model.term.inputs and model.term.name in MORE_TERMS
     }
-    held = held_measures(model, p2=numbers["p2"], **read)
-    return replace(held, others=_others(numbers))
+    return replace(held_measures(model, p2=numbers["p2"], **read), others=others)
 
 
-def _others(numbers: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in numbers.items() if name not in TOPPLING_BLOCK.names}
-
-
-def _drawn(
-    described: DescribedBlock | None, numbers: Mapping[str, float], *, free: bool
-) -> tuple[Block, Stability, str]:
-    """Return the block to draw, how it stands and what it is."""
-    if described is None:
-        angle = math.atan(positive(numbers["kr"], "kr", "g"))
-        size = float(block_size_m(positive(numbers["p2"], "p2", "1/s²")))
+def _drawing(shape: Shape | None, numbers: Mapping[str, float], *, free: bool) -> Drawing | None:
+    """Return the block to draw; None where its shape is not known."""
+    if shape is not None:
+        block, planes, title = shape.block, shape.rough(), "The block to scale"
+    elif {*TOPPLING_BLOCK.names} <= {*numbers}:
+        angle, size = math.atan(numbers["kr"]), float(block_size_m(numbers["p2"]))
         block = Block.rectangle(2.0 * size * math.cos(angle), 2.0 * size * math.sin(angle))
-        conditions: dict[str, Any] = {"beta_deg": 0.0}
-        drawn = "The rectangle of this p² and k_r on a level base"
+        planes = Shape(block, {"beta_deg": 0.0}, True).rough()
+        title = "The rectangle of this p² and k_r on a level base"
     else:
-        block, conditions, drawn = described.block, dict(described.conditions), "The block to scale"
-    conditions.setdefault("phi_deg", _ROUGH_DEG)
+        return None
     if free:
-        conditions["back_fracture"] = False
-    return block, stability(block, **conditions), drawn
+        planes["back_fracture"] = False
+    return Drawing(block, stability(block, **planes), title)
 
 
-def _tables(
-    described: DescribedBlock | None,
-    kind: str,
+def _block_rows(
+    shape: Shape | None,
+    facts: KindFacts,
     numbers: Mapping[str, float],
-    measures: Mapping[str, float],
-    document: Mapping[str, Any],
-    rate: Rate | None,
-) -> Sequence[Table]:
-    level = f"{100.0 * document['level']:g} %"
-    stands = "stands free" if facts_of(kind).free_standing else "backed by a slope"
-    block = [("fails by", f"{mode_title(kind)} ({stands})")]
-    if described is not None:
-        shape, known = described.block, described.conditions
-        block += [
-            ("height across the base", f"{shape.s1_m:.4g} m"),
-            ("length of the base", f"{shape.base_m:.4g} m"),
-            ("angles of heel and toe", f"{shape.alpha1_deg:.4g}°, {shape.alpha3_deg:.4g}°"),
-            ("dip of the base", f"{known['beta_deg']:g}°"),
-            ("friction angle", f"{known['phi_deg']:g}°" if "phi_deg" in known else "not given"),
+    model: FragilityModel,
+    y_m_s: float | None,
+) -> Rows:
+    stands = " (stands free)" if facts.free_standing else " (backed by a slope)"
+    rows = [("fails by", mode_title(facts.kind) + (stands if facts.mode == "topple" else ""))]
+    planes: Mapping[str, Any] = {}
+    if shape is not None:
+        block, planes = shape.block, shape.planes
+        rows += [
+            ("height across the base", f"{block.s1_m:.4g} m"),
+            ("length of the base", f"{block.base_m:.4g} m"),
+            ("angles of heel and toe", f"{block.alpha1_deg:.4g}°, {block.alpha3_deg:.4g}°"),
+            ("dip of the base", f"{planes['beta_deg']:g}°"),
+            ("friction angle", f"{planes['phi_deg']:g}°" if "phi_deg" in planes else "not given"),
         ]
-    block += [("p²", f"{numbers['p2']:.4g} 1/s²"), ("k_r", f"{numbers['kr']:.4g}")]
-    if "restitution" in numbers:
-        block.append(("restitution", f"{numbers['restitution']:.4g}"))
-    block.append(("toppling velocity, y = k_r g/p", f"{document['y_m_s']:.3g} m/s"))
-    shaking = [
+    rows += [number_in_words(n, value) for n, value in numbers.items() if n not in planes]
+    of = model.method.block
+    if y_m_s is not None and of.size is not None:
+        first = "toppling velocity" if facts.mode == "topple" else "velocity"
+        k, p = SYMBOLS.get(of.strength, of.strength), SYMBOLS.get(of.size, of.size).rstrip("²")
+        rows.append((f"{first}, y = {k} g/{p}", f"{y_m_s:.3g} m/s"))
+    return tuple(rows)
+
+
+def _shaking_rows(measures: Mapping[str, float]) -> Rows:
+    return tuple(
         (name, f"{measures[key]:g} {unit}")
         for key, (name, unit) in _MEASURES.items()
         if key in measures
-    ]
+    )
+
+
+def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
+    level = f"{100.0 * document['level']:g} %"
     answer = [
         ("probability of failure", percent(document["probability"])),
         (f"interval ({level})", _interval(document["ci_low"], document["ci_high"])),
@@ -303,10 +279,8 @@ def _tables(
         answer.append((f"in one earthquake ({level})", _interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
-    tables = [("Block", tuple(block)), ("Shaking", tuple(shaking)), ("Answer", tuple(answer))]
-    if rate is not None:
-        tables.append(("Hazard", _hazard_rows(rate, level)))
-    return tables
+    hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
+    return [("Answer", tuple(answer)), *hazards]
 
 
 def _interval(low: float, high: float) -> str:

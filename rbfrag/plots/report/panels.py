@@ -10,7 +10,7 @@ from rbfrag.plots.chart import draw_chart
 from rbfrag.plots.curve import AXIS, draw_curve
 from rbfrag.plots.hazard import draw_contribution
 from rbfrag.plots.model_lines import MORE_TERMS
-from rbfrag.plots.report.contents import Contents
+from rbfrag.plots.report.contents import Contents, Drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
@@ -32,7 +32,9 @@ class Panel(NamedTuple):
 
 def panels_of(contents: Contents) -> list[Panel]:
     """Return the pictures of a report, in their order."""
-    panels = [Panel("block", contents.drawn, lambda part: _block(part, contents))]
+    panels = []
+    if (drawing := contents.drawing) is not None:
+        panels.append(Panel("block", drawing.title, lambda part: _block(part, drawing)))
     if contents.model.term.inputs[0] in AXIS:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))
@@ -45,9 +47,9 @@ def panels_of(contents: Contents) -> list[Panel]:
     return panels
 
 
-def _block(part: FigureBase, contents: Contents) -> None:
+def _block(part: FigureBase, drawing: Drawing) -> None:
     axes = part.subplots()
-    draw_block(axes, contents.block, contents.stability)
+    draw_block(axes, drawing.block, drawing.stability)
     axes.set_xlabel("out of the slope, from the centroid [m]")
     axes.set_ylabel("above the centroid [m]")
 

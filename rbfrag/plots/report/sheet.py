@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import (
     new_figure,
 )
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import Contents, Table
+from rbfrag.plots.report.contents import SYMBOL, Contents, Table
 from rbfrag.plots.report.panels import panels_of
 from rbfrag.version import __version__
 
@@ -40,6 +40,8 @@ _TITLE, _WIDE, _NARROW, _FINE, _CELL = 48, 104, 80, 136, 30
 that a cell does."""
 
 _TITLE_STEP_IN = 0.27
+
+_BELOW = {"r": "\N{LATIN SUBSCRIPT SMALL LETTER R}", "s": "\N{LATIN SUBSCRIPT SMALL LETTER S}"}
 
 _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 """Letters stay letters, so that the page can be searched and copied from."""
@@ -118,7 +120,7 @@ def _lines_of(tables: Sequence[Table]) -> float:
 
 def _shown(text: str) -> str:
     """Return a text with the index of k_r where it belongs."""
-    return text.replace("k_r", "k\N{LATIN SUBSCRIPT SMALL LETTER R}")
+    return SYMBOL.sub(lambda match: match[1] + _BELOW.get(match[2], f"_{match[2]}"), text)
 
 
 def _write(part: SubFigure, x: float, y: float, text: str, **style: Any) -> None:

@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import (
     new_figure,
 )
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import Contents, Table
+from rbfrag.plots.report.contents import SYMBOL, Contents, Table
 from rbfrag.plots.report.panels import Panel, panels_of
 
 _SIZE_IN = (5.4, 4.6)
@@ -72,7 +72,7 @@ def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
 
 def _written(text: str) -> str:
     """Return a text for the page: the index of k_r where it belongs, no percent sign alone."""
-    return escape(text).replace("k_r", "k<sub>r</sub>").replace(" %", "&nbsp;%")
+    return SYMBOL.sub(r"\1<sub>\2</sub>", escape(text)).replace(" %", "&nbsp;%")
 
 
 def _column(tables: Sequence[Table]) -> str:
