@@ -119,6 +119,8 @@ class BlockTable:
 
     def _refuse(self, missing: str) -> None:
         have = ", ".join(self.file.header) or "none"
+        if len(self.file.sheets) > 1:
+            have += f" (of the first sheet; the sheets are {', '.join(self.file.sheets)})"
         raise InputError(f"{self.name}: there is no column {missing}; the columns are {have}")
 
     def whole(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:

@@ -134,7 +134,10 @@ def _scatter(of: str) -> Field:
 def _spectral(period: str) -> Field:
     code = f"sa{period.replace('.', '')}"
     return Field(
-        f"Spectral acceleration at {period} s, 5 % damping", "g", (code, f"sa({period})"), least=0.0
+        f"Spectral acceleration at {period} s, 5 % damping",
+        "g",
+        (code, f"sa({period})", f"sa_{period}"),
+        least=0.0,
     )
 
 
@@ -232,7 +235,7 @@ class PlaneFields(TypedDict, Generic[V], total=False):
         V,
         _angle(
             "Dip of the base, out of the slope positive; a rectangle's is 0 if not given",
-            "beta", "dip", "dip_deg", "β", "base_dip", column="dip_deg",
+            "beta", "dip", "dip_deg", "dip_angle", "β", "base_dip", column="dip_deg",
         ),
     ]  # fmt: skip
     phi_deg: Annotated[

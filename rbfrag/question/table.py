@@ -8,7 +8,14 @@ from functools import cache
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import column_of, columns_declared, declared, word_of
+from rbfrag.question.fields import (
+    RowFields,
+    column_of,
+    columns_declared,
+    declared,
+    names_of,
+    word_of,
+)
 
 FACTORS = {
     "m": {"m": 1.0, "cm": 0.01, "mm": 0.001},
@@ -219,6 +226,8 @@ def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> 
             )
             raise InputError(f"{source}: {twice}: leave one of them out")
         factor = 1.0 if unit is None else _factor(field.unit, unit)
+        if factor is None and name in names_of(RowFields) and not field.unit:
+            factor = 1.0  # losses are in any currency, weights of anything
         if factor is None:
             units = " or ".join(each or "no unit" for each in FACTORS.get(field.unit, ("",)))
             raise InputError(

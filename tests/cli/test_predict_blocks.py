@@ -81,6 +81,8 @@ def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     shell("survival", "curve.csv", *ASKED, "--age", "100")
     shell("export", "pelicun", *ASKED, "--out", "a.csv")
+    first = refuses("predict", "--pgv", "0.6", "--blocks", "survey.xlsx")
+    assert "columns are Contents (of the first sheet; the sheets are Sheet, north wall)" in first
     for command in (
         ("predict", "--pgv", "0.6"),
         ("hazard", "curve.csv"),

@@ -84,6 +84,11 @@ def test_columns_of_written_answers_are_not_worth_a_word(tmp_path: Path) -> None
     assert read_blocks(target).remarks == ("NOT READ: pgv_m_s: the answer does not depend on it",)
 
 
+def test_losses_are_in_any_currency() -> None:
+    stated = columns_in(["loss [EUR]", "weight (t)"], "a.csv", columns_declared())
+    assert [stated.columns[name].factor for name in ("loss", "weight")] == [1.0, 1.0]
+
+
 def test_a_name_for_a_column_states_its_field_and_unit() -> None:
     for name in columns_declared():
         assert columns_in([header_of(name)], "a.csv", [name]).columns[name].factor == 1.0

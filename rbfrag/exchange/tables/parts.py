@@ -96,6 +96,7 @@ class TableFile:
         remarks: what is to be said of it; all of it when its parts have been read.
         word: what its rows are counted by: line, row or feature.
         dialect: how to write CSV that is like it.
+        sheets: the sheets of a workbook of which none was named.
     """
 
     names: Sequence[str]
@@ -103,6 +104,7 @@ class TableFile:
     remarks: list[str] = field(default_factory=list)
     word: str = "row"
     dialect: Dialect = field(default_factory=Dialect)
+    sheets: Sequence[str] = ()
 
     @property
     def header(self) -> list[str]:

@@ -93,7 +93,7 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
             part.cells.update(texts)
             yield part
 
-    return TableFile(names, read, remarks)
+    return TableFile(names, read, remarks, sheets=() if sheet else [*sheets])
 
 
 def _rows(origin: Path, sheet: Any) -> Rows:
