@@ -15,6 +15,8 @@ from rbfrag.fragility.lookup import block_of
 from rbfrag.question.fields import BlockFields, NumberFields, column_of, names_of
 from rbfrag.question.shapes import (
     FRICTION_MISSING,
+    IS_PLANE,
+    IS_SHAPE,
     LEAST_M,
     MOST_M,
     NO_MODEL,
@@ -225,8 +227,7 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     if names is None:
         return None
     sides = {name: number(given[name], name, "a number") for name in names}
-    planes = {name: given[name] for name in (*PLANES, *OF_A_SHAPE) if name in given}
-    planes = {name: value for name, value in planes.items() if name not in (*names, "block")}
+    planes = {name: value for name, value in given.items() if name in IS_PLANE}
     stated = {name: number(planes[name], name, "a number") for name in PLANES if name in planes}
     listener = _One()
     check_ranges({**sides, **stated}, listener)
@@ -310,7 +311,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
             "described once",
             fields=(numbers[0], *OF_A_SHAPE),
         )
-    others = {n: v for n, v in given.items() if n not in OF_A_SHAPE and n != "beta_deg"}
+    others = {name: value for name, value in given.items() if name not in IS_SHAPE}
     displacement_m = others.pop("displacement_m", None)
     requested = requested_kind(kind, others)
     backed = shape.planes.get("back_fracture", True)

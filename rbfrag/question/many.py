@@ -327,9 +327,11 @@ class _Sorted:
             self.read.add("displacement_m")
             displacement = _at(self.given["displacement_m"], places)
             listener.refuse(taken & ~np.isnan(displacement), FRICTION_MISSING)
-        pairs = np.unique(np.stack([codes, self.kinds[places]])[:, self.free[places]], axis=1)
-        for code, requested in pairs.T.tolist():
-            own = (codes == code) & (self.kinds[places] == requested) & self.free[places]
+        width = len(_FACTS) + 1
+        pairs = codes.astype(np.intp) * width + self.kinds[places] + 1
+        for pair in np.flatnonzero(np.bincount(pairs[self.free[places]])).tolist():
+            code, requested = pair // width, pair % width - 1
+            own = (pairs == pair) & self.free[places]
             if not own.any():
                 continue
             here = np.flatnonzero(own)

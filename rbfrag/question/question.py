@@ -6,7 +6,6 @@ For a single block neither numpy nor any other library is loaded.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
@@ -223,7 +222,10 @@ def _answer_motion(
 
 def with_remarks(answer: Prediction, remarks: tuple[str, ...]) -> Prediction:
     """Return an answer with what is to be said of its block, first."""
-    return replace(answer, warnings=(*remarks, *answer.warnings)) if remarks else answer
+    if not remarks:
+        return answer
+    # dataclasses.replace takes as long as the answer
+    return type(answer)(**(vars(answer) | {"warnings": (*remarks, *answer.warnings)}))
 
 
 def ask(

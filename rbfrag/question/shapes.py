@@ -191,6 +191,9 @@ PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", "cohesion_pa", "density
 OF_A_SHAPE = ("block", *(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
 """Fields that describe a block by its shape and its planes."""
 
+IS_PLANE = frozenset({"beta_deg", *PLANES_OF_A_SHAPE})
+IS_SHAPE = frozenset({"beta_deg", *OF_A_SHAPE})
+
 
 def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool = False) -> None:
     """Refuse values that are out of the ranges of their fields, and say where angles are odd.
@@ -200,18 +203,21 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
         listener: hears of it.
         columns: call fields as the columns of tables that are written.
     """
+    fields = declared()
     for name, value in stated.items():
-        about = declared()[name]
+        is_friction = name in ("phi_deg", "phi_back_deg")
+        if is_friction:
+            listener.remark((value > 0.0) & (value < LEAST_DEG), _RADIANS.format(name=name))
+        usable = fields[name].usable(value)
+        if usable is True:  # a single number: no text is needed
+            continue
+        about, unknown = fields[name], value != value
         shown = column_of(name) if columns else name
-        unknown = value != value
-        if name in ("phi_deg", "phi_back_deg"):
-            low = (value > 0.0) & (value < LEAST_DEG)
-            listener.remark(low, _RADIANS.format(name=name))
-        else:
+        if not is_friction:
             text = "is empty" if columns else "is no number"
             listener.refuse(unknown, f"{shown} {text}", name)
         text = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
-        listener.refuse(about.usable(value) ^ True ^ unknown, text, name, value=value)
+        listener.refuse(usable ^ True ^ unknown, text, name, value=value)
 
 
 def numbers_of_shape(

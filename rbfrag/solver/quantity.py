@@ -9,6 +9,8 @@ from rbfrag.errors import InputError
 
 def number(value: object, name: str, what: str) -> float:
     """Return a finite number as a float."""
+    if type(value) is float and math.isfinite(value):
+        return value
     if isinstance(value, bool | str | bytes):
         raise InputError(f"{name} = {value!r} is not a number: give {what}")
     try:
