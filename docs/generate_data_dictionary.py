@@ -1,4 +1,4 @@
-"""Write the data dictionary page from the schema and its meanings; --check only compares."""
+"""Write the data dictionary page from the fields of a question and the schema; --check compares."""
 
 from __future__ import annotations
 
@@ -7,12 +7,34 @@ from collections import Counter
 from pathlib import Path
 
 from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary
+from rbfrag.question.fields import (
+    RowFields,
+    column_of,
+    columns_declared,
+    declared,
+    names_of,
+    option_of,
+    parameter_of,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "reference" / "data-dictionary.md"
 
-HEAD = """\
+FIELDS = """\
 # Data dictionary
+
+## Fields of a question
+
+What may be said of blocks and their shaking, once for all doors: the keyword of Python, the option
+of the shell, the name in requests, and what a column of a table may be called besides, its unit in
+brackets (`H (m)`). Written tables use the name in bold.
+
+| keyword | shell | request | columns | unit | range | what it is |
+| --- | --- | --- | --- | --- | --- | --- |
+"""
+
+HEAD = """\
+## Tables of the database
 
 Every table and column of the database. `rbfrag db export` writes the same beside the tables, as
 JSON and as Markdown. Units are in the column names; `k_r/PGA` is a $k_r$ over the motion's PGA in
@@ -20,9 +42,28 @@ g. A missing value is NULL in the database, null in Parquet, an empty cell in CS
 and data frames. Row numbers hold in one database only: between databases, compare `natural_key`,
 or `samples_sha256` with `dt_s`.
 
-## Columns of several tables
+### Columns of several tables
 
 """
+
+
+def fields() -> str:
+    """Return the table of the fields that blocks, their shaking and rows of tables have."""
+    rows = []
+    for name in (*columns_declared(), "cohesion_pa", "density_kg_m3"):
+        about = declared()[name]
+        others = [
+            f"**{column_of(name)}**",
+            *(each for each in about.others if each != column_of(name)),
+        ]
+        doors = ["", ""]
+        if name not in names_of(RowFields) or name == "kind":
+            doors = [f"`{option_of(name)}`", f"`{parameter_of(name)}`"]
+        cells = [f"`{name}`", *doors, ", ".join(others), about.unit, about.wanted]
+        rows.append(
+            f"| {' | '.join(cells)} | {about.sentence('`{}`'.format).split(' [')[0].rstrip('.')} |"
+        )
+    return FIELDS + "\n".join(rows) + "\n\n"
 
 
 def page() -> str:
@@ -31,11 +72,11 @@ def page() -> str:
     times = Counter(column for table in tables for column in table.columns)
     usual = {column.name: column for column, count in reversed(times.most_common()) if count > 1}
     common = [column for column in times if column in usual.values()]
-    parts = [HEAD + columns_as_markdown(common)]
+    parts = [fields() + HEAD + columns_as_markdown(common)]
     for table in tables:
         own = [column for column in table.columns if column not in common]
         also = ", ".join(f"`{column.name}`" for column in table.columns if column in common)
-        parts.append(f"## {table.name}\n\n{table.meaning}\n")
+        parts.append(f"### {table.name}\n\n{table.meaning}\n")
         parts += [columns_as_markdown(own)] if own else []
         parts += [f"Also: {also}.\n"] if also else []
     return "\n".join(parts)

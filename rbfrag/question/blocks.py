@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
-from rbfrag.question.fields import BlockFields, NumberFields, column_of, names_of
+from rbfrag.question.fields import (
+    BlockFields,
+    FailureFields,
+    NumberFields,
+    PlaneFields,
+    ScatterFields,
+    ShakingFields,
+    ShapeFields,
+    WholeFields,
+    column_of,
+    names_of,
+)
 from rbfrag.question.shapes import (
     FRICTION_MISSING,
     IS_PLANE,
@@ -288,6 +299,32 @@ class _One:
             self.remarks.append(text)
 
 
+_READ = frozenset(
+    names_of(
+        NumberFields,
+        FailureFields,
+        ShapeFields,
+        PlaneFields,
+        ScatterFields,
+        ShakingFields,
+        WholeFields,
+    )
+)
+"""Fields that shapes, models or the choice of one read."""
+
+
+def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return the fields that anything reads, and what is said of others."""
+    if given.keys() <= _READ:
+        return given, ()
+    from rbfrag.fragility.methods import methods
+
+    blocks = [method.block for method in methods()]
+    known = {*_READ, *(n for b in blocks for n in (*b.names, *b.options, *b.sigmas))}
+    remarks = (f"{name} is not read: no model asks for it" for name in given if name not in known)
+    return {name: value for name, value in given.items() if name in known}, tuple(remarks)
+
+
 def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     """Return a single block as answers read it.
 
@@ -299,9 +336,10 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         InputError: it is described twice or in part, is of another kind than is requested, slides
             without a displacement, or no earthquake decides about it.
     """
-    shape = shape_of(without_kv(given))
+    given, unread = read_by_some(without_kv(given))
+    shape = shape_of(given)
     if shape is None:
-        return Blocks((Group(kind, given),))
+        return Blocks((Group(kind, given),), unread)
     from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged
 
@@ -335,7 +373,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         listener,
     )  # fmt: skip
     remarks = [*(() if taken else warnings_about(shape.block, finding)), *listener.remarks]
-    remarks += shape.remarks
+    remarks += [*shape.remarks, *unread]
     across_m = 2.0 * shape.block.r3_m
     if not LEAST_M <= across_m <= MOST_M:
         remarks.append(f"the block measures some {across_m:.2g} m: lengths are in m")

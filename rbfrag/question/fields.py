@@ -12,14 +12,28 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypedDict, TypeVar, get_type_hints
+from textwrap import wrap
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Generic,
+    Literal,
+    TypedDict,
+    TypeVar,
+    get_type_hints,
+)
 
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from os import PathLike
 
+    from numpy.typing import ArrayLike
+
     from rbfrag.fragility.model import Model
+    from rbfrag.fragility.prediction_motion import Polarity
+    from rbfrag.motions.recognise import MotionLike
     from rbfrag.solver.block.geometry import Block
 
 V = TypeVar("V")
@@ -357,6 +371,64 @@ class RequestFields(AnsweringFields, total=False):
     ]
 
 
+class RecordFields(TypedDict, Generic[V], total=False):
+    """What else may be said of the shaking."""
+
+    sa_g: Annotated[
+        Mapping[float, V] | None,
+        Field("Spectral accelerations by their period in s, as in {{1.0: 0.4}}", "g"),
+    ]
+    motion: Annotated[
+        MotionLike | None, Field("The accelerogram itself or its file, instead of its measures")
+    ]
+    polarity: Annotated[
+        Polarity,
+        Field(
+            "forward or reverse where it is known how the motion points at the slope; both gives "
+            "the mean of the two, which stand beside it (motion only)",
+            is_text=True,
+        ),
+    ]
+
+
+class ArrayFields(TypedDict, total=False):
+    """What is asked of arrays."""
+
+    nan: Annotated[
+        Literal["propagate", "raise"],
+        Field(
+            "propagate answers NaN with its reason where the input cannot be used, raise refuses "
+            "such arrays",
+            is_text=True,
+        ),
+    ]
+    interval: Annotated[
+        bool,
+        Field(
+            "False leaves interval and range out (their ends are then NaN), which takes less time"
+        ),
+    ]
+    weights: Annotated[
+        ArrayLike | None,
+        Field(
+            "Makes the arrays that describe the block draws of one block, of these weights (1: all "
+            "the same): one answer, over all of them"
+        ),
+    ]
+
+
+class QuestionFields(
+    BlockFields[V],
+    WholeFields,
+    ShakingFields[V],
+    RecordFields[V],
+    RequestFields,
+    ArrayFields,
+    total=False,
+):
+    """What :func:`rbfrag.predict` may be asked."""
+
+
 class RowFields(TypedDict, total=False):
     """What a row of a table says beside its block and its shaking."""
 
@@ -374,10 +446,12 @@ class RowFields(TypedDict, total=False):
 
 SPECTRAL = tuple(name for name in ShakingFields.__annotations__ if name.startswith("sa"))
 
-_CLASSES = (BlockFields, ShakingFields, WholeFields, AtRestFields, RequestFields, RowFields)
+_CLASSES = (QuestionFields, AtRestFields, RowFields)
 
 # nothing but the annotations' own words is read: what the types are called does not matter
-_TYPES = dict.fromkeys(("V", "Block", "Model", "PathLike"), Any) | {"PathLike": list}
+_TYPES: dict[str, Any] = dict.fromkeys(
+    ("V", "Block", "Model", "MotionLike", "Polarity", "ArrayLike"), Any
+) | {"PathLike": list}
 
 
 @cache
@@ -400,6 +474,19 @@ def names_of(*classes: Any) -> tuple[str, ...]:
 def _hints(fields: Any) -> Mapping[str, Any]:
     annotations: Mapping[str, Any] = fields.__annotations__
     return annotations
+
+
+def keywords_in_words(fields: Any) -> str:
+    """Return the list of a class's fields for the documentation of what takes them by keyword."""
+    lines = []
+    for name in names_of(fields):
+        if (about := declared().get(name)) is not None:
+            sentence = about.sentence("``{}``".format)
+            if about.is_flag:
+                sentence = f"False where {sentence[:1].lower()}{sentence[1:]}"
+            text = f"- ``{name}``: {sentence}"
+            lines += wrap(text, 92, initial_indent="    ", subsequent_indent="      ")
+    return "\n".join(lines)
 
 
 def columns_declared() -> tuple[str, ...]:

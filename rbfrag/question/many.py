@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.measures import HIGHEST
-from rbfrag.question.blocks import NUMBERS, Blocks, Group, Refused, kinds_by_numbers, requested_kind
+from rbfrag.question.blocks import (
+    NUMBERS,
+    Blocks,
+    Group,
+    Refused,
+    kinds_by_numbers,
+    read_by_some,
+    requested_kind,
+)
 from rbfrag.question.shapes import (
     FRICTION_MISSING,
     LEAST_M,
@@ -68,7 +76,12 @@ def many_blocks(
     Raises:
         InputError: they are described twice or in part.
     """
-    return _Sorted(given, size, rows).blocks(kinds, modes)
+    if rows:
+        return _Sorted(given, size, rows).blocks(kinds, modes)
+    known, unread = read_by_some(given)
+    blocks = _Sorted(known, size, rows).blocks(kinds, modes)
+    others = given.keys() - known.keys()
+    return blocks._replace(remarks=(*blocks.remarks, *unread), read=blocks.read | others)
 
 
 class _Some:

@@ -7,50 +7,29 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack, overload
 
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.prediction import Prediction, answer_given, is_single
-from rbfrag.question.blocks import Blocks, Group, has_shape, one_block
-from rbfrag.question.fields import BlockFields, ShakingFields, V
+from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
+from rbfrag.question.fields import (
+    ArrayFields,
+    QuestionFields,
+    RequestFields,
+    keywords_in_words,
+    names_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rbfrag.fragility.model import Model
     from rbfrag.fragility.prediction_array import PredictionArray
-    from rbfrag.fragility.prediction_motion import Polarity
-    from rbfrag.motions.recognise import MotionLike
-    from rbfrag.solver.block.geometry import Block
 
 
-class QuestionOptions(TypedDict, total=False):
-    """What is asked of blocks and their shaking."""
-
-    rotation_deg: float | None
-    model: Model | None
-    level: float
-    db: str | PathLike[str] | None
-    nan: Literal["propagate", "raise"]
-    interval: bool
-    weights: ArrayLike | None
-
-
-class QuestionFields(BlockFields[V], ShakingFields[V], QuestionOptions, total=False):
-    """What :func:`predict` may be asked."""
-
-    block: Block | None
-    back_fracture: bool | None
-    kind: str | None
-    sa_g: Mapping[float, V] | None
-    motion: MotionLike | None
-    polarity: Polarity
-
-
-_NAMES = QuestionFields.__optional_keys__
-_OPTIONS = QuestionOptions.__optional_keys__
+_OPTIONS = frozenset(names_of(RequestFields, ArrayFields))
 _SINGLE = frozenset({"block", "back_fracture"})
 """Fields that hold one thing for all blocks."""
 
@@ -93,47 +72,7 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
 
     The keywords:
 
-    - ``kind``: how it fails; None for what shape, dip and friction, or the numbers say.
-    - ``height_m``, ``width_m``: sides of a rectangle [m]; or alpha1_deg, alpha3_deg, r3_m; or s1_m,
-      s2_m, gamma_deg; or block, a :class:`rbfrag.Block`.
-    - ``beta_deg``: dip of the base, out of the slope positive [deg]; level if not given.
-    - ``phi_deg``, ``phi_back_deg``: friction angles of base and back plane [deg]. A rectangle
-      without is taken to topple.
-    - ``back_fracture``: False for a block that no plane backs.
-    - ``ky``: yield acceleration coefficient of sliding, tan(phi - beta) [-].
-    - ``displacement_m``: the displacement down the base that is too far [m].
-    - ``ks``: yield acceleration coefficient of slumping [-].
-    - ``ps2``: frequency parameter p_s² of slumping at rest [1/s²].
-    - ``rotation_deg``: with ks: rotation that counts as failure [deg], of which there must be a
-      model; None for failure past recovery.
-    - ``leaves_g``: with ks: acceleration at which the block leaves its back plane [g]: above it the
-      answer warns.
-    - ``restitution``: of a block that rocks: speed after an impact over that before it, above 0 and
-      up to 1; None for what angular momentum leaves.
-    - ``p2_sigma``, ``kr_sigma``, ``ky_sigma``, ``ks_sigma``, ``ps2_sigma``: standard deviations of
-      logarithms.
-    - ``restitution_sigma``: standard deviation of the restitution.
-    - ``pgv_m_s``: peak ground velocity of the horizontal component [m/s].
-    - ``pga_g``: peak ground acceleration [g].
-    - ``tm_s``: mean period [s].
-    - ``pgd_m``: peak ground displacement [m].
-    - ``sa03_g``, ``sa10_g``, ``sa20_g``, ``sa30_g``: spectral accelerations of the horizontal
-      component at 5 % damping [g]; or all of them as sa_g, by their period: ``{1.0: 0.4}``.
-    - ``motion``: the accelerogram itself or its file, instead of its measures.
-    - ``polarity``: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
-      ``both`` gives the mean of the two, which stand beside it (motion only).
-    - ``model``: a model, the name of a stored one, or None for the one of the best score that what
-      is given suffices for, or the database's default where no other reads more of the motion.
-    - ``level``: confidence level of the interval and of the range of one earthquake, between 0 and
-      1.
-    - ``db``: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
-      ``rbfrag.db`` in the current folder, or else the reference that is shipped.
-    - ``nan``: in arrays, ``propagate`` answers NaN with its reason where the input cannot be used,
-      ``raise`` refuses such arrays.
-    - ``interval``: in arrays, False leaves interval and range out (their ends are then NaN), which
-      takes less time.
-    - ``weights``: makes the arrays that describe the block draws of one block, of these weights (1:
-      all the same): one answer, over all of them.
+    KEYWORDS
 
     Args:
         p2: frequency parameter p² of the block [1/s²].
@@ -153,8 +92,8 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    if not question.keys() <= _NAMES:
-        raise unknown_field(question, _NAMES)
+    if not question.keys() <= QuestionFields.__optional_keys__:
+        raise unknown_field(question, QuestionFields.__optional_keys__)
     given: dict[str, Any] = {} if p2 is None else {"p2": p2}
     if kr is not None:
         given["kr"] = kr
@@ -182,6 +121,10 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     return ask(given, kind=kind, **options)
 
 
+if predict.__doc__:  # python -OO leaves none
+    predict.__doc__ = predict.__doc__.replace("    KEYWORDS", keywords_in_words(QuestionFields))
+
+
 def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownFieldError:
     """Return the error of the first keyword that is none, with the one that may be meant."""
     from difflib import get_close_matches
@@ -197,9 +140,6 @@ def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownF
 
 def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
     """Return the single block of a question as answers read it; its measures are left aside."""
-    if not has_shape(given):
-        block = {name: value for name, value in given.items() if name not in MEASURES}
-        return Blocks((Group(kind, block),))
     return one_block({n: value for n, value in given.items() if n not in MEASURES}, kind)
 
 
@@ -220,12 +160,16 @@ def _answer_motion(
     return with_remarks(answer, blocks.remarks)
 
 
-def with_remarks(answer: Prediction, remarks: tuple[str, ...]) -> Prediction:
-    """Return an answer with what is to be said of its block, first."""
+A = TypeVar("A", bound="Prediction | PredictionArray")
+
+
+def with_remarks(answer: A, remarks: tuple[str, ...]) -> A:
+    """Return an answer with what is to be said of its blocks, first."""
     if not remarks:
         return answer
+    field = "warnings" if isinstance(answer, Prediction) else "notes"
     # dataclasses.replace takes as long as the answer
-    return type(answer)(**(vars(answer) | {"warnings": (*remarks, *answer.warnings)}))
+    return type(answer)(**(vars(answer) | {field: (*remarks, *getattr(answer, field))}))
 
 
 def ask(
@@ -262,8 +206,9 @@ def ask(
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:
         if not has_shape(given):
+            given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-            return answer_given(chosen, given, level, **how)
+            return with_remarks(answer_given(chosen, given, level, **how), unread)
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)
             (group,) = blocks.groups

@@ -241,7 +241,8 @@ def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> 
 
 
 def _factor(unit: str, stated: str) -> float | None:
-    return FACTORS.get(unit, {}).get(stated.lower().translate(_SUPERSCRIPTS))
+    own, word = (each.lower().translate(_SUPERSCRIPTS) for each in (unit, stated))
+    return FACTORS.get(unit, {}).get(word, 1.0 if own and own == word else None)
 
 
 def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:

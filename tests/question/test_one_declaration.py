@@ -1,0 +1,98 @@
+"""A field that is declared in one line is known to every door and to the documentation."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rbfrag
+
+PACKAGE = Path(rbfrag.__file__).parent
+DECLARED = (
+    '    hardness: Annotated[V, Field("Rebound hardness of the rock", "MPa", ("rebound",))]\n'
+)
+
+ASKED = """
+import json, sys
+import numpy as np
+import rbfrag
+from rbfrag.question.fields import declared
+from rbfrag.service.app import make_app
+from rbfrag.service.settings import Settings
+from rbfrag.db.location import REFERENCE
+
+single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, hardness=40.0)
+many = rbfrag.predict(np.array([3.0, 3.0]), 0.1, pgv_m_s=0.6, hardness=40.0)
+shape = rbfrag.predict(height_m=2.0, width_m=0.4, pgv_m_s=0.6, hardness=40.0)
+schema = make_app(Settings(db=str(REFERENCE))).openapi()
+print(json.dumps({
+    "same": single.probability == rbfrag.predict(3.0, 0.1, pgv_m_s=0.6).probability,
+    "warnings": [single.warnings, many.warnings, shape.warnings],
+    "help": rbfrag.predict.__doc__,
+    "schema": json.dumps(schema),
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package with one more line, which declares a field; its folder."""
+    folder = tmp_path_factory.mktemp("declared")
+    package = folder / "rbfrag"
+    package.mkdir()
+    for each in PACKAGE.iterdir():
+        if each.name != "question":
+            (package / each.name).symlink_to(each)
+    (package / "question").mkdir()
+    for each in (PACKAGE / "question").glob("*.py"):
+        text = each.read_text(encoding="utf-8")
+        if each.name == "fields.py":
+            head, mark, rest = text.partition(
+                '"""What may be said of a block: numbers, or its sides and planes."""\n'
+            )
+            assert mark
+            text = f"{head}{mark}\n{DECLARED}{rest}"
+        (package / "question" / each.name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def run(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_python_and_requests_know_it(copied: Path) -> None:
+    answer = json.loads(run(copied, "-c", ASKED))
+    assert answer["same"]
+    for warnings in answer["warnings"]:
+        assert "hardness is not read: no model asks for it" in warnings
+    assert "``hardness``: Rebound hardness of the rock [MPa]." in answer["help"]
+
+
+def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
+    assert "Rebound hardness of the rock [MPa]." in run(
+        copied, "-m", "rbfrag.cli.main", "predict", "--help"
+    )
+    told = run(
+        copied, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6",
+        "--hardness", "40",
+    )  # fmt: skip
+    assert "not read: no model asks for it" in told
+    (copied / "blocks.csv").write_text("p2,kr,PGV [cm/s],Rebound [MPa]\n3,0.1,60,40\n")
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "blocks.csv")
+    assert "not read: Rebound [MPa]" in told
+
+
+def test_the_data_dictionary_knows_it(copied: Path) -> None:
+    (copied / "docs").symlink_to(PACKAGE.parent / "docs")
+    script = "from docs.generate_data_dictionary import page; print(page())"
+    assert "hardness" in run(copied, "-c", script)
