@@ -90,6 +90,7 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
 
     Args:
         records: where the motions come from.
+        seed: the same seed draws the same cases.
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(records.motions))

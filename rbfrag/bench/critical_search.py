@@ -30,6 +30,8 @@ class SearchTimes:
     """One kind of work over all combinations.
 
     Args:
+        name: what was run.
+        combinations: how many combinations.
         time_s: median time per combination [s].
         time_low_s: its 10 % quantile [s].
         time_high_s: its 90 % quantile [s].

@@ -78,6 +78,7 @@ def run_bench(
 
     Args:
         records: file or folder of accelerograms; None as for :func:`cases.find_records`.
+        quick: few cases, under a minute.
         say: told what comes next.
     """
     size = QUICK if quick else FULL

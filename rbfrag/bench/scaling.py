@@ -28,6 +28,7 @@ class LengthRow:
 
     Args:
         lengthened: ``rest`` (zeros before it) or ``shaking`` (the record repeated).
+        moved: sample intervals in which the block moves.
         run_s: time of one run with the excitation at hand [s].
         excitation_s: time to make the excitation from the record [s].
     """

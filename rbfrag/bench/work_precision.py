@@ -20,6 +20,7 @@ class WorkPrecision:
     """What one method did on all cases.
 
     Args:
+        of_use: the setting that users of rbfrag get.
         wrong: cases whose outcome differs from the reference's.
         error_median: median relative error of the peak rotation, where the block stays.
         error_worst: greatest of these errors.

@@ -50,10 +50,13 @@ class Workforce:
         """Have all work done and stored.
 
         Args:
+            settings: what the campaign was asked for.
             do: does one chunk of work; a function of a module, which workers can find.
+            work: the chunks.
             store: stores the answers to one chunk, which belong to the campaign of this row id, and
                 returns the number of combinations.
-            resumed: of all combinations, those that are stored already.
+            total: number of combinations.
+            resumed: of these, those that are stored already.
             started: when the campaign began, by time.perf_counter [s].
 
         Raises:

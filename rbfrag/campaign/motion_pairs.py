@@ -37,6 +37,7 @@ def motion_pairs(
     """Return the pairs of a campaign, the longest first.
 
     Args:
+        suite: only the horizontal motions of this suite.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:
@@ -103,6 +104,7 @@ def drawn_pairs(
 
     Args:
         without: ids of motions that are no second ones here.
+        draws: first motions for each second one.
     """
     pairs = []
     for second in rows:

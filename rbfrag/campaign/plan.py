@@ -36,6 +36,7 @@ class Wanted:
         full_map: the map of the intervals that fail and that do not.
         blocks: k/PGA of blocks to run for themselves, falling.
         histories: k/PGA of blocks whose motion in time is to be kept, falling.
+        critical_history: keep that of each critical block.
     """
 
     full_map: bool = False
@@ -64,6 +65,7 @@ class CampaignPlan:
     Args:
         motions: the longest records first, so that no worker is left with one at the end.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
+        warnings: sentences about these.
     """
 
     kind: str

@@ -96,6 +96,7 @@ def simulate_sequences(
 
     Args:
         cases: what the campaign is asked for: the blocks of slumps, and what counts as failure.
+        seed: of the pairs that are drawn.
         draws: first motions that are drawn for each second one.
     """
     if draws < 1:

@@ -44,6 +44,7 @@ def read_traces(
     """Return every trace of a file with its row of the metadata.
 
     Args:
+        metadata: the table, or None.
         units: unit that the caller states for files that state none, neither by themselves nor
             by the table; :attr:`Trace.other_unit` names one that does state another.
         dt_s: sampling interval that the caller states [s]; likewise.

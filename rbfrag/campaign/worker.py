@@ -91,6 +91,9 @@ class TaskResult:
 
     Args:
         critical: the search; None also where the kind has none.
+        grid: outcomes of its grid.
+        blocks: blocks run for themselves.
+        responses: histories.
     """
 
     task: Task

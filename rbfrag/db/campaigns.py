@@ -68,8 +68,12 @@ class KnownCombination:
     """What a campaign asks about a combination that is stored already.
 
     Args:
+        status: of its search.
         kr_over_pga: its critical value, if one was found.
+        certified: whether that is proven.
         reentrant: whether a safe island lies below it; None where no map was made.
+        gridded: whether the blocks of the kind's grid are stored.
+        mapped: whether a map of intervals is stored.
     """
 
     id: int

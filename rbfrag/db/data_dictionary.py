@@ -19,6 +19,8 @@ class ColumnMeaning:
     Args:
         type: ``integer``, ``number`` (float64), ``true/false``, ``text`` or ``array`` (float64).
         unit: its unit; empty for none, ``k_r/PGA`` for a k_r over the motion's PGA in g.
+        meaning: one sentence.
+        may_be_missing: whether a row may have no value.
         refers_to: the table and column it points to; empty for none.
     """
 
@@ -32,7 +34,12 @@ class ColumnMeaning:
 
 @dataclass(frozen=True)
 class TableMeaning:
-    """One table."""
+    """One table.
+
+    Args:
+        meaning: one sentence.
+        columns: its columns, in order.
+    """
 
     name: str
     meaning: str

@@ -63,6 +63,7 @@ def insert_rows(
     value would cost more than the insertion.
 
     Args:
+        columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
             scalars are not understood by every driver.
         on_conflict: SQL that says what becomes of a row whose key is there.
@@ -120,6 +121,7 @@ def table_digests(
 
     Args:
         columns: names of the columns that the rows fill; the others are NULL.
+        rows: their values, in the order of `columns`.
     """
     filled = dict(zip(columns, zip(*rows, strict=True), strict=True))
     missing = (None,) * len(rows)

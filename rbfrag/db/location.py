@@ -85,6 +85,7 @@ def check_revision(revision: str, where: str) -> None:
     """Refuse a database whose schema this rbfrag does not work with.
 
     Args:
+        revision: the revision stored in the database.
         where: the database as the user names it, for the message.
     """
     if revision == SCHEMA_REVISION:

@@ -30,10 +30,13 @@ class ModelRow:
     """One fitted fragility model as stored.
 
     Args:
+        name: unique name.
         term: intensity term (``pgv``, ``pga_tm``, ``pgd_tm``).
+        method: fit method (``wls``).
         coefficients: value of each parameter by name, in a fixed order.
         covariance: covariance of the parameters in that order.
         domain: fitted range (low, high) of each variable by name.
+        data_fingerprint: hash of the data that were fitted.
         diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
         is_default: True for the model of its kind that answers when none is named: the chosen one,
             else the one of the best score (:func:`with_defaults`).
@@ -244,6 +247,9 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
     """Return all models of an SQLite database, sorted by name.
 
     Works while another process writes to it, and in a folder that cannot be written.
+
+    Args:
+        path: the database file.
 
     Raises:
         DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.

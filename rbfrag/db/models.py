@@ -28,6 +28,7 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
 
     Args:
         row: the model; without a time of creation it is now.
+        replace: overwrite a model of the same name.
 
     Returns:
         The model as stored.
@@ -66,6 +67,7 @@ def load_model(
     Args:
         name: its name; None for the default of a kind
             (:func:`rbfrag.db.model_file.recommended`).
+        kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.

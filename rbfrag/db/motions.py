@@ -73,12 +73,14 @@ def add_motion(
     Args:
         motion: equally spaced samples [g].
         earthquake: where it belongs; without an event_id it stands for itself alone.
+        is_vertical: True for a vertical component.
         recording: what all components of one recording share; when empty, the motion's own,
             or else file and trace, so that strangers never become companions.
         station: station; when empty, the motion's own.
         component: component; when empty, the motion's own.
         processing: what was done to the samples, in words.
         flags: quality signs, such as ``event_guessed``.
+        suite: suite to put the motion into; made when new.
 
     Returns:
         The motion's id, and True when it was not there before.

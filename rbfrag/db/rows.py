@@ -16,6 +16,7 @@ class Selection(TypedDict, total=False):
     """Which combinations of a kind are read.
 
     Args:
+        suite: only motions of this suite.
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
             and of kinds that know none.
@@ -40,7 +41,9 @@ class EarthquakeInfo:
 
     Args:
         event_id: the key that earthquakes are told apart by.
+        name: name for people.
         magnitude: magnitude as the source gives it (scale not harmonised), if known.
+        time: origin time or year as text, if known.
         guessed: True when the event was read off a file header instead of stated by metadata.
     """
 

@@ -27,6 +27,7 @@ class ShockEnd(NamedTuple):
     """How one motion of two leaves a block.
 
     Args:
+        outcome: how the run ended.
         displacement_m: slip along the base since the block's first place [m]; None if not known.
         rotation_rad: rotation that is left [rad]; None of slides, and if not known.
         peak_rad: greatest rotation [rad]; None of slides, and where the block failed.
@@ -49,8 +50,11 @@ class ShockPairRecord:
     Args:
         natural_key: from :func:`rbfrag.db.keys.pair_key`.
         pairing: ``station`` for two shocks of one station, ``drawn`` for others.
+        polarity: of both.
         yield_g: yield acceleration in its first place [g].
         critical_rad: rotation without strength [rad]; None of slides.
+        first: after the first motion.
+        second: after both.
         intact: after the second alone.
     """
 
@@ -75,8 +79,11 @@ class ShockPairRow(NamedTuple):
     Args:
         event_id: earthquake of the second motion.
         pga_g: its PGA [g].
+        pairing: ``station`` or ``drawn``.
         yield_g: yield acceleration of the block [g].
         critical_rad: rotation without strength [rad]; None of slides.
+        first: after the first motion.
+        second: after both.
         intact: after the second alone.
     """
 
@@ -92,7 +99,11 @@ class ShockPairRow(NamedTuple):
 
 @dataclass(frozen=True)
 class StoredShockPair:
-    """One stored block under two motions."""
+    """One stored block under two motions.
+
+    Args:
+        processor: the processor and numba of its campaign.
+    """
 
     id: int
     processor: object

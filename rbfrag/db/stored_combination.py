@@ -31,9 +31,12 @@ class StoredCombination:
 
     Args:
         pga_g: PGA of the horizontal motion [g].
+        values: the columns of the combination by name.
+        settings: what else went into its natural key.
         block: which block it is; None for toppling.
         campaign_settings: what the campaign that made it was asked for, and on which machine.
         points: its simulations, by falling k_r/PGA.
+        intervals: its map; empty where none is stored.
         grid: number in the kind's outcome grid of each simulation, -1 for those beside it.
     """
 

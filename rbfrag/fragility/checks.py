@@ -67,7 +67,13 @@ _ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s":
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found about a question."""
+    """One thing found about a question.
+
+    Args:
+        holds: whether (where) it is so.
+        name: the value concerned.
+        text: what is wrong and what to do.
+    """
 
     holds: Any
     name: str
@@ -142,6 +148,8 @@ class Judgement(NamedTuple):
     """An answer with what was found about the question.
 
     Args:
+        answer: what the model says.
+        values: the completed values.
         intensity_m_s: the intensity term as it is [m/s].
         missing: where no answer is possible.
         in_domain: whether block and motion lie in the ranges that were fitted.

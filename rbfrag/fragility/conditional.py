@@ -98,6 +98,8 @@ def conditional_shares(
     past recovery. It survived the first shock if it then came to rest within the limit.
 
     Args:
+        rows: blocks under two motions.
+        measure: what counts.
         limits: displacements [m] or rotations [rad] that count as failure; None for past recovery.
 
     Returns:

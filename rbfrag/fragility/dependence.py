@@ -83,6 +83,8 @@ class Dependence:
         Args:
             distance_l: D, any shape.
             distance_y: d, same shape.
+            same_site: whether they are of one site.
+            same_component: whether they are of one component of it.
             sign: q, the product of the polarities.
         """
         import numpy as np
@@ -188,6 +190,7 @@ def event_range(probability: float, rho_e: float, level: float = 0.95) -> tuple[
     Too narrow for few sites or few blocks, whose own scatter it leaves out.
 
     Args:
+        probability: P of one block, 0 to 1.
         rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
         level: probability that the share lies between both ends.
     """

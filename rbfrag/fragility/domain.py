@@ -42,6 +42,7 @@ class Ratio:
     Args:
         name: its name in the stored domain.
         symbol: its formula for people.
+        unit: its unit, empty for none.
         of: the values that it is made of; the first is the one that does not go with the others.
         shipped: its range over the motions of the shipped reference, which judges where a model
             says nothing of it; None where models say it all.
@@ -55,7 +56,11 @@ class Ratio:
     shipped: tuple[float, float] | None = None
 
     def limits(self, domain: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-        """Return the range within which nothing is to be said."""
+        """Return the range within which nothing is to be said.
+
+        Args:
+            domain: fitted ranges of a model by name.
+        """
         if self.name in domain or self.shipped is None:
             return domain.get(self.name, (0.0, math.inf))
         return self.shipped[0] / MARGIN, self.shipped[1] * MARGIN
@@ -182,6 +187,8 @@ class Spread(NamedTuple):
     """How the fitted points scatter: an ellipsoid in the logarithms of block and measures.
 
     Args:
+        names: the values that the model reads.
+        centre: mean logarithms.
         packed: inverse covariance of the logarithms on and below its diagonal, row by row, those
             off it doubled.
         radius2: squared distance within which the share `INSIDE` of the points lies.
@@ -223,6 +230,9 @@ class Spread(NamedTuple):
 
 def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
     """Return the scatter of the points that a stored model was fitted to; None if it has none.
+
+    Args:
+        name: the model's name.
 
     Raises:
         ModelError: it is not whole.

@@ -25,6 +25,7 @@ class Quantiles(NamedTuple):
     """What an interval of one confidence level reaches to.
 
     Args:
+        normal: quantile of the normal distribution.
         student: Student's quantile as a polynomial in w = 4/ν - 1, highest power first.
     """
 
@@ -64,6 +65,7 @@ class ParameterErrors:
 
         Args:
             x: slopes of eta by the parameters, numbers or arrays.
+            quantiles: of the confidence level.
         """
         g = len(self.steps)
         if not g:
@@ -207,8 +209,11 @@ def _incomplete_beta(a: float, b: float, x: float, rest: float, log_beta: float)
     """Return I_x(a, b) by its continued fraction (NIST DLMF 8.17.22), Lentz's way.
 
     Args:
+        a: first parameter.
+        b: second parameter.
         x: upper limit, below (a + 1)/(a + b + 2).
         rest: 1 - x.
+        log_beta: ln B(a, b).
     """
     c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
     value = d

@@ -73,6 +73,7 @@ class LatentPoints:
 
     Args:
         points: number of points of all replicates, of which a power of two in each is taken.
+        seed: seed of the scrambles.
     """
 
     def __init__(

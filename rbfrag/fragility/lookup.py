@@ -33,6 +33,8 @@ class _Store:
     Args:
         place: its name in messages.
         stamp: what tells whether the file has changed since; () where nothing can.
+        rows: the models of all kinds.
+        models: those that have answered, by name.
         suited: those that have been found to suit a question, the recommended first.
     """
 
@@ -304,6 +306,9 @@ def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
 def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
     """Return a model of a database as it is stored.
 
+    Args:
+        db: database, as for :func:`find_model`.
+
     Raises:
         UnknownModelError: no model of that name.
     """
@@ -311,7 +316,11 @@ def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
 
 
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
-    """Return the models of a database as they are stored, sorted by name."""
+    """Return the models of a database as they are stored, sorted by name.
+
+    Args:
+        db: database, as for :func:`find_model`.
+    """
     return list(_store(db).rows)
 
 

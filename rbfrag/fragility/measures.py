@@ -22,6 +22,9 @@ class Term:
     """One intensity term.
 
     Args:
+        name: name in options and in the database.
+        title: name for people.
+        symbol: symbol of the nomenclature.
         inputs: measures of the motion it needs, as named in `predict`; the first one says
             how strong the shaking is, and is zero when there is none.
         formula: the term from its inputs, in the order of `inputs`.

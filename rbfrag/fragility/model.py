@@ -49,6 +49,7 @@ class Answer(NamedTuple):
     """What a model says of a block and a motion, numbers or arrays.
 
     Args:
+        probability: P.
         event_low: lower end of the share failing in one future earthquake; None where the model
             does not know it.
         eta: argument of the link; None where nothing had to be evaluated, and where the block is
@@ -75,7 +76,13 @@ class FragilityModel:
     """One fitted fragility model: a stored row in the form that answers.
 
     Args:
+        term: the intensity term it reads.
+        form: the method's formula on that term.
+        parameters: values of the coefficients.
+        errors: how well they are known.
         event_spread: what one earthquake may do; None where it is not known.
+        vertical: whether it was fitted with vertical motion.
+        notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
         unknown: how many outcomes that it was fitted to are not known; None where all are.
         data: the database that it is stored in, as people call it; None of a row by itself.
@@ -210,6 +217,7 @@ class FragilityModel:
         """Add the ratios of measures and k/PGA where they are judged by; return the values.
 
         Args:
+            values: completed values.
             of: the same above zero, where `values` may hold a zero that a ratio divides by.
         """
         above_zero = values if of is None else of

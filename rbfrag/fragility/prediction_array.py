@@ -179,6 +179,7 @@ def predict_many(
 
     Args:
         given: block and measures of the motion by name, numbers or arrays.
+        quantiles: of the confidence level.
         interval: whether interval and range of one earthquake are asked for.
         refuse_nan: raise instead of answering NaN.
 

@@ -115,9 +115,11 @@ def measures_of(
     """Return the measures of a motion by the names of :func:`rbfrag.predict`, and X(p).
 
     Args:
+        motion: the accelerogram.
         p2: frequency parameter p² of the block [1/s²]; None where the block has none that a
             toppling spectrum is drawn for.
         polarity: how the motion points at the slope.
+        spectrum: spectral accelerations too.
     """
     measures: dict[str, float] = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s}
     measures["pgd_m"] = motion.pgd_m

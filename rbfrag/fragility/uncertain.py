@@ -77,6 +77,7 @@ class Scatter:
         """Return the points for what is uncertain of a block, a product of steps.
 
         Args:
+            block: what describes blocks.
             sigmas: names of the standard deviations that are given.
         """
         names = [block.sigmas[sigma] for sigma in sigmas]
@@ -229,6 +230,7 @@ def drawn_model(
     """Return the model that answers for draws of one block, and the question for their medians.
 
     Args:
+        model: the model of certain blocks.
         given: the question: arrays, shape (k,), are draws of the block.
         weights: their weights, shape (k,), or 1 where all weigh the same.
 
@@ -266,6 +268,7 @@ def uncertain_model(
     """Return the model that answers a question, and the question without sigmas that are 0.
 
     Args:
+        model: the model of certain blocks.
         given: the question, with standard deviations among its values.
 
     Raises:

@@ -36,6 +36,7 @@ class UnknownOutcomes:
 
     Args:
         variable: what the curves run over: ``k_over_pga`` or ``y_over_intensity``.
+        strength: name of the block's strength.
         edges: strengths that part the classes, each with its curve.
         first: logarithm of the variable at the first node.
         step: from one node to the next.
@@ -54,6 +55,9 @@ class UnknownOutcomes:
         cls, diagnostics: Mapping[str, Any], strength: str, name: str
     ) -> UnknownOutcomes | None:
         """Return what a model's diagnostics hold, None where all outcomes are known.
+
+        Args:
+            strength: name of its block's strength.
 
         Raises:
             ModelError: the curves are torn.

@@ -73,6 +73,7 @@ def unusable_in_words(
 
     Args:
         places: where they stand, or the first.
+        reasons: why they could not be used.
         effect: what becomes of them in numbers of several blocks; those of a mean have no row.
     """
     if not count:
@@ -92,6 +93,7 @@ def refuse(
     Args:
         source: what messages call them.
         places: where those stand that cannot be used; if none can, of the first.
+        reasons: why each cannot be used.
         why: why the others do not do; empty where there are no others.
     """
     if not why or len(places) == total:
@@ -130,6 +132,7 @@ def in_list(places: Iterable[str], reasons: Iterable[str]) -> str:
 
     Args:
         places: where each stands, as "line 3 (block A7)".
+        reasons: why it cannot be used.
     """
     alike: dict[str, list[str]] = {}
     for place, reason in zip(places, reasons, strict=True):

@@ -17,7 +17,11 @@ def percent(share: float) -> str:
 
 
 def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what P, its interval and the range of one earthquake mean, in counts of blocks."""
+    """Return what P, its interval and the range of one earthquake mean, in counts of blocks.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+    """
     p, level = document["probability"], f"{100.0 * document['level']:g} %"
     low, high = document["ci_low"], document["ci_high"]
     event_low, event_high = document["event_low"], document["event_high"]

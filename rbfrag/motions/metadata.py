@@ -39,9 +39,13 @@ class TraceMetadata:
     Args:
         line: line of the table, from 1.
         trace_index: position of the trace in its file, from 0; None for all traces of the file.
+        event_id: key of the earthquake.
         units: unit of acceleration; from the column ``file_units`` it may be any words.
+        is_vertical: whether the trace is the vertical component.
         companion_group: a name that all components of one recording share.
+        magnitude: magnitude of the earthquake.
         processing: what was done to the record.
+        earthquake: name of the earthquake for people.
         year: year or time of the earthquake, as text.
         dt_s: sampling interval [s].
     """
@@ -64,7 +68,11 @@ class TraceMetadata:
 
 @dataclass(frozen=True)
 class MotionMetadata:
-    """The rows of a metadata table, found by file and trace."""
+    """The rows of a metadata table, found by file and trace.
+
+    Args:
+        rows: every row, in the table's order.
+    """
 
     path: str
     rows: tuple[TraceMetadata, ...]

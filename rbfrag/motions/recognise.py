@@ -103,6 +103,7 @@ def motions_in(
     """Return every acceleration trace of a file that is no file here, such as one sent.
 
     Args:
+        raw: what the file holds.
         name: what messages call it; nothing of that name is looked for.
     """
     _check_stated(units, dt_s)

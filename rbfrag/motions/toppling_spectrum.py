@@ -225,7 +225,10 @@ def spectrum_as_dict(
     """Return the answer under the keys of the JSON contract.
 
     Args:
+        motion: the motion as the caller names it.
+        ground: the motion itself.
         p2: frequency parameters [1/s²].
+        polarity: forward or reverse.
     """
     return {
         "motion": motion,

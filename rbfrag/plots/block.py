@@ -32,6 +32,7 @@ class BlockLines:
     All points are (out of the slope, up) from the centroid [m].
 
     Args:
+        outline: vertices of the block.
         contacts: the contacts by number: 1 heel, 2 back (where there is a back plane), 3 toe.
         planes: the line of the base plane, from the slope upwards, and of the back plane.
         rock: outline of a band of rock below and behind the planes.

@@ -34,6 +34,7 @@ def plot_calibration(
     Args:
         models: bins by name of the model, at most four.
         scores: held-out scores by name of the model, for the legend.
+        data: what the outcomes are, for the title.
     """
     canvas.plot_path(path)
     if not 1 <= len(models) <= MOST_MODELS:

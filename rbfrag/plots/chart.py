@@ -86,6 +86,7 @@ def draw_chart(
     """Draw the chart of :func:`plot_chart` into axes.
 
     Args:
+        axes: empty axes.
         point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
     """
     across, up = _known_ranges(model, held)

@@ -48,6 +48,7 @@ def draw_coast(axes: Axes, west: float, east: float, south: float, north: float)
     """Draw the coasts, and thinner the borders, of a part of the world.
 
     Args:
+        axes: axes of longitude and latitude.
         west: western edge [deg]; longitudes beyond 180 or below -180 are taken round the globe.
         east: eastern edge [deg].
         south: southern edge [deg].

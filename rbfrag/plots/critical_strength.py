@@ -87,6 +87,9 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
 
     The legend says how many of the critical values lie above each line.
 
+    Args:
+        data: what the data are, for the title.
+
     Raises:
         InputError: no critical value of a motion with a mean period, or a path that cannot
             be written.

@@ -55,6 +55,7 @@ def film(
     Args:
         path: .gif, .mp4 (by the program ffmpeg), or .html with buttons.
         beta_deg: dip of the base, out of the slope positive [deg].
+        back_fracture: draw the back plane.
         exaggerate: factor on displacement and rotation; 1 is true scale.
 
     Raises:

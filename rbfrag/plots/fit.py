@@ -52,6 +52,7 @@ def plot_fit(
     each motion.
 
     Args:
+        log: logarithmic axes.
         xp_m_s: toppling spectrum of each row [m/s], which models of the term xp need.
 
     Returns:

@@ -53,7 +53,9 @@ def plot_islands(
     single blocks, broken where they topple.
 
     Args:
+        motion: the horizontal motion that was searched.
         result: its critical search, made with ``full_map=True``.
+        vertical: the vertical motion of that search.
     """
     if not result.intervals.outcome:
         why = f"no map of outcomes (status {result.status})"

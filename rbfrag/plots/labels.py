@@ -36,6 +36,7 @@ def as_written(name: str, letters: int, lines: int = 3) -> str:
     Args:
         name: what a file or the user calls something.
         letters: the most letters of a line.
+        lines: the most lines.
     """
     shown = "".join(letter if letter.isprintable() else " " for letter in name)
     text = "\n".join(wrap(shown, letters, max_lines=lines, placeholder=" …")).replace("$", r"\$")

@@ -25,6 +25,9 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
     Bands are those of the counting error of the event set. Of years, the sum is drawn beside the
     events; what happens less than once in the time that the events cover is shaded.
 
+    Args:
+        answer: the answer, with samples.
+
     Raises:
         InputError: the answer has no curve.
     """

@@ -47,6 +47,7 @@ def plot_response(
 
     Args:
         p2: the block's p² [1/s²], for the title.
+        kr: the block's k_r, for the title.
     """
     history = response.history
     if history is None:

@@ -127,6 +127,9 @@ def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float
 
     Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at
     the scale nearest to that. With one scale there is that alone.
+
+    Args:
+        shaken: the outcomes of the blocks.
     """
     canvas.plot_path(path)
     by_scale = failures(shaken, level)

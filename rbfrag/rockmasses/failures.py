@@ -62,6 +62,7 @@ class ModeFailures:
         mode: the mode; None for all.
         outcomes: number of blocks by outcome, in the order of
             :data:`~rbfrag.rockmasses.shaking.OUTCOMES`; they add up to `count`.
+        moved: number of blocks that were set in motion.
         of_all: those that fail, as a share of the blocks of all modes.
         of_mode: the same as a share of the blocks of the mode; None without blocks.
         open_of_all: those of which it is open whether they fail, as a share of all.
@@ -95,7 +96,8 @@ class ScaleFailures:
     """What became of the blocks at one scale of the motion.
 
     Args:
-        pga_g: PGA of the scaled motion [g].
+        scale: factor on the motion.
+        pga_g: its PGA [g].
         modes: by mode, for the modes that have blocks.
     """
 

@@ -59,6 +59,7 @@ class ScenarioMode:
     """The answer for the blocks of one mode.
 
     Args:
+        has_model: whether a fragility model answers for the mode.
         unstable: number of blocks that fail at rest, P = 1 whatever the mode.
         covered: average over the blocks for which there is an answer.
         in_domain: number of blocks with a model's answer in the range that was fitted.
@@ -79,6 +80,9 @@ class Scenario:
 
     Args:
         model: name of the model that answered; None if no block needed one.
+        term: its intensity term.
+        method: how it was fitted.
+        modes: answers by mode, for the modes that have blocks.
         covered: average over all blocks for which there is an answer, and over no others.
         covered_share: the share of these among all blocks.
         uncovered_share: share of the blocks without an answer, by mode.
@@ -90,6 +94,7 @@ class Scenario:
         event_high: upper ends, shape (n,).
         in_domain: True where a model answered in the range that was fitted, shape (n,).
         reason: why an answer is missing, ruled or to be doubted, shape (n,).
+        warnings: sentences on the whole answer.
         other_models: names of the models that answered for other modes than toppling, by mode.
     """
 
@@ -134,6 +139,8 @@ def scenario(
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
             [m], sa03_g, sa10_g, sa20_g, sa30_g [g].
+        model: as in :func:`rbfrag.question.question.predict`.
+        db: database of the models.
         displacement_m: how far is too far for a block that slides [m]; None for an answer of
             toppling alone.
         rotation_deg: with it, the rotation that is failure of a block that slumps [deg]; None

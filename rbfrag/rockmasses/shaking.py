@@ -119,9 +119,11 @@ class BlocksToRun:
     """Some stable blocks of a rock mass and the scales at which they move; shapes (k,) and (m, k).
 
     Args:
+        place: places of the blocks among the realisations.
         numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
             ``phi_deg``, ``phi_back_deg`` and ``cohesion_pa`` [Pa], as :class:`Realisations`
             has them.
+        back_fracture: whether there is a plane behind them.
     """
 
     place: NDArray[np.intp]
@@ -138,6 +140,7 @@ class BlockOutcomes:
     """What became of them, shapes (m, k).
 
     Args:
+        place: as in :class:`BlocksToRun`.
         code: places in :data:`OUTCOMES`; ``at_rest`` where a block was not run.
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
@@ -220,10 +223,12 @@ class ShakingPlan:
     """What is known of the blocks without running any, and which ones have to be run.
 
     Args:
+        shaking: the motion and its scales.
         code: places in :data:`OUTCOMES`, -1 for no block, shape (scales, n); ``at_rest`` where a
             block is still to be run.
         moves: which block moves, and is to be run, at which scale, shape (scales, n).
         pga_g: PGA at each scale [g].
+        warnings: sentences about the motion.
     """
 
     realisations: Realisations
@@ -256,7 +261,11 @@ class ShakingPlan:
             )
 
     def gathered(self, answers: Iterable[BlockOutcomes]) -> ShakenMass:
-        """Return the outcomes of all blocks; the order of the answers does not matter."""
+        """Return the outcomes of all blocks; the order of the answers does not matter.
+
+        Args:
+            answers: to all of :meth:`work`.
+        """
         code = self.code.copy()
         at_rest = (self.code == AT_REST) | (self.code == LOCKED)
         mode_code = self.realisations.stability.mode_code

@@ -85,8 +85,10 @@ class FreeMotion:
     """What became of a block without a mechanism.
 
     Args:
+        outcome: how it ended.
         sentence: what happened at the end; empty where it came to rest.
         time_s: when it came to rest, or ended [s].
+        pose: where it is then.
         started_s: first motion [s]; None for none.
         landed_s: first time at which its whole base fell on the base plane [s], or None.
         backward_rad: greatest rotation backward (counter-clockwise) [rad].
@@ -94,6 +96,7 @@ class FreeMotion:
         slip_m: greatest displacement of the contact along the base [m].
         error_rad: difference of the rotation from a run of twice the step [rad].
         error_m: the same of the displacement [m].
+        steps: steps of both runs.
         contact: the contact whose displacement is told, from the centroid [m].
         rows: what the kernel kept of the motion.
     """

@@ -49,6 +49,7 @@ class BlockOnPlanes:
         phi_rad: friction angle of the base [rad]; π/2 where it is not known and the kind does
             without.
         phi_back_rad: friction angle of the back plane [rad].
+        back_fracture: whether there is a back plane.
         cohesive: whether the base has cohesion.
         yield_g: yield acceleration of the model's mode where 1 + k_v = 1 [g]; None if the
             block's mode is another one.
@@ -94,6 +95,7 @@ class Shaking:
 
     Args:
         vertical: vertical motion of the same recording, upward positive.
+        history: keep the motion in time.
         remarks: what is known about the block that the answer should say.
         start: the state that the motion finds; None for a block at rest in its first place.
     """
@@ -121,6 +123,7 @@ class RunEnd:
     """The end of one run, without its history.
 
     Args:
+        moved: whether the block moved at all.
         peak_rad: peak rotation [rad]; None for a block that slides, or that has failed.
         peak_displacement_m: greatest displacement of the contact on the base along it [m]; None
             for a block that rocks, or that has failed.
@@ -281,11 +284,19 @@ class Kind(KindFacts):
         raise InputError(f"campaigns of {self.kind} keep no histories")
 
     def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
-        """Return the blocks that campaigns of sequences shake, as they are stored."""
+        """Return the blocks that campaigns of sequences shake, as they are stored.
+
+        Args:
+            cases: what the campaign is asked for.
+        """
         raise InputError(f"campaigns of sequences are not known of {self.kind}")
 
     def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return what counts as failure, in the unit of the measure; None for past recovery."""
+        """Return what counts as failure, in the unit of the measure; None for past recovery.
+
+        Args:
+            cases: what the campaign is asked for.
+        """
         raise InputError(f"campaigns of sequences are not known of {self.kind}")
 
     def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:

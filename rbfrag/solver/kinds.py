@@ -104,6 +104,7 @@ def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
     """Return the kind of blocks that fail in this mode.
 
     Args:
+        mode: the failure mode.
         back_fracture: whether there is a plane behind the block, which decides where the mode has
             a kind of each sort.
     """
@@ -113,7 +114,11 @@ def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
 
 
 def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
-    """Return whether a block is asked of a kind of backed blocks though nothing backs it."""
+    """Return whether a block is asked of a kind of backed blocks though nothing backs it.
+
+    Args:
+        back_fracture: whether there is a plane behind the block.
+    """
     if back_fracture or facts.free_standing or facts.mode is None:
         return False
     return kind_of_mode(facts.mode, back_fracture=False).free_standing

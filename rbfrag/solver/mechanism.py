@@ -97,6 +97,7 @@ class WholeRun:
     """A block followed to its end: by its mechanism, and from where that ends step by step.
 
     Args:
+        mechanism: the block as its model describes it.
         start: the state that it started from; None for its first place.
         run: what its mechanism did; None for a start that no mechanism describes.
         free: what the block did after it; None where the mechanism goes to the end.
@@ -219,6 +220,7 @@ def whole_run(
     """Follow a block to its end.
 
     Args:
+        mechanism: the block as its model describes it.
         history: keep the motion in time.
         start: the state that the motion finds; None for the first place.
     """
@@ -408,6 +410,7 @@ class ShakenMechanism:
     """A stable block of a mechanism that rotates.
 
     Args:
+        mechanism: its motion.
         yield_name: symbol of the yield acceleration.
         yield_g: acceleration that starts it where 1 + k_v = 1 [g].
         p2: frequency parameter p_s² at rest [1/s²].

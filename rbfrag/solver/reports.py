@@ -154,6 +154,7 @@ def critical_as_dict(
     """Return the answer with the keys of the JSON contract.
 
     Args:
+        result: the answer, of any kind.
         remarks: warnings about the motion, which go before those of the answer.
         full_map: put the map of outcomes in.
     """

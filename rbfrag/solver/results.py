@@ -109,6 +109,7 @@ class ModeChange:
 
     Args:
         time_s: when [s].
+        motion: what it does from then on.
     """
 
     time_s: float
@@ -155,6 +156,7 @@ class Part:
     Args:
         begins_s: when it begins, on the clock of the sequence [s].
         first_s: time of its first sample on its own clock [s].
+        motion: its label.
         start: the state that it finds; None for a block at rest in its first place.
         response: the answer to it alone, on its own clock.
     """

@@ -81,7 +81,6 @@ def simulate(
 
     Args:
         excited: the excitation.
-        block: the block.
         rows: history to be filled, shape (4, n).
         order: order of the step; for convergence studies.
         ph_max: greatest p·h of a step; for convergence studies.
@@ -146,6 +145,7 @@ def corner_force(
     across it (physics of toppling, section 5); backward rotation is the mirror image.
 
     Args:
+        history: its motion.
         tan_phi: coefficient of friction of the base; infinite where it does not slip.
         until_s: time up to which it is of interest [s].
     """

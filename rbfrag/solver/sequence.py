@@ -48,6 +48,7 @@ class Motions:
 
     Args:
         horizontal: horizontal motions, one or more.
+        vertical: the vertical motion of each, or None.
         gap_s: rest between the end of one and the beginning of the next [s]; None for as long as
             the block takes to come to rest.
 

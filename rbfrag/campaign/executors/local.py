@@ -94,7 +94,9 @@ def run_locally(
 
     Args:
         do: what is done to each chunk of work; a function of a module.
+        work: the chunks.
         after_a_death: what to do next when a worker process has died.
+        stopped: says whether to end after the chunks in hand.
     """
     if workers <= 1:
         for item in work:

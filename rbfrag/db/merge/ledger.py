@@ -32,6 +32,7 @@ class Ledger:
     """Counts, notes and conflicts, gathered while a merge goes on.
 
     Args:
+        added: rows added by table.
         same: rows that were there already by table.
         restated: motions whose guessed earthquake became a stated one.
         within_error: combinations and histories that differ by no more than the solver's error.
@@ -65,6 +66,8 @@ class Merge:
 
     Args:
         target: the database that is merged into, inside the caller's transaction.
+        motions: the row id here of each motion there.
+        campaigns: the row id here of each campaign there.
         other_bits: of motions made from the same samples of a file by the same filter, whose
             last bits another machine rounded otherwise: the sha256 of the samples here, by the
             row id there.

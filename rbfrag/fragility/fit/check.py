@@ -85,7 +85,12 @@ def _check(
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Calibration of one model on earthquakes left out."""
+    """Calibration of one model on earthquakes left out.
+
+    Args:
+        bins: predicted and observed.
+        outcomes: what the outcomes are, in words.
+    """
 
     name: str
     bins: CalibrationBins

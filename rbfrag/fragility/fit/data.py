@@ -136,6 +136,7 @@ def read_source(
     """Read critical values, spectra and outcomes of one kind from the database.
 
     Args:
+        block: what describes the kind's block.
         kind: response kind; None for the one that `block` stands for.
     """
     from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
@@ -222,6 +223,7 @@ class FitData:
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit may read, same shape.
         scored: which of these it is judged on, same shape.
+        outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
         n_excluded: found combinations left out because the term is not defined.
         n_outside_model: combinations for which the block model does not apply.

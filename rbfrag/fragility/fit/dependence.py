@@ -46,7 +46,9 @@ class DependenceEstimate:
 
     Args:
         errors: standard error of each by its name, from resamples of earthquakes.
+        earthquakes: number of earthquakes with pairs.
         pairs: number of pairs read of other sites, other components of a site, same component.
+        seed: seed of resamples and of the pairs drawn.
     """
 
     dependence: Dependence
@@ -66,7 +68,6 @@ class Blocks(TypedDict):
         earthquake: labels.
         site: labels of the recordings within an earthquake.
         component: labels of the horizontal components within a recording.
-        polarity: +1 or -1.
         p2: squared frequency parameter p² [1/s²].
         y_m_s: toppling velocity k_r g/p [m/s].
     """
@@ -92,6 +93,7 @@ def estimate_dependence(
 
     Args:
         replicates: number of resamples of earthquakes for the standard errors; 0 for none.
+        seed: seed of the resamples and of pairs that are drawn.
 
     Raises:
         InputError: columns differ in length.
@@ -125,7 +127,9 @@ def dependence_of_fit(
     that differ in more than size and strength those are read that have the most of it.
 
     Args:
+        block: what describes its blocks.
         held_out: probabilities of the blocks of the grid without their earthquake, shape (n, m).
+        seed: of pairs drawn and of resamples.
 
     Raises:
         FitError: too few earthquakes or pairs, or it is not known which motions are of one site.
@@ -264,7 +268,9 @@ def _own(
     """Return ρ_o as a share of what is left, λ_v, λ_o and λ_y of greatest likelihood.
 
     Args:
+        own: of pairs of one component.
         times: how often each earthquake counts.
+        start: where the search begins.
         shared: ρ_e + ρ_s and λ_e.
     """
     of_own, left = own.likelihood(times), 1.0 - shared[0]
@@ -297,7 +303,9 @@ def _least(
     """Return where a function of shares and logarithms of lengths is least, from several starts.
 
     Args:
+        starts: where the search begins.
         shares: how many of its arguments are shares.
+        most: greatest share.
     """
     low, high = (float(np.log(length)) for length in LENGTHS)
     bounds = [(0.0, most) if k < shares else (low, high) for k in range(len(starts[0]))]

@@ -96,6 +96,7 @@ def bin_variances(
 
     Args:
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
+        multiplicity: how many times each point counts.
     """
     counts = bins.sums(multiplicity)
     used = counts > 0.0
@@ -128,6 +129,7 @@ def fit_variance(
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
         multiplicity: how many times each point counts (a resampled earthquake counts
             several times or not at all).
+        degree: degree of v(x).
         previous: v0, v1[, v2] of the iteration before; None for equal relative weights.
     """
     from scipy.optimize import nnls
@@ -151,6 +153,8 @@ class LineFit:
 
     Args:
         parameters: c0 [m/s], c1, v0, v1[, v2].
+        iterations: how many times line and variance were fitted.
+        converged: whether they became stable.
     """
 
     parameters: FloatArray
@@ -181,7 +185,10 @@ def iterate(
     """Fit line and variance in turn until both are stable.
 
     Args:
+        bins: bins over the rising intensities.
         y: critical toppling velocities [m/s], in the order of ``bins.x``.
+        multiplicity: how many times each point counts.
+        degree: degree of the variance polynomial.
         start: parameters to start from; None starts with ordinary least squares.
     """
     x = bins.x
@@ -254,6 +261,7 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
 
     Args:
         term: the intensity term, which sets the degree of v(x).
+        seed: seed of the bootstrap.
 
     Raises:
         FitError: the line does not rise with intensity, or there is no scatter.
@@ -341,7 +349,11 @@ def event_bootstrap(
     is drawn again. The bins are kept.
 
     Args:
+        bins: bins over the rising intensities.
         y: critical toppling velocities [m/s].
+        events: number of each point's earthquake.
+        degree: degree of the variance polynomial.
+        start: parameters of the fit to all data.
 
     Returns:
         The parameters, and how many replicates did not become stable.

@@ -22,6 +22,9 @@ class MethodResult:
     Args:
         coefficients: value of each parameter by name, in the order of the formula.
         steps: change of the parameters without each earthquake, shape (G, k).
+        standard_errors: standard error of each parameter by name.
+        scores: how well the model predicts, by name.
+        details: everything else the report states, JSON-able.
         held_out: probability of each block of the grid by a fit without its earthquake,
             shape (n, m).
     """
@@ -43,6 +46,7 @@ class Estimates:
         values: shape (k,).
         steps: change of the parameters without each earthquake, shape (G, k).
         samples: of a bootstrap by earthquake, shape (replicates, k).
+        seed: seed of the bootstrap.
         others: further standard errors by what the report calls them.
     """
 
@@ -85,6 +89,8 @@ def method_result(
         in_sample: probabilities of the blocks of the grid, shape (n, m).
         held_out: the same by fits without the earthquake concerned.
         ln_residual: ln y less its median where known, shape (n,), to be split by earthquakes.
+        scores: further scores.
+        details: what else the report states.
     """
     judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
     return MethodResult(

@@ -29,7 +29,9 @@ class Judged:
 
     Args:
         failed: 0 or 1, shape (n, m).
+        known: where the outcome is known.
         event: number of each row's earthquake, shape (n,).
+        source: where the outcomes come from.
         weights: what each known outcome counts, shape (n, m); None: each the same.
     """
 

@@ -28,6 +28,8 @@ class Numbers(NamedTuple):
     Args:
         ndtr: standard normal distribution function.
         expm1: exponential less one.
+        maximum: the larger of two.
+        minimum: the smaller of two.
         sin: sine of an angle [rad].
         cos: its cosine.
         ndtri: its inverse.
@@ -105,6 +107,7 @@ class Link(NamedTuple):
     """A function from eta to probability.
 
     Args:
+        name: as reports call it.
         probability: F(eta, functions).
         density: F'(eta, functions).
         quantile: eta of a probability between 0 and 1, from it and functions.
@@ -154,6 +157,7 @@ class Bound(NamedTuple):
     Args:
         holds: whether (where) it is so, from values by name.
         about: name of the value that it is said of.
+        text: what is said.
     """
 
     holds: Callable[[Mapping[str, Any]], Any]
@@ -232,7 +236,11 @@ class BlockParameters:
         return float(value) if isinstance(value, int | float) else None
 
     def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return arrays with what a block has of itself where an option is NaN."""
+        """Return arrays with what a block has of itself where an option is NaN.
+
+        Args:
+            values: the question, arrays that numpy can broadcast.
+        """
         import numpy as np
 
         filled = dict(values)
@@ -318,6 +326,7 @@ class Form:
             functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
             (docs/evidence/model-choice.md).
+        bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
         wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
@@ -347,6 +356,7 @@ class Form:
 
         Args:
             parameters: of the formula, in its order.
+            values: completed values by name.
         """
         formula = self.formula(parameters, values, ns)
         return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
@@ -375,7 +385,10 @@ class Method:
     """One method of fitting.
 
     Args:
+        name: name in options and in the database.
+        block: what describes its blocks.
         link: F in P = F(eta).
+        forms: its formulas by name of the measure.
         reads: what it is fitted to: ``outcomes`` of blocks on the grid, or ``critical`` values.
         meaning: what the probability is one of, in words.
         fit: module and function that fit it, as ``module:function``.

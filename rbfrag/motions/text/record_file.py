@@ -86,6 +86,7 @@ class Trace:
         component: its name; direction and sense are what it says, or else what `axis` says.
         axis: a name that says more of the direction.
         recording: id that the components of a recording share; None for event and station.
+        start: text with the time of the first sample.
         remarks: what else a user should see.
         is_partial: True where more is missing than `count` tells.
         remark_if_partial: what a user should see besides where samples are missing.
@@ -116,6 +117,7 @@ class RecordFile:
     """A file that is being read. Every refusal is a MotionFileError that names the line.
 
     Args:
+        text: the file's text.
         units: unit of acceleration that the caller states, or None.
         dt_s: sampling interval that the caller states [s], or None.
         allow_partial: True to read a file whose header states another number of samples than
@@ -277,6 +279,7 @@ class RecordFile:
         They stand below 7 lines of integers and 7 of reals, and end with a line ``/&``.
 
         Args:
+            span: indices of the block's lines.
             header_line: 1-based line of the last header field, above the numbers.
         """
         lines = self.lines
@@ -339,6 +342,7 @@ class RecordFile:
             rows: the lines that hold them; only the last may hold fewer than the others.
             first_line: 1-based line of the first.
             layout: fields a line, and characters a field, the number at its right end.
+            what: what the numbers are, for messages.
         """
         per_line, width = layout
         rows = [row.rstrip() for row in rows]

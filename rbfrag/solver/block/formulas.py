@@ -67,6 +67,7 @@ def tan_deg(angle_deg: N, functions: Elementwise[N]) -> N:
 
     Args:
         angle_deg: angle [deg], scalar or array; NaN gives NaN.
+        functions: the functions for this kind of number.
     """
     where = functions.where
     steep = abs(angle_deg) > 45.0
@@ -82,6 +83,7 @@ def cot_deg(angle_deg: N, functions: Elementwise[N]) -> N:
 
     Args:
         angle_deg: angle [deg], scalar or array; NaN gives NaN.
+        functions: the functions for this kind of number.
     """
     where = functions.where
     steep = abs(angle_deg - 90.0) <= 45.0
@@ -122,6 +124,7 @@ def tangents_from_spacings(
         s1_m: spacing of the base fractures [m].
         s2_m: spacing of the back fractures [m].
         gamma_deg: dip of the back less dip of the base [deg].
+        functions: the functions for this kind of number.
     """
     cot = cot_deg(gamma_deg, functions)
     half_base = s2_m / s1_m * functions.sqrt(cot * cot + 1.0)

@@ -30,6 +30,8 @@ class Runs:
         started_s: time of the first lift-off [s]; NaN where the block never moves.
         verdict_s: time at which toppling (or the throw) was certain [s]; NaN where it was not.
         error_rad: estimated bound on the error of the peak rotation [rad].
+        steps: integration steps taken.
+        samples_moved: sample intervals that had to be integrated.
     """
 
     outcome: IntArray

@@ -58,6 +58,8 @@ class Excursion(NamedTuple):
 
     Args:
         event: IMPACT, TOPPLED, IN_AIR (at the end of the record), STOPPED or ORDER_LOST.
+        state: state of the block there.
+        steps: integration steps taken.
     """
 
     event: int
@@ -79,6 +81,7 @@ def order_lost(
     """Whether D may be negative between the states of one step and tan(phi) = tangent.
 
     Args:
+        shaking: the excitation over the step.
         s0: sin(phi) at its start.
         c0: cos(phi) there.
         s1: sin(phi) at its end.
@@ -163,9 +166,12 @@ def integrate_excursion(
     """Integrate an excursion until the block impacts, topples or the stop comes.
 
     Args:
+        kr: rocking acceleration coefficient.
+        start: where it begins.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
             kr the rotation rate cannot become negative, so that no impact is looked for.
         stop: where it ends; the last node for none.
+        rules: how it is followed.
     """
     interval_s = excitation.interval_s
     k_h, w = excitation.k_h, excitation.w

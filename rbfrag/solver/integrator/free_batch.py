@@ -91,6 +91,7 @@ def simulate_free(
     Args:
         corners: numbers of both corners of each block, toe before heel, shape (n, 2, 6).
         slowest: speed after an impact below which each block rests [rad/s], shape (n,).
+        most_impacts: impacts beyond which a run is given up.
         change: relative change of the motion that sensitive outcomes are told by.
     """
     more, less = excited.scaled(1.0 + change), excited.scaled(1.0 - change)

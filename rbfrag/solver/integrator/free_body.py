@@ -87,6 +87,7 @@ class FreeRun(NamedTuple):
     Args:
         time_s: when it came to rest, or ended [s].
         motion: place and velocity then.
+        steps: integration steps.
         filled: columns of the history that are filled.
         moved_s: first motion [s]; NaN for none.
         landed_s: first impact of the whole base [s]; NaN for none.
@@ -112,6 +113,9 @@ def one_step(
     """Take one step; return where it leads and what touched, as bits.
 
     Args:
+        corners: pairs of corner and plane.
+        frame: the block on its slope.
+        at: motion at the start.
         h: length of the step [s].
         a: driving acceleration in its middle [g].
         w: 1 + k_v there.
@@ -243,9 +247,12 @@ def run_free(
 
     Args:
         record: the excitation; a time may repeat.
+        corners: pairs of corner and plane.
+        frame: the block on its slope.
         start_s: where in the record the run begins [s].
         h: greatest step [s].
         stop_at_landing: whether an impact of the whole base ends the run.
+        work: what the steps write to.
         history: shape (8, k) for what is kept; (8, 0) for nothing.
     """
     time_s, k_h, w, last = record.time_s, record.k_h, record.w, record.last

@@ -83,7 +83,8 @@ def after_record(
         toe: the corner of forward rotation.
         heel: that of backward rotation.
         side: the present one, 1 or -1.
-        off: error of the state.
+        state: of the block.
+        off: its error.
         slowest: speed after an impact below which the block rests [rad/s].
     """
     # energy alone decides: (theta'/p)²/2 - (1 - cos x) is conserved about one corner

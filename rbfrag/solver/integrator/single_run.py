@@ -169,6 +169,7 @@ def step_errors(
     Args:
         order: degree N of U.
         ph: p times the step length.
+        shaking: over the step.
         turned: theta(1) - theta(0).
         highest: U[N - 2], U[N - 1] and U[N].
 
@@ -204,10 +205,14 @@ class Crossing(NamedTuple):
     """What the rest of an interval brought.
 
     Args:
+        state: of the block at its end.
+        known: of the trajectory.
         impact_at: fraction of the interval at which the block closes its contact, or -1; `state`
             then holds the rate of the impact.
         verdict_at: fraction at the end of the first step past which it has toppled, or -1.
         verdict_error: `known.error` there.
+        steps: integration steps taken.
+        filled: rows of the history that are filled.
     """
 
     state: State
@@ -235,7 +240,10 @@ def cross_interval(
     """Integrate from (i, tau) to the end of the interval, or to an impact before it.
 
     Args:
+        nodes: the excitation.
         tau: fraction of it to begin at.
+        state: state of the block there.
+        known: what is known of the trajectory.
         lifting: the threshold is being crossed from below: the first step holds no impact.
         rows: history to be filled with peaks; with one, the run goes on after the verdict.
         filled: how many rows are.
@@ -320,6 +328,7 @@ class Closed(NamedTuple):
     """What follows an impact, which closes the contact of the block.
 
     Args:
+        known: of the trajectory.
         hidden: whether the error hides what comes then.
         moving: whether motion restarts at once.
     """
@@ -336,7 +345,11 @@ def after_impact(
     """Return what follows an impact at (i, tau).
 
     Args:
+        nodes: the excitation.
+        i: the interval.
+        tau: fraction of it.
         stuck: whether the block has not moved since it was there last.
+        known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
     """
     # k_h - (1 + k_v) k_r, a straight line: at both ends of the interval, and here
@@ -356,6 +369,7 @@ def errors_after_impact(
     """Carry the errors through an impact, which takes away theta' and with it its error.
 
     Args:
+        known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
         threshold: k_h - (1 + k_v) k_r there.
 
@@ -449,6 +463,7 @@ def run_toppling(
     """Run one block over one record; the fields of :class:`Run` in order.
 
     Args:
+        nodes: the excitation.
         kr: rocking acceleration coefficient k_r.
         p: frequency parameter [1/s].
         order: degree of the Taylor step: 4, 5, 6 or 8.

@@ -148,6 +148,7 @@ def taylor_step(
         ph: p times the step length.
         s0: sin(phi) at the start.
         c0: cos(phi) at the start.
+        shaking: the excitation over the step.
 
     Returns:
         theta(1) - theta(0), U(1), U'(1).

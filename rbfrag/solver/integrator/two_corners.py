@@ -67,6 +67,10 @@ class RockingRun(NamedTuple):
         error: estimated error of the rotation where the run ended [rad].
         started_s: first motion [s].
         verdict_s: when overturning, or the throw, was certain [s].
+        impacts: impacts within the record.
+        steps: integration steps.
+        samples_moved: sample intervals in which the block moved.
+        history_length: columns of the history that are filled.
     """
 
     outcome: int
@@ -86,11 +90,13 @@ class Crossing(NamedTuple):
     """What the rest of an interval brought.
 
     Args:
+        state: of the block at its end.
         off: estimated error of it.
         peak: greatest rotation about the present corner.
         impact_at: fraction of the interval at which the block hits its base, or -1; `state` then
             holds the rate of the impact.
         fallen: whether it lies beyond recovery.
+        steps: integration steps taken.
         filled: columns of the history that are filled.
     """
 
@@ -142,7 +148,10 @@ def cross_interval(
     """Integrate from a place to the end of its interval, or to an impact before it.
 
     Args:
+        record: the excitation.
+        corner: the corner that the block turns about.
         side: 1 for the toe, -1 for the heel.
+        place: where to begin.
         start: state, its error, and the greatest rotation about this corner so far.
         lifting: the threshold is being crossed from below: the first step holds no impact.
         rows: history to be filled with peaks.
@@ -258,7 +267,10 @@ def through_impact(
     """Return what follows an impact at a place: rest, or rotation about the other corner.
 
     Args:
+        record: the excitation.
         side: the present corner, 1 or -1.
+        rules: how to integrate.
+        crossing: how the block came to the impact.
     """
     rate = crossing.state.rate
     # of theta' itself: theta'/p changes with the corner, whose p is its own
@@ -335,7 +347,11 @@ def run_rocking(
     """Run one block over one record.
 
     Args:
+        record: the excitation.
         tail_max_q: greatest k_h/(1 + k_v) from each node on, rest after the record included.
+        toe: the corner of forward rotation.
+        heel: that of backward rotation.
+        rules: how to integrate.
         rows: history to be filled with time, rotation (forward positive), its rate and node
             (`EVENT` or `IMPACT` between nodes), shape (4, m); (4, 0) for none. With one, the run
             goes on after the verdict until the block lies beyond recovery.

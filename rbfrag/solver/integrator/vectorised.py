@@ -163,6 +163,7 @@ def run_batch(
     """Run blocks over one record, order 8, side by side.
 
     Args:
+        nodes: the excitation.
         kr: rocking acceleration coefficients, shape (m,).
         p: frequency parameters [1/s], shape (m,).
         ph_max: greatest p·h of one step.

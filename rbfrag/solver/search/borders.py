@@ -17,6 +17,8 @@ class Bracket(NamedTuple):
     """Two k_r, of which one topples and the other does not.
 
     Args:
+        low: the smaller.
+        high: the greater.
         low_topples: whether it is the smaller that topples.
         at_low: distance of the smaller from toppling; infinite where it is not known.
         at_high: the same of the greater.
@@ -93,6 +95,8 @@ def border(
         high: the greater k_r, which does otherwise.
         width: relative width to end with.
         rest: node at which blocks are at rest.
+        table: as for `follow`.
+        work: counts what it costs.
 
     Returns:
         A k_r that does as `low` and a greater one that does as `high`.

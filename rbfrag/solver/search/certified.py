@@ -70,7 +70,10 @@ class CertifiedMap:
         high: upper ends, shape (n,).
         verdict: SAFE, TOPPLES, UNKNOWN or ORDERLESS of `rbfrag.solver.search.march`, shape (n,).
         point: a k_r of an undecided interval whose block topples, or NaN, shape (n,).
+        reached: k_r down to which verdicts were given.
         complete: False when the step budget ended the search early.
+        runs: trajectories integrated.
+        steps: integration steps taken.
     """
 
     k_up: float

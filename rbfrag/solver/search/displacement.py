@@ -81,10 +81,12 @@ def critical_of(
     """Return the greatest k_y/PGA with which a block slides further than a distance.
 
     Args:
+        kind: name of the model, for the answer.
         blocks: the blocks, of which some displacements may be known.
         displacement_m: the distance on a level plane [m]; 0 for the strength that first moves.
         search_limit: least k_y/PGA looked at.
         tolerance: width of the bracket, k_y/PGA.
+        warnings: sentences about the motion.
     """
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")

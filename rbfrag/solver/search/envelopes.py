@@ -117,6 +117,7 @@ class Decision(NamedTuple):
 
     Args:
         verdict: ALL_SAFE, ALL_TOPPLE, SPLIT (none), NO_ORDER (D < 0 was met) or OPEN (go on).
+        split_at: a k_r to split at, or ANYWHERE.
     """
 
     verdict: int
@@ -140,8 +141,10 @@ def decide(
         k1: smallest k_r.
         k2: greatest k_r.
         margin: the bounding trajectories are integrated with k1 (1 - margin) and k2 (1 + margin).
+        check: check D >= 0 on the way.
         table: excursions from rest of a k_r <= k1.
         rest: node at which all blocks are at rest, and from which on the table counts.
+        work: counts what it costs.
     """
     n = excitation.q.size
     blocks = blocks_between(k1, k2, margin, check)

@@ -59,6 +59,7 @@ def follow(
     Args:
         kr: rocking acceleration coefficient.
         table: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
+        work: counts what it costs.
     """
     n = excitation.q.size
     # a block that is never lifted is as far from toppling as it is strong
@@ -100,6 +101,8 @@ def first_change(
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
         first: number of the first block to look at.
         topples: what the others do.
+        table: as for `follow`.
+        work: counts what it costs.
 
     Returns:
         The number, m where there is none.

@@ -122,6 +122,7 @@ def march(excitation: BlockExcitation, m: March, work: np.void) -> None:
 
     Args:
         m: the march; its state and its intervals are filled.
+        work: counts what it costs.
     """
     state, settings = m.state, m.settings
     begin_march(excitation, m, work)

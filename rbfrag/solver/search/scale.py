@@ -56,6 +56,7 @@ class ScaledRun:
     Args:
         scale: factor on the record.
         peak_rad: peak rotation [rad].
+        outcome: how the run ended.
         verdict: ``safe``; ``fails``; ``outside`` where the model ended first; ``undecided`` where
             the run is closer to its end than its error.
         sentence: what ended the model, empty where nothing did.
@@ -83,6 +84,7 @@ class ScaleSearch:
         starts: factor at which the block first moves; None for a record that never drives it.
         scale_limit: greatest factor that the answer covers: that of k/PGA = 0.01, or the last
             safe one before the model ended.
+        status: as of the answer.
         lower: lower end of the bracket of the scale (safe); None unless found.
         scale: upper end (fails); None unless found.
         ended: why the answer covers no more; empty if it goes on to k/PGA = 0.01.

@@ -110,6 +110,7 @@ def upper_bound(
         width: relative width to which K_up is bisected.
         check: check D >= 0; where it fails the answer is `top`.
         table: the excursion table, filled anew.
+        work: counts what it costs.
 
     Returns:
         NOTHING_FAILS (no excursion from rest at `bottom` topples), BORDER or AT_THE_TOP, and K_up.

@@ -40,6 +40,7 @@ def slump_at_rest(
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg].
+        functions: the functions for this kind of number.
         trigonometry: what has its ``sin``, ``cos`` and ``radians``: math, or numpy.
     """
     where, sin, cos = functions.where, trigonometry.sin, trigonometry.cos
@@ -96,6 +97,7 @@ def rocking_at_rest(
         half_s1_m: height of the centroid above the base, normal to it [m].
         inertia_m2: moment of inertia about the centroid per mass [m²].
         tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
 
     Returns:
         k_r about the toe and about the heel, at most 0 for a block that falls over it; p² of the

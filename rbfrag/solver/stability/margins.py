@@ -48,6 +48,7 @@ def margins(
     Args:
         limit_deg: angle of the resultant at which the base slides [deg]; phi_deg unless a
             bond helps.
+        back_fracture: whether there is a back plane.
         phi_for: the friction angle [deg] with which the base slides at a given angle of the
             resultant [deg].
     """

@@ -94,6 +94,7 @@ def yield_coefficient(
         sine: sin δ* up to a positive factor.
         cosine: cos δ* up to the same factor.
         tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
         bond: what the bond adds to the numerator, in the same scale.
 
     Returns:
@@ -134,6 +135,7 @@ def on_its_branch(k: N, ky: N, rises: object, functions: Elementwise[N]) -> N:
         k: yield acceleration coefficient of a mechanism with two contacts.
         ky: that of sliding, at which δ* = φ1.
         rises: whether δ* rises from φ1.
+        functions: the functions for this kind of number.
     """
     where = functions.where
     risen = where((k == -math.inf) | (ky == math.inf), math.inf, k)
@@ -154,6 +156,7 @@ def mode_code(
         limit: tan φ of the base, or with a cohesive bond the tangent of the angle of the
             resultant at which the base slides.
         confined: whether the back plane hinders a rotation about the toe (γ > 90°).
+        functions: the functions for this kind of number.
     """
     where = functions.where
     rotates = where(confined, CONFINED_TOPPLE, TOPPLE)
@@ -175,6 +178,7 @@ def mode_code_without_back(
     Args:
         limit: as in :func:`mode_code`.
         tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
     """
     where = functions.where
     backward = where(tan_beta < tan_alpha1, SLUMP, SLIDE)
@@ -215,6 +219,7 @@ def sliding_limit(
         weight: 1 + k_v.
         ky: yield acceleration coefficient of sliding, with the bond.
         bond: strength of the base's bond over the weight; without one the limit is `mu1`.
+        functions: the functions for this kind of number.
     """
     where = functions.where
     # weight and inertia at the yield, normal and along the base, each over cos β
@@ -246,6 +251,7 @@ def toe_lifts(
         tan_beta: tangent of the dip of the base.
         weight: 1 + k_v.
         bond: strength of the base's bond over the weight.
+        functions: the functions for this kind of number.
     """
     normal = (weight - k * tan_beta) / functions.sqrt(1.0 + tan_beta * tan_beta)
     pressed = normal * r_base + bond * pull
@@ -265,6 +271,7 @@ class Planes(Generic[N]):
         mu1: tangent of the friction angle of the base.
         mu2: tangent of the friction angle of the back plane.
         weight: 1 + k_v.
+        functions: the functions for this kind of number.
         bond: strength of the base's bond over the weight, c L/(ρ g A); None without cohesion.
     """
 

@@ -27,7 +27,6 @@ def kr_after_rotation(block: Block, theta_deg: N, *, beta_deg: float, kv: float 
     """Return k_r(θ) = (1 + k_v) tan(α3 - θ - β) of a block that has turned about its toe.
 
     Args:
-        block: the block.
         theta_deg: forward rotation, from 0 to 180 - γ, where the front face meets the base
             plane [deg]; scalar or array.
         beta_deg: dip of the base [deg].
@@ -154,6 +153,7 @@ class RotatedYield(NamedTuple):
     Args:
         yield_g: function of the block and θ [deg] like :func:`ks_after_rotation`.
         limit_deg: the greatest θ, by block and `back_follows` [deg].
+        end: what happens there.
     """
 
     yield_g: Callable[..., Any]

@@ -79,6 +79,7 @@ def coast(
     """Follow a moving block over whole intervals, up to one in which something may happen.
 
     Args:
+        record: the excitation.
         rules: those of the phase, whose equations are the same everywhere.
         table: coefficients of the equation of the present sense.
         conditions: :func:`fill_conditions` of that table.

@@ -49,7 +49,10 @@ class Crossing(NamedTuple):
     Args:
         kind: `PASSED`, or the event.
         condition: which condition failed, if it is `BROKEN`.
+        state: state of the block.
         peak: greatest x so far.
+        filled: columns of the history that are filled.
+        steps: integration steps.
     """
 
     kind: int
@@ -68,6 +71,7 @@ class Arrival(NamedTuple):
         kind: `PASSED`, or the event that cuts it short.
         condition: which condition failed, if it is `BROKEN`.
         tau: fraction of the step.
+        state: state of the block.
         turn_tau: where a block that nothing holds turns round on the way; -1 if it does not.
         turn_x: position there.
     """
@@ -100,8 +104,10 @@ def cross_interval(
         series: work array for the series of a step.
         tau: where in it the motion is.
         own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
+        state: state of the block.
         peak: greatest x so far.
-        filled: columns of the history that are filled.
+        history: as for the phase.
+        filled: columns of it that are filled.
     """
     # an equation that is the same everywhere is solved exactly by one step, whatever its length
     order, parts = rules.order, 1
@@ -166,6 +172,8 @@ def arrive(
         u: Taylor coefficients of U.
         order: degree of U.
         own: rate of the block's own time [1/s].
+        state: state at the start.
+        step: length and accelerations.
     """
     x_end = rotation(state.x, u, order, 1.0)
     leading = 0  # of the coefficients are zero

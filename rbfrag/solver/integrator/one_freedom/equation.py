@@ -33,6 +33,7 @@ class Condition:
         per_w: factor of the effective gravity 1 + k_v.
         per_rate2: factor of x'^2; it alone may hold a third harmonic.
         outcome: how the run ends where the condition fails.
+        sentence: what has happened then.
     """
 
     per_k_h: Harmonics
@@ -152,6 +153,7 @@ class Exit:
     Args:
         reason: why.
         time_s: when [s].
+        x: position.
         rest_max_q: greatest k_h/(1 + k_v) from here to the end of the record, rest included.
         rest_min_q: least of it.
     """
@@ -174,6 +176,8 @@ class Phase:
     Args:
         name: what the block does, for people.
         forward: the equation of growing x; of all motion where friction plays no part.
+        pose: where the block is at a position.
+        after: what follows where the phase is left.
         reverse: the equation of falling x; None where the block does not move in reverse.
         sticks: whether friction holds the block at a standstill. Where it does not, x turns
             freely, and `forward` governs both senses.

@@ -23,6 +23,7 @@ class Event(NamedTuple):
     """The first event of a step.
 
     Args:
+        kind: `PASSED`, `STANDSTILL`, `AT_HIGHEST` or `AT_LOWEST`.
         tau: where; 1 if nothing happens.
         x: position at the end of the step, or at the standstill in it.
         turn_tau: where a block that nothing holds turns round before it; -1 if it does not.
@@ -46,6 +47,7 @@ def find_event(
         u: Taylor coefficients of U.
         order: degree of U.
         leading: how many of the first of them are zero.
+        state: state at the start.
         x_end: position at the end of the whole step.
     """
     standstill = 0.0

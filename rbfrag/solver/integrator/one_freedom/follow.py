@@ -93,6 +93,7 @@ class MechanismRun:
     """What became of a mechanism under one excitation.
 
     Args:
+        outcome: how it ended.
         peak: greatest position.
         x: position at the end.
         rate: rate at the end; not zero where the model ended in motion.
@@ -104,8 +105,13 @@ class MechanismRun:
         certain_s: time from which nothing in the rest of the record turns the motion back,
             as far as k_h against the strength left says [s]; None unless it went on to the end.
         error: estimated bound on the error of the peak position.
+        steps: integration steps.
+        samples_moved: sample intervals that had to be integrated.
+        changes: changes of phase.
         sentences: what the answer takes for granted, and where it ends.
+        phase: the phase in which it ended.
         ending: the last of the sentences, how it ended; empty for none.
+        history: the motion in time, if it is kept.
     """
 
     outcome: Outcome
@@ -139,6 +145,8 @@ def follow(
     """Run a mechanism from rest under one excitation until nothing moves any more.
 
     Args:
+        excitation: accelerations at nodes.
+        history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.
         order: order of the method; for convergence studies.
         start: position in the first phase at which it rests, and the bound on its error.

@@ -66,6 +66,9 @@ def leave_rest(
     """Find where a block at rest starts to move.
 
     Args:
+        record: the excitation.
+        state: the state of the block, its rate 0.
+        place: where the rest begins.
         barred: sense in which the block has just come to a standstill, 0 for none. Its motion
             ended because the acceleration opposed it: to rounding it may still seem to have its
             sense, and is not resumed within the interval.

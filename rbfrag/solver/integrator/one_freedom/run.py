@@ -65,6 +65,9 @@ def run_phase(
     """Run one phase from where it is entered to where it ends.
 
     Args:
+        record: the excitation.
+        rules: what governs the motion.
+        work: work arrays of the kernels.
         history: shape (4, m), for time, x, x' and node (-1 between nodes); (4, 0) for none.
     """
     fill_uniform_conditions(rules, work)

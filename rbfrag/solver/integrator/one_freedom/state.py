@@ -83,7 +83,7 @@ class State(NamedTuple):
 
     Args:
         x: position.
-        rate: rate of the position [1/s].
+        rate: its rate [1/s].
         cos: cos x; 1 where the equation is the same everywhere, which x then does not enter.
         sin: sin x; 0 there.
         error_x: bound on the error of the position.
@@ -106,8 +106,10 @@ class Entry(NamedTuple):
     """Where and how a phase is entered, or was left: the end of one is the entry of the next.
 
     Args:
+        place: where in the record.
         free_s: time after the record [s].
-        rate: rate of the position [1/s].
+        x: position.
+        rate: its rate [1/s].
         error_x: bound on the error of the position.
         error_rate: bound on the error of the rate.
     """
@@ -146,13 +148,17 @@ class PhaseRun(NamedTuple):
     """What became of a phase; times are NaN where nothing happened.
 
     Args:
+        stop: why it ended.
         condition: which condition failed: 0 for the inertia, or the number of the contact from 1.
         time_s: when it ended [s].
         peak: greatest position.
         started_s: first motion [s].
         stopped_s: last standstill [s].
         certain_s: time from which nothing in the rest of the record turns the motion back [s].
+        steps: integration steps.
+        samples_moved: sample intervals in which the block moved.
         impacts: impacts at the lowest position that stopped the block.
+        history_length: columns of the history that are filled.
     """
 
     stop: int
@@ -256,6 +262,9 @@ def certain_since(
     of all that is to come exceeds the resistance where it is.
 
     Args:
+        since_s: the time so far, or NaN.
+        now_s: the present.
+        rate: rate of the block.
         driving: factor of k_h in the equation of forward motion.
         resistance: factor of 1 + k_v in it.
         least_q: least k_h/(1 + k_v) from now on.

@@ -114,6 +114,8 @@ def fill_step(table: FloatArray, series: FloatArray, order: int, state: State, s
         series: shape (8, order + 1); its first row is filled with those of U, the others with
             those of cos x, sin x, cos 2x, sin 2x, D, Q and U².
         order: degree of U.
+        state: state of the block at the start.
+        step: length and accelerations.
     """
     h, a0, da, w0, dw = step
     u = series[0]
@@ -251,6 +253,8 @@ def error_growth(
         u: Taylor coefficients of U.
         order: degree of U.
         own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
+        state: state at the start.
+        step: length and accelerations.
         tau: fraction of the step that is taken.
         x: position that it leads to.
     """

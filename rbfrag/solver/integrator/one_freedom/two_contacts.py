@@ -51,6 +51,8 @@ def two_contact_equation(
     """Return the equation of motion of a block on two contacts, with their conditions.
 
     Args:
+        base: the contact on the base plane.
+        back: the contact on the back plane.
         path: position of the centroid in the base frame [m].
         clockwise: whether the rotation is counted clockwise.
         inertia_m2: moment of inertia about the centroid per mass [m²].
