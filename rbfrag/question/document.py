@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from rbfrag.motions.recognise import MotionLike
 
 
+OF_EACH_MODEL = (
+    "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
+    "in_domain",
+)  # fmt: skip
+"""What a document has of the answer of each suited model."""
+
+
 def prediction_document(
     given: Mapping[str, ArrayLike],
     *,
@@ -74,12 +81,8 @@ def prediction_document(
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *recommended.warnings]
-    columns = (
-        "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
-        "in_domain",
-    )  # fmt: skip
     document["answers"] = [
-        {**{name: getattr(each, name) for name in columns}, "recommended": each is recommended}
+        {name: getattr(each, name) for name in OF_EACH_MODEL} | {"recommended": each is recommended}
         for each in others
     ]
     return document

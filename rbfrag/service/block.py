@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Query
 
 from rbfrag.errors import InputError
 from rbfrag.service.documents import BlockAnswer, DrawingAnswer
-from rbfrag.service.parameters import WAYS, BlockQuery, DrawingQuery, Shape
+from rbfrag.service.parameters import BlockQuery, DrawingQuery
 from rbfrag.service.problem import READ
 
 if TYPE_CHECKING:
@@ -30,9 +31,11 @@ def add_routes(routes: APIRouter) -> None:
 
         A block is described by height and width, by alpha1, alpha3 and r3, or by s1, s2 and gamma.
         """
-        from rbfrag.solver.stability.single import stability_as_dict
+        from rbfrag.question.blocks import on_planes
+        from rbfrag.solver.stability.single import stability, stability_as_dict
 
-        return stability_as_dict(*_on_planes(query))
+        shape = on_planes(query.given())
+        return stability_as_dict(shape.block, stability(shape.block, **shape.planes))
 
     @routes.get(
         "/v1/drawing",
@@ -49,7 +52,7 @@ def add_routes(routes: APIRouter) -> None:
         from rbfrag.plots.block import block_lines
         from rbfrag.solver.stability.single import rectangle_r3_m, stability_as_dict
 
-        body, result, kind, numbers = _drawn(query)
+        body, result, kind, numbers = _drawn(query.given())
         lines = block_lines(body, result)
         return {
             "kind": kind,
@@ -64,48 +67,49 @@ def add_routes(routes: APIRouter) -> None:
         }
 
 
-def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float] | None]:
+def _drawn(
+    given: Mapping[str, Any],
+) -> tuple[Block, Stability, str, Mapping[str, float] | None]:
     """Return a block, how it stands, the kind of its failure and what a prediction reads of it."""
-    from rbfrag.question.blocks import described_block
+    from rbfrag.question.blocks import one_block, shape_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
-    from rbfrag.solver.stability.single import level_rectangle, rough_deg, stability
+    from rbfrag.solver.stability.single import level_rectangle, stability
 
     def kind_of(result: Stability) -> str:
-        return kind_of_mode(result.mode, back_fracture=not query.no_back).kind
+        return kind_of_mode(result.mode, back_fracture=given.get("back_fracture", True)).kind
 
-    others = query.model_dump(exclude_defaults=True).keys() - {"p2", "kr", "no_back"}
-    if query.p2 is not None or query.kr is not None or not others:
+    numbers = {name: given[name] for name in ("p2", "kr") if name in given}
+    others = [name for name in given if name not in (*numbers, "back_fracture")]
+    if numbers or not others:
+        require(numbers, "p2", "kr")
         if others:
             raise InputError(
-                f"{min(others)} does not go with p2 and kr: a block is these two numbers, or a "
-                "shape with its beta and phi"
+                f"{others[0]} does not go with p2 and kr: a block is these two numbers, or a shape "
+                "with its dip and friction",
+                fields=(others[0],),
             )
-        _, numbers, _ = query.model_copy(update={"no_back": False}).toppling("p2", "kr")
-        body, result = level_rectangle(numbers["p2"], numbers["kr"])
+        body, result = level_rectangle(**numbers)
         return body, result, kind_of(result), numbers
-    described = query.described()
-    if described is None:
-        raise InputError(f"there is no block: describe it by {WAYS}")
-    body, conditions = described.block, dict(described.conditions)
-    if described.only_topples:
-        conditions["phi_deg"] = rough_deg(body)
-    result = stability(body, **conditions)
+    shape = shape_of(given)
+    assert shape is not None  # planes without one are refused
+    result = stability(shape.block, **shape.rough())
     kind = kind_of(result)
+    slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
     try:
-        slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
-        (group,) = described_block(described, slides, kind).groups
-        numbers = {n: value for n, value in group.numbers.items() if n != "displacement_m"}
-        return body, result, kind, numbers
+        (group,) = one_block({**given, **slides}, kind).groups
     except InputError:  # no earthquake decides about it, or no model answers
-        return body, result, kind, None
+        return shape.block, result, kind, None
+    read = {name: value for name, value in group.numbers.items() if name not in slides}
+    return shape.block, result, kind, read
 
 
-def _on_planes(query: Shape) -> tuple[Block, Stability]:
-    """Return the block that parameters describe, and its stability."""
-    from rbfrag.solver.stability.single import stability
+def require(numbers: Collection[str], *names: str) -> None:
+    """Refuse a block of which a number is missing."""
+    from rbfrag.question.shapes import OF_A_SHAPE, WAYS
 
-    described = query.described()
-    if described is None:
-        raise InputError(f"there is no block: describe it by {WAYS}")
-    body, conditions = described.on_planes()
-    return body, stability(body, **conditions)
+    for name in names:
+        if name not in numbers:
+            raise InputError(
+                f"{name} is missing: a block is given by {' and '.join(names)}, or by {WAYS}",
+                fields=OF_A_SHAPE,
+            )

@@ -1,10 +1,76 @@
-"""The answers as OpenAPI describes them; the packages below write them."""
+"""The answers as OpenAPI describes them: their keys have the types that the answers declare."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from functools import cached_property, reduce
+from inspect import getattr_static
+from operator import or_
+from types import SimpleNamespace, UnionType
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.fragility.prediction import Prediction
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.document import OF_EACH_MODEL
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.reports import STRENGTH_VALUES
+from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.stability.single import KEYS, Cohesion, Stability
+
+T = TypeVar("T", bound=BaseModel)
+
+_LISTS = {np.float64: list[float | None], np.bool_: list[bool], np.object_: list[str]}
+"""What JSON has for arrays of a type: NaN is null."""
+
+_NOT_LOADED = {"pd": SimpleNamespace(Index=Any)}
+"""What annotations name that a type checker alone imports."""
+
+
+def with_fields(definitions: dict[str, Any]) -> Callable[[type[T]], type[T]]:
+    """Return what gives a model fields, each a type and a default, beside those it states."""
+
+    def extended(model: type[T]) -> type[T]:
+        further = {
+            name: each for name, each in definitions.items() if name not in model.model_fields
+        }
+        # under its own name and module, so that other processes find it
+        return create_model(
+            model.__name__, __base__=model, __doc__=model.__doc__, __module__=model.__module__,
+            **further,
+        )  # fmt: skip
+
+    return extended
+
+
+def keys_of(*answers: type, names: Sequence[str] = ()) -> Callable[[type[T]], type[T]]:
+    """Return what gives a document the values of answers.
+
+    Args:
+        answers: dataclasses.
+        names: what it has of their fields and properties; all fields where none is named.
+    """
+    names = names or [each.name for answer in answers for each in fields(answer)]
+    types: dict[str, Any] = {}
+    for answer in answers:
+        types |= get_type_hints(answer, localns=_NOT_LOADED)
+        for name in names:
+            member = getattr_static(answer, name, None)
+            if isinstance(member, property | cached_property):
+                getter = member.fget if isinstance(member, property) else member.func
+                types[name] = get_type_hints(getter)["return"]
+    return with_fields({name: (_in_json(types[name]), ...) for name in names})
+
+
+def _in_json(of: Any) -> Any:
+    """Return the type that JSON has for a type with arrays in it."""
+    if get_origin(of) is UnionType:
+        return reduce(or_, map(_in_json, get_args(of)))
+    return _LISTS[get_args(get_args(of)[1])[0]] if get_origin(of) is np.ndarray else of
 
 
 class _Document(BaseModel):
@@ -25,26 +91,16 @@ class Problem(_Document):
     traces: list[str] | None = None
 
 
-class _Fitted(_Document):
-    model: str
-    term: str
-    method: str
-
-
-class ModelAnswer(_Fitted):
+@keys_of(Prediction, names=OF_EACH_MODEL)
+class ModelAnswer(_Document):
     """The answer of one model that the measures suffice for."""
 
-    probability: float
-    ci_low: float
-    ci_high: float
-    event_low: float | None
-    event_high: float | None
-    in_domain: bool
     recommended: bool
 
 
+@keys_of(Prediction)
 class PredictAnswer(_Document):
-    """Probability that one block fails: what `rbfrag predict --json` prints, in its order.
+    """Probability that one block fails: what `rbfrag predict --json` prints.
 
     `probability` is the share of such blocks that fail over all earthquakes and sites with these
     measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
@@ -53,91 +109,37 @@ class PredictAnswer(_Document):
     null where it is certain.
     """
 
-    kind: str
     mode: str
-    probability: float
-    ci_low: float
-    ci_high: float
-    event_low: float | None
-    event_high: float | None
-    level: float
-    model: str
-    term: str
-    method: str
-    failure: str
-    y_m_s: float | None
-    intensity_m_s: float
-    in_domain: bool
-    warnings: list[str]
-    pgv_over_pga_s: float | None
-    median_displacement_m: float | None
-    unknown_share: float | None
-    block_sd: float | None
-    data: str | None
     answers: list[ModelAnswer]
 
 
-class PredictArrays(_Fitted):
+OF_ARRAYS = (
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain",
+    "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
+)  # fmt: skip
+"""What is answered of many blocks."""
+
+
+@keys_of(PredictionArray, names=OF_ARRAYS)
+class PredictArrays(_Document):
     """Probabilities of many blocks or motions; null where the input cannot be used."""
 
-    probability: list[float | None]
-    ci_low: list[float | None]
-    ci_high: list[float | None]
-    event_low: list[float | None]
-    event_high: list[float | None]
-    block_sd: list[float | None] | None
-    in_domain: list[bool]
-    reason: list[str]
-    kind: str
-    kinds: list[str]
-    modes: list[str]
-    level: float
-    data: str | None
-    warnings: list[str]
 
-
-class Margin(_Document):
-    """By how much an angle may change before another mode governs."""
-
-    variable: str
-    change_deg: float
-    mode: str
-
-
-class Cohesion(_Document):
+@keys_of(Cohesion)
+class CohesionAnswer(_Document):
     """What cohesion of the base adds."""
 
-    ratio: float
     ky: float | None
-    phi_equivalent_deg: float | None
     ky_equivalent: float | None
 
 
+@keys_of(Stability, Block, names=KEYS)
 class BlockAnswer(_Document):
     """How a block fails: what `rbfrag block --json` prints; null where it does not apply."""
 
-    mode: str
-    state: str
-    p2: float
-    kr: float | None
     ky: float | None
-    ks: float | None
-    kct: float | None
     yield_acceleration: float | None
-    alpha1_deg: float | None
-    alpha3_deg: float | None
-    gamma_deg: float | None
-    r1_m: float | None
-    r2_m: float | None
-    r3_m: float | None
-    s1_m: float | None
-    s2_m: float | None
-    area_m2: float
-    shape_factor: float
-    delta_deg: float | None
-    margins: list[Margin]
-    cohesion: Cohesion | None
-    warnings: list[str]
+    cohesion: CohesionAnswer | None
 
 
 class DrawingAnswer(_Document):
@@ -159,6 +161,7 @@ class DrawingAnswer(_Document):
     resultant_m: Pair
 
 
+@keys_of(ModelRow, names=("name", "kind", "term", "method", "is_default", "created"))
 class ModelListed(_Document):
     """A stored model: what `rbfrag models list --json` prints.
 
@@ -167,17 +170,11 @@ class ModelListed(_Document):
     motion by a millionth changes; null of kinds of which that is not asked.
     """
 
-    name: str
-    kind: str
-    term: str
-    method: str
-    is_default: bool
     n: int | None
     log_loss: float | None
     events: int | None
     sensitive_share: float | None
     domain: dict[str, Pair]
-    created: str
 
 
 class Health(_Document):
@@ -207,27 +204,10 @@ class MapRow(_Document):
     outcome: str
 
 
+@keys_of(CriticalResult, names=(*STRENGTH_VALUES, "polarity", "pga_g", "warnings"))
 class CriticalAnswer(_Document):
     """The largest k_r/PGA that topples: what `rbfrag critical --json` prints."""
 
-    kr_over_pga: float | None
-    lower: float | None
-    upper: float | None
-    kr: float | None
-    y_m_s: float | None
-    status: str
-    search_limit: float
-    certified: bool
-    k_up_over_pga: float | None
-    undecided: float | None
-    island_width: float | None
-    kr_over_pga_resolved: float | None
-    reentrant: bool | None
-    n_runs: int
-    p2: float
-    polarity: str
-    pga_g: float
-    warnings: list[str]
     map: list[MapRow] | None = None
 
 
@@ -267,9 +247,12 @@ class SiteRate(_Document):
     probability: float
 
 
-class HazardAnswer(_Fitted):
+class HazardAnswer(_Document):
     """Annual rates of toppling [1/a]: what `rbfrag hazard --json` prints."""
 
+    model: str
+    term: str
+    method: str
     years: float
     level: float
     imt: str

@@ -12,8 +12,6 @@ from reprlib import Repr
 from typing import Any
 
 from fastapi import Request, Response
-from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
@@ -121,9 +119,6 @@ def answer_error(request: Request, error: Exception, settings: Settings) -> Resp
         error: what was raised.
         settings: those of the service; the place of its database is left out of the words.
     """
-    if isinstance(error, RequestValidationError):
-        fields = _fields_of_query(request)
-        error = refusal(fields, [{**each, "loc": each["loc"][1:]} for each in error.errors()])
     if isinstance(error, RequestRefusedError):
         return problem(error.status_code, error.kind, error.detail, error.headers)
     if isinstance(error, HTTPException):
@@ -206,13 +201,6 @@ def refusal(
     return InputError(_sentence(name + indices, worst, fields[name].description or ""))
 
 
-def _fields_of_query(request: Request) -> Mapping[str, FieldInfo]:
-    """Return the fields of the model of a request's query, by name."""
-    (parameter,) = request.scope["route"].dependant.query_params
-    model: type[BaseModel] = parameter.field_info.annotation
-    return model.model_fields
-
-
 _NO_NUMBER = "{name} = {shown} is not a number: {words}"
 _SENTENCES = {
     "missing": "{name} is missing: {words}",
@@ -228,7 +216,6 @@ _SENTENCES = {
     "string_pattern_mismatch": "{name} = {shown} is not a list of numbers such as 30,10,3,1",
     "greater_than": "{name} = {plain} is not above {gt:g}: {words}",
     "greater_than_equal": "{name} = {plain} is below {ge:g}: {words}",
-    "less_than": "{name} = {plain} is not below {lt:g}: {words}",
     "finite_number": "{name} = {plain} is not a finite number: {words}",
     "too_large": "{name} is too large for a number",
 }

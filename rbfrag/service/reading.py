@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
@@ -162,26 +162,8 @@ def json_of(body: bytes) -> Any:
         raise MalformedError(f"the body is not JSON: {error}") from None
 
 
-class BoundedRoute(APIRoute):
-    """A route whose body is read in bounds, and whose parameters are given once."""
-
-    def get_route_handler(self) -> Handler:
-        """Return what answers a request."""
-        handler = super().get_route_handler()
-
-        async def bounded(request: Request) -> Response:
-            query_of(request)
-            if request.method != "POST":
-                return await handler(request)
-            bodies: Bodies = request.app.state.bodies
-            async with bodies.read(request) as read:
-                return await handler(read)
-
-        return bounded
-
-
 class QueryRoute(APIRoute):
-    """A route that is asked by the model of a query alone, which pydantic reads at once.
+    """A route whose query one model reads, each parameter given once, and its body in bounds.
 
     FastAPI inspects every field of such a model anew for each request: with the names of
     `/v1/predict` that takes longer than all the rest of the answer (docs/evidence/performance.md).
@@ -189,18 +171,39 @@ class QueryRoute(APIRoute):
 
     def get_route_handler(self) -> Handler:
         """Return what answers a request."""
-        (parameter,) = self.dependant.query_params
-        model: type[BaseModel] = parameter.field_info.annotation  # type: ignore[assignment]
+        models: list[Any] = [each.field_info.annotation for each in self.dependant.query_params]
+        model: type[BaseModel] | None = models[0] if models else None
 
         async def answer(request: Request) -> Response:
-            try:
-                query = model.model_validate(query_of(request))
-            except ValidationError as error:
-                raise refusal(model.model_fields, error.errors()) from None
-            document: BaseModel = await self.endpoint(query)
-            return Response(document.model_dump_json(), media_type="application/json")
+            values = query_of(request)
+            given: dict[str, Any] = {}
+            if model is not None:
+                try:
+                    given["query"] = model.model_validate(values)
+                except ValidationError as error:
+                    raise refusal(model.model_fields, error.errors()) from None
+            if request.method != "POST":
+                document = await self.endpoint(**given)
+                return document if isinstance(document, Response) else json_answer(document)
+            bodies: Bodies = request.app.state.bodies
+            async with bodies.read(request) as read:
+                return json_answer(await self.endpoint(read, **given))
 
         return answer
+
+
+def json_answer(answer: object) -> Response:
+    """Return a document, or JSON that is written already, as the answer to a request."""
+    text = answer if isinstance(answer, bytes) else json_text(answer)
+    return Response(text, media_type="application/json")
+
+
+_WRITER: TypeAdapter[Any] = TypeAdapter(Any)
+
+
+def json_text(document: object) -> bytes:
+    """Return a document as JSON; NaN is null."""
+    return _WRITER.dump_json(document)
 
 
 def query_of(request: Request) -> dict[str, str]:

@@ -83,7 +83,8 @@ def listener(host: str, port: int) -> socket.socket:
     except OSError as error:
         reason = (error.strerror or str(error)).partition(" (")[0]
         raise InputError(
-            f"--host {host} --port {port}: {reason}: choose another port or address"
+            f"host {host} port {port}: {reason}: choose another address",
+            fields=("host", "port"),
         ) from None
     listening.set_inheritable(True)
     # Head and body of an answer leave in two packets, and the connections inherit this: without it

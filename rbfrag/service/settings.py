@@ -53,24 +53,28 @@ class Settings:
         token = read_token(self.token_file)
         if token is None and not is_loopback(self.host):
             raise InputError(
-                f"--host {self.host}: other computers can ask there, so the service needs a token: "
+                f"host {self.host}: other computers can ask there, so the service needs a token: "
                 f"put one into the environment variable {VARIABLE}, or into a file named by "
-                "--token-file"
+                "token_file",
+                fields=("host", "token_file"),
             )
         if self.workers < 1:
-            raise InputError(f"--workers {self.workers}: at least one process answers")
+            raise _refused("workers", self.workers, "at least one process answers")
         if not 0 <= self.port <= 65535:
-            raise InputError(f"--port {self.port}: a port is a number from 0 to 65535")
+            raise _refused("port", self.port, "give a number from 0 to 65535")
         for name in ("body_limit_mb", "body_time", "row_limit", "time_limit", "jobs"):
             value = getattr(self, name)
             if not 0.0 < value < float("inf"):
-                option = name.replace("_", "-")
-                raise InputError(f"--{option} {value:g}: give a number above zero")
+                raise _refused(name, f"{value:g}", "give a number above zero")
         hosts = tuple(self.allow_host)
         if token is None:
             # else a web page could ask by a name of its own that leads to this computer
             hosts = ("localhost", "127.0.0.1", "[::1]", self.host, *hosts)
         return replace(self, token=token, allow_host=hosts, early=True)
+
+
+def _refused(field: str, value: object, why: str) -> InputError:
+    return InputError(f"{field} {value}: {why}", fields=(field,))
 
 
 VARIABLE = "RBFRAG_TOKEN"
@@ -95,7 +99,7 @@ def read_token(file: str | None) -> str | None:
             token = Path(file).read_text(encoding="ascii").strip()
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not ASCII text"
-            raise InputError(f"--token-file {file}: cannot be read: {reason}") from None
+            raise _refused("token_file", file, f"cannot be read: {reason}") from None
     if not _TOKEN.fullmatch(token):
         raise InputError(
             f"the token in {source} is not 16 to 512 letters, digits or any of ._~+/=-: make one "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Request
 
 from rbfrag.service import work
 from rbfrag.service.documents import CriticalAnswer, HazardAnswer, RockmassAnswer, SpectrumAnswer
@@ -13,7 +13,7 @@ from rbfrag.service.parameters import CriticalQuery, HazardQuery, RockmassQuery,
 from rbfrag.service.problem import SENT, RequestRefusedError
 from rbfrag.service.reading import FILE_FORM, MULTIPART, media_type, sent_as, sent_file
 from rbfrag.service.settings import Settings
-from rbfrag.service.work import WorkerPool, json_answer
+from rbfrag.service.work import WorkerPool
 
 CURVE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,0.0001\n"
 """A made-up hazard curve."""
@@ -69,11 +69,11 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         responses=SENT,
         openapi_extra=_ACCELEROGRAM,
     )
-    async def spectrum(request: Request, query: Annotated[SpectrumQuery, Query()]) -> Response:
+    async def spectrum(request: Request, query: Annotated[SpectrumQuery, Query()]) -> bytes:
         """Return what `rbfrag spectrum --json` prints: one object, or two in a list for both."""
         query.sizes()
         body = await sent_file(request)
-        return json_answer(await pool.run(request, work.spectrum, body, query))
+        return await pool.run(request, work.spectrum, body, query)
 
     @routes.post(
         "/v1/critical",
@@ -82,13 +82,13 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         responses=SENT,
         openapi_extra=_ACCELEROGRAM,
     )
-    async def critical(request: Request, query: Annotated[CriticalQuery, Query()]) -> Response:
+    async def critical(request: Request, query: Annotated[CriticalQuery, Query()]) -> bytes:
         """Return what `rbfrag critical --json` prints.
 
         The certified search of a long record may need more time than one request is given.
         """
         body = await sent_file(request)
-        return json_answer(await pool.run(request, work.critical, body, query))
+        return await pool.run(request, work.critical, body, query)
 
     @routes.post(
         "/v1/hazard",
@@ -103,14 +103,14 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
             }
         ),
     )
-    async def hazard(request: Request, query: Annotated[HazardQuery, Query()]) -> Response:
+    async def hazard(request: Request, query: Annotated[HazardQuery, Query()]) -> bytes:
         """Return what `rbfrag hazard --json` prints for one block and the curve that is sent.
 
         A curve is OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header names their
         units.
         """
         body = await sent_file(request)
-        return json_answer(await pool.run(request, work.hazard, body, query, settings.db))
+        return await pool.run(request, work.hazard, body, query, settings.db)
 
     @routes.post(
         "/v1/rockmass",
@@ -126,7 +126,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
             }
         ),
     )
-    async def rockmass(request: Request, query: Annotated[RockmassQuery, Query()]) -> Response:
+    async def rockmass(request: Request, query: Annotated[RockmassQuery, Query()]) -> bytes:
         """Return what `rbfrag rockmass --json` prints for a rock mass file.
 
         It is TOML, its tables as JSON, or CSV. With a measure of the motion, the probability of
@@ -140,4 +140,4 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
                 f"a rock mass comes as {', '.join(_FORMS)}: say which by the header Content-Type",
             )
         given = await request.body(), form, query, settings.row_limit, settings.db
-        return json_answer(await pool.run(request, work.rock_mass, *given))
+        return await pool.run(request, work.rock_mass, *given)

@@ -12,15 +12,14 @@ import signal
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from fastapi import Request, Response
+from fastapi import Request
 from pebble import ProcessExpired, ProcessPool
 
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.files import unique_keys
+from rbfrag.service.block import require
 from rbfrag.service.parameters import (
-    MEASURES,
-    WAYS,
     CriticalQuery,
     HazardQuery,
     Reading,
@@ -34,6 +33,7 @@ from rbfrag.service.problem import (
     RequestRefusedError,
     SeveralTracesError,
 )
+from rbfrag.service.reading import json_text
 from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
@@ -50,23 +50,10 @@ EXAMPLE = "time_s,acceleration_g\n" + "".join(
 """A made-up accelerogram, short enough for the documentation."""
 
 
-_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-
-
-def json_text(document: object) -> bytes:
-    """Return a document as JSON."""
-    return _ENCODER.encode(document).encode("utf-8")
-
-
-def json_answer(text: bytes) -> Response:
-    """Return JSON that is written already as the answer to a request."""
-    return Response(text, media_type="application/json")
-
-
 def warm_up() -> None:
     """Load or compile the kernels, so that no request waits for that or is ended for it."""
     spectrum(EXAMPLE.encode(), SpectrumQuery())
-    critical(EXAMPLE.encode(), CriticalQuery(p2=3.0))
+    critical(EXAMPLE.encode(), CriticalQuery.model_validate({"p2": 3.0}))
 
 
 def rock_mass(
@@ -94,16 +81,14 @@ def rock_mass(
             f"{wanted} realisations are more than the {row_limit} of one request: ask for fewer "
             "with n"
         )
-    measures, model, level = query.given(MEASURES), query.model, query.level
-    if not measures and not (model is None and level is None):
+    measures, how = query.question()
+    if how and not measures:
         raise InputError(
-            f"{'level' if model is None else 'model'} goes with a measure of the motion: give "
-            "pgv, pga or sa10_g, or pgd and tm, too"
+            f"{next(iter(how))} goes with a measure of the motion: give pgv, pga or sa10_g, or pgd "
+            "and tm, too"
         )
     realisations = described.realise(query.n, query.seed)
-    answer = None
-    if measures:
-        answer = scenario(realisations, measures, model=model, level=level or 0.95, db=db)
+    answer = scenario(realisations, measures, **how, db=db) if measures else None
     return json_text(
         as_dict(realisations, mode_counts(realisations), crossings(realisations), answer)
     )
@@ -130,13 +115,15 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical --json` prints."""
     from rbfrag.fragility.methods import TOPPLING_BLOCK
+    from rbfrag.question.blocks import one_block
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
-    p2 = query.toppling("p2", kind=TOPPLING_BLOCK.kind)[1]["p2"]
+    (group,) = one_block(query.given(), TOPPLING_BLOCK.kind).groups
+    require(group.numbers, "p2")
     result = search(
         _motion(body, query),
-        p2=p2,
+        p2=group.numbers["p2"],
         polarity="reverse" if query.reverse else "forward",
         full_map=query.map,
     )
@@ -149,19 +136,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
-    from rbfrag.question.blocks import missing_number
-    from rbfrag.question.fields import parameter_of
-    from rbfrag.question.question import described
 
-    others = {"restitution": "restitution", "displacement": "displacement_m"}
-    blocks = described({**query.block_fields(), **query.given(others)}, query.kind)
-    (group,) = blocks.groups
-    if (missing := missing_number(group.numbers, group.kind)) is not None:
-        raise InputError(
-            f"{parameter_of(missing[0])} is missing: a block is given by "
-            f"{' and '.join(map(parameter_of, missing[1]))}, or by {WAYS}"
-        )
-    known: dict[str, Any] = {**group.numbers, "kind": group.kind}
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
     except RecursionError:
@@ -171,11 +146,11 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         curves,
         converted_period_s=None if convert is None else convert.period_s,
     )
-    chosen = query.model_dump(
-        include={"years", "level", "convert", "convert_sigma", "component", "model"}
+    keywords = query.given() | query.model_dump(
+        include={"years", "convert", "convert_sigma", "component"}
     )
-    rates = [answer(curve, **known, **chosen, db=db) for curve in curves]
-    return json_text(as_dict(curves, [[None]] * len(curves), rates, blocks.remarks))
+    rates = [answer(curve, **keywords, db=db) for curve in curves]
+    return json_text(as_dict(curves, [[None]] * len(curves), rates))
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:

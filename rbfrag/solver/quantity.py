@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import is_dataclass
+from typing import Any
 
 from rbfrag.errors import InputError
 
@@ -24,7 +26,7 @@ def number(value: object, name: str, what: str) -> float:
 
 def positive(value: object, name: str, unit: str) -> float:
     """Return a finite number above zero as a float, or refuse it."""
-    what = f"a number above 0 [{unit}]"
+    what = f"a number above 0 [{unit}]" if unit else "a number above 0"
     result = number(value, name, what)
     if result <= 0.0:
         raise InputError(f"{name} = {result:g} is not above zero: give {what}")
@@ -72,3 +74,14 @@ def vertical_g(value: object) -> float:
 def finite_or_none(value: float | None) -> float | None:
     """Return a number, or None where there is none: kernels and formulas say NaN or infinity."""
     return value if value is not None and math.isfinite(value) else None
+
+
+def json_value(value: Any) -> Any:
+    """Return a value of an answer as JSON knows it: infinities and NaN are None."""
+    if isinstance(value, float):
+        return finite_or_none(value)
+    if isinstance(value, tuple):
+        return [json_value(each) for each in value]
+    if is_dataclass(value):
+        return {name: json_value(each) for name, each in vars(value).items()}
+    return value

@@ -90,7 +90,7 @@ def test_a_list_says_which_element_cannot_be_used(client):
     [
         ("p2=3&kr=0.1", "nothing about the motion is given"),
         ("p2=3&pgv=0.6", "kr is missing"),
-        ("ky=0.1&pgv=0.6", "displacement_m is missing"),
+        ("ky=0.1&pgv=0.6", "displacement is missing"),
         ("p2=3&kr=0.1&ky=0.1&pgv=0.6", "ky does not go with kind toppling"),
         ("p2=3&kr=0.1&kind=falls&pgv=0.6", "no falls model"),
         ("p2=3&kr=0&pgv=0.6", "kr = 0"),

@@ -148,7 +148,7 @@ def test_requests_are_counted_by_operation_and_not_by_what_is_asked_for(guarded)
 def test_an_address_that_somebody_listens_at_is_refused():
     with listener("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(InputError, match=f"--port {port}: .* choose another"):
+        with pytest.raises(InputError, match=f"port {port}: .* choose another"):
             listener("127.0.0.1", port)
-    with pytest.raises(InputError, match=r"--host no\.such\.host\.invalid"):
+    with pytest.raises(InputError, match=r"host no\.such\.host\.invalid"):
         listener("no.such.host.invalid", 0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,8 +14,8 @@ from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.quantity import (
     angle,
-    finite_or_none,
     friction_angle,
+    json_value,
     not_negative,
     positive,
     vertical_g,
@@ -36,8 +36,6 @@ from rbfrag.solver.stability.modes import (
     state_code,
     yield_coefficient,
 )
-
-YIELDS = ("kr", "ky", "ks", "kct", "yield_acceleration")
 
 
 @dataclass(frozen=True)
@@ -262,22 +260,18 @@ def rough_deg(block: Block) -> float:
     return 0.5 * (block.alpha3_deg + 90.0)
 
 
+KEYS = (
+    "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
+    "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
+    "delta_deg", "margins", "cohesion", "warnings",
+)  # fmt: skip
+"""What the JSON contract has of a stability and of its block."""
+
+
 def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract.
 
     A yield acceleration that no number expresses is None; the state says why.
     """
-    own = ("alpha1_deg", "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m",
-           "area_m2", "shape_factor")  # fmt: skip
-    bond = None if stability.cohesion is None else asdict(stability.cohesion)
-    return {
-        "mode": stability.mode,
-        "state": stability.state,
-        "p2": block.p2,
-        **{name: finite_or_none(getattr(stability, name)) for name in YIELDS},
-        **{name: getattr(block, name) for name in own},
-        "delta_deg": stability.delta_deg,
-        "margins": [asdict(margin) for margin in stability.margins],
-        "cohesion": bond and {name: finite_or_none(value) for name, value in bond.items()},
-        "warnings": list(stability.warnings),
-    }
+    own = Stability.__annotations__
+    return {name: json_value(getattr(stability if name in own else block, name)) for name in KEYS}

@@ -76,10 +76,10 @@ def test_an_extrapolation_is_said_and_its_reasons_are_the_services(open_page, as
     ("field", "text", "words"),
     [
         ("pgv", "abc", "pgv = 'abc' is not a number"),
-        ("kr", "-0.1", "kr = -0.1 is not above 0"),
+        ("kr", "-0.1", "kr = -0.1 is not above zero"),
         ("p2", "", "p2 is missing"),
         ("level", "2", "level"),
-        ("pgv", "-1", "pgv = -1 is below 0"),
+        ("pgv", "-1", "pgv = -1 m/s is negative"),
     ],
 )
 def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
