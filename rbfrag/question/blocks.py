@@ -34,6 +34,7 @@ from rbfrag.question.shapes import (
     OF_A_SHAPE,
     PLANES,
     SHAPES,
+    SIDES_AND_PLANES,
     WAYS,
     Judged,
     check_ranges,
@@ -262,7 +263,7 @@ def on_planes(given: Mapping[str, Any]) -> Shape:
     """
     shape = shape_of(given)
     if shape is None:
-        raise InputError(f"no block: describe it by {WAYS}", fields=OF_A_SHAPE)
+        raise InputError(f"no block: describe it by {WAYS}", fields=SIDES_AND_PLANES)
     return shape.known()
 
 
@@ -347,7 +348,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         raise InputError(
             f"{numbers[0]} does not go with {(shape_among(given) or ('a shape',))[0]}: a block is "
             "described once",
-            fields=(numbers[0], *OF_A_SHAPE),
+            fields=(numbers[0], *SIDES_AND_PLANES),
         )
     others = {name: value for name, value in given.items() if name not in IS_SHAPE}
     displacement_m = others.pop("displacement_m", None)

@@ -167,7 +167,7 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     if not begun:
         if planes := [name for name in PLANES_OF_A_SHAPE if name in given]:
             raise InputError(
-                f"{planes[0]} goes with the shape of a block, by {WAYS}", fields=OF_A_SHAPE
+                f"{planes[0]} goes with the shape of a block, by {WAYS}", fields=SIDES_AND_PLANES
             )
         return None
     first = begun[0]
@@ -175,7 +175,7 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
         one, other = (next(name for name in names if name in given) for names in begun[:2])
         raise InputError(
             f"{other} does not go with {one}: a block is described once, by {WAYS}",
-            fields=OF_A_SHAPE,
+            fields=SIDES_AND_PLANES,
         )
     if missing := [name for name in first if name not in given]:
         raise InputError(
@@ -188,7 +188,9 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
 PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", "cohesion_pa", "density_kg_m3")
 """Fields that describe a block only beside its shape; the dip stands with numbers too."""
 
-OF_A_SHAPE = ("block", *(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
+SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
+
+OF_A_SHAPE = ("block", *SIDES_AND_PLANES)
 """Fields that describe a block by its shape and its planes."""
 
 IS_PLANE = frozenset({"beta_deg", *PLANES_OF_A_SHAPE})

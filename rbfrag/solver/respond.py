@@ -104,10 +104,15 @@ def respond(
     if block is not None:
         for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
             if value is not None:
-                raise InputError(f"{name} does not go with a block, which is given by its shape")
+                raise InputError(
+                    f"{name} does not go with a block that is given by its shape", fields=(name,)
+                )
         if beta_deg is None or (phi_deg is None and not free_standing):
             name = "beta_deg" if beta_deg is None else "phi_deg"
-            raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+            raise InputError(
+                f"{name} is missing: the mode of a block depends on dip and friction",
+                fields=(name,),
+            )
         rough_deg = 0.5 * (90.0 + max(block.alpha1_deg, block.alpha3_deg, 0.0))  # it does not slip
         judged = stability(
             block,
@@ -148,19 +153,30 @@ def known_by_numbers(
     given = {name: value for name, value in numbers.items() if value is not None}
     if "ky" in given:
         if "p2" in given or "kr" in given:
-            raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
+            raise InputError(
+                "ky belongs to sliding, p2 and kr to toppling: give one or the other",
+                fields=("ky", "p2", "kr"),
+            )
         if extra := [name for name in given if name not in ("ky", "beta_deg")]:
-            raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
+            raise InputError(
+                f"{extra[0]} does not go with ky: it follows from ky and beta_deg",
+                fields=(extra[0], "ky", "beta_deg"),
+            )
         model = _by_numbers(kind, "slide", ("ky",))
         beta_deg = given.get("beta_deg", 0.0)
         return model, _sliding_site(given["ky"], beta_deg, _known(model, settings))
     for name in ("p2", "kr"):
         if name not in given:
             raise InputError(
-                f"{name} is missing: give p2 and kr, or ky, or a block with beta_deg and phi_deg"
+                f"{name} is missing: give p2 and kr, or ky, or the shape of a block with beta_deg "
+                "and phi_deg",
+                fields=("p2", "kr", "ky", "beta_deg", "phi_deg"),
             )
     if extra := [name for name in given if name not in ("p2", "kr")]:
-        raise InputError(f"{extra[0]} does not go with p2 and kr, which say all about the block")
+        raise InputError(
+            f"{extra[0]} does not go with p2 and kr, which say all about the block",
+            fields=(extra[0], "p2", "kr"),
+        )
     model = _by_numbers(kind, "topple", ("p2", "kr"))
     return model, block_of_numbers(given["p2"], given["kr"], _known(model, settings))
 
@@ -262,7 +278,8 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     if not set(numbers) <= {*model.parameters}:
         raise InputError(
             f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
-            f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}"
+            f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}",
+            fields=(*numbers, "beta_deg", "phi_deg"),
         )
     return model
 
@@ -274,7 +291,8 @@ def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
         understood = " and ".join(model.settings) or "no such option"
         raise InputError(
             f"{unknown[0]} does not go with {model.kind}, the model of this block, which knows "
-            f"{understood}"
+            f"{understood}",
+            fields=(unknown[0],),
         )
     return given
 

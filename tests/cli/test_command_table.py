@@ -21,7 +21,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.refusals import CONFLICTS, NEEDS, refuse
 from rbfrag.cli.parameters.stack import stacked
 from rbfrag.errors import InputError
-from rbfrag.question.fields import BlockFields, Field, _by_word, declared, option_of
+from rbfrag.question.fields import option_of
 
 COMMAND_FOLDER = Path(__file__).parents[2] / "rbfrag" / "cli" / "commands"
 MODULES = [import_module(f"rbfrag.cli.commands.{name}") for name in COMMANDS]
@@ -103,27 +103,6 @@ def test_a_command_gets_the_object_and_the_shell_its_fields(
     assert "--two" in run(made, ["--help"]).stdout
 
 
-def test_a_field_that_is_declared_is_an_option_wherever_fields_of_its_class_are(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    about = Field("Share of the base that rests on something", "%", least=0.0)
-    monkeypatch.setitem(BlockFields.__annotations__, "rest_percent", Annotated[float, about])
-    declared.cache_clear()
-    _by_word.cache_clear()
-    try:
-        for command in ("predict", "survival"):
-            text = CliRunner().invoke(app, [command, "--help"]).stdout
-            assert "--rest-percent <float>" in text
-            assert "Share of the base that rests on something" in text
-        result = CliRunner().invoke(app, ["predict", "--rest-percent", "x"])
-        assert "'x' cannot be used: give a number" in result.stderr
-    finally:
-        monkeypatch.undo()
-        declared.cache_clear()
-        _by_word.cache_clear()
-    assert "--rest-percent" not in CliRunner().invoke(app, ["predict", "--help"]).stdout
-
-
 def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> None:
     made = typer.Typer(add_completion=False)
 
@@ -144,8 +123,8 @@ def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> N
 
 def test_the_table_refuses_by_what_is_given_and_known() -> None:
     refuse("any", ["--p2", "--kr"], ["--p2", "--kr", "--motion", "--vertical"])
-    with pytest.raises(InputError, match=r"--height does not go with --p2: a block is described"):
-        refuse("any", ["--p2", "--height"], ["--p2", "--height"])
+    with pytest.raises(InputError, match=r"--block does not go with --p2: a block is described"):
+        refuse("any", ["--p2", "--block"], ["--p2", "--block"])
     with pytest.raises(InputError, match=r"--vertical goes with --motion: name the accelerogram"):
         refuse("any", ["--vertical"], ["--motion", "--vertical"])
     refuse("respond", ["--vertical"], ["--vertical"])  # its motion is an argument

@@ -57,7 +57,7 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--kind", "slumping"), "--block is missing"),
+        (("--kind", "slumping"), "no block: its shape, dip and friction decide about slumping"),
         (("--kind", "sliding", "--p2", "3"), "--p2 goes with --kind toppling"),
         (("--rotation", "3"), "--rotation goes with --kind confined_toppling and slumping"),
         (("--kind", "falling"), "use one of confined_toppling, rocking, sliding"),

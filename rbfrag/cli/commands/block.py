@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Annotated
 
 from rbfrag.cli.output import (
     check_files,
@@ -13,10 +14,10 @@ from rbfrag.cli.output import (
     write_table,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, MeshOptions, ShapeOptions
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.block import MeshOptions
+from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import block_in_words
-from rbfrag.errors import InputError
+from rbfrag.question.fields import AtRestFields, PlaneFields, ShapeFields, WholeFields
 from rbfrag.solver.stability.modes import ModeName
 
 FREE_STANDING = (
@@ -34,11 +35,10 @@ SHORT = ("mode", "p2", "kr", "ky", "ks", "kct", "alpha1_deg", "alpha3_deg", "gam
 @stacked
 def block(
     *,
-    shape: ShapeOptions,
+    given: Annotated[
+        Given, fields_of(ShapeFields, PlaneFields, WholeFields, AtRestFields, without=("kind",))
+    ],
     mesh: MeshOptions,
-    cohesion: float | None = option("Cohesion of the base [Pa], with --density."),
-    density: float | None = option("Density of the rock [kg/m3]."),
-    kv: float | None = option("Vertical acceleration of the ground, up positive [g]."),
     plot: str | None = option(
         "Draw the block on its planes with its contacts and the resultant at yield, or the "
         "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)."
@@ -69,22 +69,15 @@ def block(
             print(f"predict --blocks {written}  with a measure of the motion, as --pgv 0.6")
         return
     if mesh.mesh is not None:
-        _mesh(mesh.mesh, mesh, density, plot, json=printing.json)
+        _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, json=printing.json)
         return
+    from rbfrag.question.blocks import on_planes
     from rbfrag.solver.stability.single import stability, stability_as_dict
 
-    described = shape.described(cohesion_pa=cohesion, density_kg_m3=density, kv=kv)
-    if described is None:
-        raise InputError(f"no block: describe it by {WAYS}, or by --mesh FILE")
-    free = described.conditions.get("back_fracture") is False
-    if free and described.only_topples:
-        raise InputError(
-            f"--phi is missing: the mode of a block depends on it. A rectangle that stands free "
-            f"needs none: {FREE_STANDING}"
-        )
-    body, conditions = described.on_planes()
-    result = stability(body, **conditions)
-    if free and _rocks(result.mode):
+    with given.named():
+        body, planes, *_ = on_planes(given)
+    result = stability(body, **planes)
+    if planes.get("back_fracture") is False and _rocks(result.mode):
         result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))
     if plot is not None:
         from rbfrag.plots.block import plot_block

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rbfrag.cli.output import (
     check_files,
@@ -14,12 +14,11 @@ from rbfrag.cli.output import (
     say_when_compiling,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, ShapeOptions
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import critical_in_words, slides_in_words
 from rbfrag.errors import InputError
-from rbfrag.solver.described import TAKEN_TO_TOPPLE
+from rbfrag.question.fields import PlaneFields, ShapeFields, WholeFields
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -39,7 +38,6 @@ SHORT = ("kr", "kr_over_pga", "scale", "y_m_s", "pga_g")
 class Searched:
     """What is searched for."""
 
-    p2: float | None = option("Toppling: frequency parameter p² of the block [1/s²].")
     kind: str | None = option(
         "toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
         "the kind of the failure mode of a shape."
@@ -57,7 +55,9 @@ class Searched:
 def critical(
     *,
     motion: options.Motion,
-    shape: ShapeOptions,
+    given: Annotated[
+        Given, fields_of("p2", ShapeFields, PlaneFields, WholeFields, without=("kind",))
+    ],
     direction: options.Direction,
     reading: options.Reading,
     searched: Searched,
@@ -84,22 +84,23 @@ def critical(
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.results import MAP_DEPTH
 
-    p2, rotation, displacement = searched.p2, searched.rotation, searched.displacement
-    of_shape = _searched_block(shape, searched.kind)
-    model = _chosen_kind(searched.kind, of_shape, displacement)
-    given = {
-        "--p2": p2 is not None or "p2" in of_shape,
-        "--map": full_map,
-        "--plot": plot is not None,
-        "--block": "block" in of_shape,
-        "--rotation": rotation is not None,
-        "--displacement": displacement is not None,
-    }
-    _refuse_options_of_other_kinds(model, given)
+    rotation, displacement = searched.rotation, searched.displacement
+    block, about = _searched_block(given, searched.kind)
+    model = _chosen_kind(searched.kind, block, displacement)
+    _refuse_options_of_other_kinds(
+        model,
+        {
+            "--p2": "p2" in block,
+            "--map": full_map,
+            "--plot": plot is not None,
+            "--block": "block" in block,
+            "--rotation": rotation is not None,
+            "--displacement": displacement is not None,
+        },
+    )
     check_files(plot=plot)
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
-    if "p2" in of_shape:
-        remarks.append(TAKEN_TO_TOPPLE)
+    remarks += about
     say_when_compiling()
     if "displacement_m" in model.search_options:
         distances = (
@@ -108,17 +109,14 @@ def critical(
         document = _slides(model.kind, ground, upward, direction.polarity, distances, remarks)
         print_json(document) if printing.json else _show_slides(document, verbose=printing.verbose)
         return
-    settings: dict[str, Any] = {"p2": p2, "rotation_deg": rotation, **of_shape}
+    settings: dict[str, Any] = {"rotation_deg": rotation, **block}
     if "full_map" in model.search_options:
         settings["full_map"] = full_map or plot is not None
         settings["map_depth"] = MAP_DEPTH if plot is None else FINE_ENOUGH_TO_DRAW
-    try:
+    with given.named():
         result = search(
             ground, kind=model.kind, vertical=upward, polarity=direction.polarity, **settings
         )
-    except InputError as error:
-        file = shape.block or shape.polygon
-        raise InputError(f"{file}: {error}" if file else str(error)) from None
     if plot is not None:
         from rbfrag.plots.islands import plot_islands
 
@@ -150,20 +148,22 @@ SEARCH_OPTION = {
 """What an option is called by the kinds that understand it."""
 
 
-def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str | None) -> KindFacts:
+def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | None) -> KindFacts:
+    from rbfrag.question.shapes import SIDES_AND_PLANES, WAYS
     from rbfrag.solver.critical import kind_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
 
     if kind is not None:
         model = facts_of(kind)
-        if model.search_needs == "block" and "block" not in of_shape:
+        if model.search_needs == "block" and "block" not in block:
             raise InputError(
-                f"--block is missing: shape, friction and dip of a block decide about {kind}; "
-                f"describe it by {WAYS}, with --beta and --phi"
+                f"no block: its shape, dip and friction decide about {kind}; describe it by "
+                f"{WAYS}, with beta_deg and phi_deg",
+                fields=("beta_deg", *SIDES_AND_PLANES),
             )
         return model
-    if of_shape:
-        return kind_of(None, of_shape)
+    if block:
+        return kind_of(None, block)
     return kind_of_mode("topple" if displacement is None else "slide")
 
 
@@ -183,23 +183,31 @@ def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> 
         raise InputError("--p2 is missing: the critical block is searched for one p² [1/s²]")
 
 
-def _searched_block(shape: ShapeOptions, kind: str | None) -> dict[str, Any]:
-    """Return the keywords of a search that a shape gives."""
+def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the keywords of a search that say which block, and what is to be said of it."""
+    from rbfrag.question.blocks import shape_of, without_kv
+    from rbfrag.question.shapes import TAKEN_TO_TOPPLE
     from rbfrag.solver.kinds import facts_of
 
-    described = shape.described()
-    if described is None:
-        return {}
-    if described.only_topples and (kind is None or facts_of(kind).search_needs == "p2"):
-        return {"p2": described.block.p2}
-    block, conditions = described.on_planes()
-    for name, nothing in (("kv", 0.0), ("cohesion_pa", 0.0), ("back_fracture", True)):
-        if conditions.pop(name, nothing) != nothing:
+    with given.named():
+        shape = shape_of(without_kv(given))
+        if shape is None:
+            return {name: given[name] for name in ("p2",) if name in given}, ()
+        if "p2" in given:
             raise InputError(
-                f"{described.origin}{name} does not go with a search in time: leave it out"
+                "p2 does not go with the shape of a block: a block is described once",
+                fields=("p2",),
             )
-    conditions.pop("density_kg_m3", None)
-    return {"block": block, **conditions}
+        if "phi_deg" not in shape.planes and (kind is None or facts_of(kind).search_needs == "p2"):
+            return {"p2": shape.block.p2}, (TAKEN_TO_TOPPLE,)
+        planes = {**shape.known().planes}
+        for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
+            if planes.pop(name, nothing) != nothing:
+                raise InputError(
+                    f"{name} does not go with a search in time: leave it out", fields=(name,)
+                )
+    planes.pop("density_kg_m3", None)
+    return {"block": shape.block, **planes}, ()
 
 
 def _slides(

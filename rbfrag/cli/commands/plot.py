@@ -9,10 +9,11 @@ import typer
 
 from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions
+from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
-from rbfrag.cli.parameters.stack import command_group, option, stacked
+from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
 from rbfrag.errors import InputError
+from rbfrag.question.fields import PlaneFields, ShapeFields, WholeFields
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -187,7 +188,7 @@ def plot_spectrum(
 def plot_response(
     motion: options.Motion,
     out: Out,
-    block: BlockOptions,
+    given: Annotated[Given, fields_of("p2", "kr", ShapeFields, PlaneFields, WholeFields)],
     direction: options.Direction,
     reading: options.Reading,
     db: options.Db = None,
@@ -196,7 +197,7 @@ def plot_response(
     from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.plots import plot
 
-    _, numbers, about = block.toppling(TOPPLING_BLOCK.kind)
+    _, numbers, about = numbers_of(given, TOPPLING_BLOCK.kind)
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
     say_when_compiling()
     plot.response(
@@ -214,13 +215,8 @@ def plot_response(
 @stacked
 def plot_modes(
     *,
-    phi: float = option("Friction angle of the base [deg].", ...),
+    planes: Annotated[Given, fields_of(PlaneFields, "back_fracture")],
     out: Out,
-    beta: float = option("Dip of the base for the yield accelerations [deg].", 0.0),
-    phi_back: float | None = option(
-        "Friction angle of the back plane [deg]. Default: that of the base."
-    ),
-    no_back: NoBack = False,
     blocks: str | None = option(
         "Show the blocks of a table (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
         "as  rbfrag rockmass --out  writes it.",
@@ -236,14 +232,13 @@ def plot_modes(
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
+    if "phi_deg" not in planes:
+        raise InputError(
+            "phi_deg is missing: the chart is drawn for one friction angle", fields=("phi_deg",)
+        )
     plot_path(out)
-    shown = charted_blocks(
-        blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back, sheet=sheet
-    )
-    plot.modes(
-        out, phi_deg=phi, beta_deg=beta, phi_back_deg=phi_back, back_fracture=not no_back,
-        alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg,
-    )  # fmt: skip
+    shown = charted_blocks(blocks, rockmass, planes, sheet=sheet)
+    plot.modes(out, alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg, **planes)
     print(out)
     print_warnings(shown.warnings)
 
@@ -257,7 +252,7 @@ def plot_modes(
 def plot_rotation(
     *,
     out: Out,
-    shape: ShapeOptions,
+    given: Annotated[Given, fields_of(ShapeFields, PlaneFields, WholeFields, without=("kind",))],
     back_follows: str = option(
         "Shares of the block's rotation by which the back plane turns with it, from 0 to 1.",
         "0,0.5,1",
@@ -270,16 +265,13 @@ def plot_rotation(
     block's rotation.
     """
     from rbfrag.plots.rotation import plot_rotation as draw
+    from rbfrag.question.blocks import on_planes, without_kv
 
-    described = shape.described()
-    if described is None:
-        raise InputError(f"no block: describe it by {WAYS}")
-    block, conditions = described.without_kv().on_planes()
-    if not conditions.pop("back_fracture", True):
+    with given.named():
+        block, planes, *_ = on_planes(without_kv(given))
+    if not planes.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
-    lines = draw(
-        block, out, shares=options.number_list(back_follows, "--back-follows"), **conditions
-    )
+    lines = draw(block, out, shares=options.number_list(back_follows, "--back-follows"), **planes)
     if json:
         print_json({"plot": out, "lines": [line._asdict() for line in lines]})
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rbfrag.cli.output import (
     print_json,
@@ -14,13 +14,19 @@ from rbfrag.cli.output import (
     say_when_compiling,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
+from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
-from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling_rectangle
+from rbfrag.question.fields import (
+    FailureFields,
+    PlaneFields,
+    ScatterFields,
+    ShapeFields,
+    WholeFields,
+)
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -51,10 +57,6 @@ class Model:
         "Sliding: leave out the factor cos(phi - beta)/cos(phi), as Newmark's horizontal "
         "block does.",
         False,
-    )
-    restitution: float | None = option(
-        "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
-        "angular momentum leaves at each corner."
     )
     kind: str | None = option(
         "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
@@ -87,7 +89,7 @@ class Directions(options.Direction):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Draws(UncertaintyOptions):
+class Draws:
     """What the block may be, and how many of it are run."""
 
     draws: int | None = option(
@@ -100,9 +102,7 @@ class Draws(UncertaintyOptions):
         "known how the motion points at the block.",
         "forward",
     )
-    displacement: float | None = option(
-        "With --draws: displacement beyond which a sliding block has failed [m]."
-    )
+    block_draws: options.BlockDraws = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,16 +127,25 @@ class Files:
 def respond(
     *,
     motions: options.Motions,
-    block: BlockOptions,
+    given: Annotated[
+        Given,
+        fields_of(
+            "p2",
+            "kr",
+            "ky",
+            FailureFields,
+            ShapeFields,
+            PlaneFields,
+            ScatterFields,
+            WholeFields,
+            without=("kind", "ks_sigma", "ps2_sigma"),
+        ),
+    ],
     model: Model,
     drawn: Draws,
     direction: Directions,
     files: Files,
     reading: options.Reading,
-    ky: float | None = option(
-        "Yield acceleration coefficient tan(phi - beta) [g] of a block that slides on a "
-        "plane of dip --beta (default 0), whatever its shape."
-    ),
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
@@ -158,7 +167,7 @@ def respond(
     if drawn.draws is not None:
         from rbfrag.solver.respond_draws import respond_draws
 
-        possible, remarks = _possible(drawn, block, ky, model.kind)
+        possible, remarks = _possible(drawn, given, model.kind)
         if len(motions) > 1:
             raise InputError("--draws runs blocks under one motion: leave the others out")
         one = direction.each(1)[0]
@@ -172,14 +181,14 @@ def respond(
             horizontal=model.horizontal,
             draws=drawn.draws,
             seed=drawn.seed,
-            displacement_m=drawn.displacement,
-            **{"restitution": model.restitution, **possible},
+            displacement_m=given.get("displacement_m"),
+            **{"restitution": given.get("restitution"), **possible},
         )
         _show_shares(
             replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=printing.json
         )
         return
-    body, what, remarks = _body(block, ky, model.kind)
+    body, what, remarks = _body(given, model.kind)
     if files.film is not None:
         if body is None:
             raise InputError(
@@ -197,7 +206,7 @@ def respond(
     title = ",\nthen ".join(ground.label for ground in grounds)
     several = len(grounds) > 1
     say_when_compiling()
-    try:
+    with given.named():
         response = run(
             grounds if several else grounds[0],
             vertical=upwards if several else upwards[0],
@@ -205,13 +214,10 @@ def respond(
             gap_s=direction.gap,
             two_way=model.two_way,
             horizontal=model.horizontal,
-            restitution=model.restitution,
+            restitution=given.get("restitution"),
             history=any((files.csv, files.plot, files.film)),
             **what,
         )
-    except InputError as error:
-        file = block.block or block.polygon
-        raise InputError(f"{file}: {error}" if file else str(error)) from None
     response = replace(response, warnings=(*about, *remarks, *response.warnings))
     if files.csv is not None:
         write_history(response, files.csv)
@@ -249,7 +255,7 @@ def respond(
 
 
 def _possible(
-    drawn: Draws, block: BlockOptions, ky: float | None, kind: str | None
+    drawn: Draws, given: Given, kind: str | None
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the keywords that say what the one block may be, and warnings."""
     if drawn.block_draws is not None:
@@ -257,10 +263,11 @@ def _possible(
 
         values, weights = read_draws(drawn.block_draws)
         return {"kind": kind, **values, "weights": weights}, ()
-    body, what, remarks = _body(block, ky, kind)
+    body, what, remarks = _body(given, kind)
     if body is not None:
         what = {"kind": what["kind"], **_numbers_of(body, what)}
-    return {**what, **drawn.sigmas()}, remarks
+    sigmas = {name: value for name, value in given.items() if name.endswith("_sigma")}
+    return {**what, **sigmas}, remarks
 
 
 def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
@@ -301,38 +308,28 @@ def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
     print_warnings(warnings)
 
 
-def _body(
-    block: BlockOptions, ky: float | None, kind: str | None
-) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
+def _body(given: Given, kind: str | None) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
     """Return the block where its shape decides, the keywords that say it, and warnings."""
+    from rbfrag.question.blocks import shape_of, without_kv
+    from rbfrag.question.shapes import TAKEN_NOT_TO_SLIP
     from rbfrag.solver.kinds import facts_of, kind_of_mode
 
-    described = block.described()
-    if described is not None and described.only_topples:
-        conditions = described.without_kv().conditions
-        backed = conditions.get("back_fracture", True)
+    with given.named():
+        shape = shape_of(without_kv(given))
+        stated = {name: given[name] for name in ("p2", "kr", "ky", "beta_deg") if name in given}
+        if shape is None:
+            return None, {"kind": kind, **stated}, ()
+        if len(stated.keys() - {"beta_deg"}):
+            numbers_of(given)  # refuses a block that is described twice
+        if "phi_deg" in shape.planes:
+            return shape.block, {"kind": kind, "block": shape.block, **shape.planes}, ()
+        backed = shape.planes.get("back_fracture", True)
         model = kind_of_mode("topple", back_fracture=backed) if kind is None else facts_of(kind)
-        if not model.free_standing:
-            return None, {"kind": kind, **toppling_rectangle(described)}, (TAKEN_TO_TOPPLE,)
-        free = {"kind": model.kind, "block": described.block, **conditions}
-        return described.block, free, (TAKEN_NOT_TO_SLIP,)
-    if described is not None:
-        body, conditions = described.without_kv().on_planes()
-        return body, {"kind": kind, "block": body, **conditions}, ()
-    what: dict[str, Any] = {
-        "kind": kind,
-        "p2": block.p2,
-        "kr": block.kr,
-        "ky": ky,
-        "beta_deg": block.beta,
-    }
-    what = {name: value for name, value in what.items() if value is not None}
-    if not what.keys() & {"p2", "kr", "ky"}:
-        raise InputError(f"no block: give --p2 and --kr, or --ky, or describe it by {WAYS}")
-    for name, other in (("p2", "kr"), ("kr", "p2")):
-        if name in what and not {other, "ky"} & what.keys():
-            raise InputError(f"--{other} is missing: --p2 and --kr together give a block")
-    return None, what, ()
+        if model.free_standing:
+            free = {"kind": model.kind, "block": shape.block, **shape.planes}
+            return shape.block, free, (TAKEN_NOT_TO_SLIP,)
+    _, numbers, remarks = numbers_of(given, model.kind)
+    return None, {"kind": kind, **numbers}, remarks
 
 
 def _draw(

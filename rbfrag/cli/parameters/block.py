@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.cli.parameters.options import EXCEL_TEXT, SHEET
 from rbfrag.cli.parameters.stack import Given, option
 from rbfrag.errors import InputError
-from rbfrag.question.fields import column_of, name_of, option_of
-from rbfrag.solver.described import DescribedBlock, describe
+from rbfrag.question.fields import column_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,68 +17,6 @@ if TYPE_CHECKING:
 
     from rbfrag.exchange.block_rows import BlockRows
     from rbfrag.rockmasses.joint_sets import RockMass
-
-WAYS = (
-    "--height and --width, or by --alpha1, --alpha3 and --r3, or by --s1, --s2 and --gamma, or by "
-    "--block or --polygon FILE"
-)
-"""How a shape is given."""
-
-_Number = float | None
-
-NoBack = Annotated[bool, typer.Option("--no-back", help="There is no fracture behind the block.")]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShapeOptions:
-    """A block by its shape, and its planes."""
-
-    height: _Number = option(
-        "Height of a rectangular block, perpendicular to its base [m], with --width."
-    )
-    width: _Number = option("Width of a rectangular block along its base [m].")
-    dip: _Number = option("Dip of the base of a rectangular block [deg], its --beta. Default: 0.")
-    alpha1: _Number = option(
-        "Angle from the normal of the base to the line centroid-heel [deg], with --alpha3 and --r3."
-    )
-    alpha3: _Number = option("The same of the toe [deg].")
-    r3: _Number = option("Distance from centroid to toe [m].")
-    s1: _Number = option("Spacing of the base fractures [m], with --s2 and --gamma.")
-    s2: _Number = option("Spacing of the back fractures [m].")
-    gamma: _Number = option("Dip of the back plane less dip of the base [deg].")
-    block: str | None = option(
-        "Block file (.toml or .csv); what it states about the planes may be given anew by options.",
-        metavar="FILE",
-    )
-    polygon: str | None = option(
-        "File with the outline of a block (.csv or .toml), read as --block is.", metavar="FILE"
-    )
-    beta: _Number = option("Dip of the base, out of the slope positive [deg].")
-    phi: _Number = option(
-        "Friction angle of the base [deg]; only a rectangle is taken to topple without."
-    )
-    phi_back: _Number = option("Friction angle of the back plane [deg]. Default: that of the base.")
-    no_back: NoBack = False
-
-    def described(self, **conditions: float | None) -> DescribedBlock | None:
-        """Return the block, or None where no option says anything of its shape.
-
-        Args:
-            conditions: further keywords of `rbfrag.stability` that were given, or None.
-        """
-        lengths = ("height", "width", "dip", "alpha1", "alpha3", "r3", "s1", "s2", "gamma")
-        return describe(
-            {name: getattr(self, name) for name in lengths},
-            {
-                "beta_deg": self.beta,
-                "phi_deg": self.phi,
-                "phi_back_deg": self.phi_back,
-                "back_fracture": False if self.no_back else None,
-                **conditions,
-            },
-            file=self.block or self.polygon,
-            spell=option_of,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,86 +37,6 @@ class MeshOptions:
         metavar="FILE",
     )
     excel_text: bool = option(EXCEL_TEXT, False)
-
-
-@dataclass(frozen=True, kw_only=True)
-class NumberOptions:
-    """A toppling block by two numbers."""
-
-    p2: _Number = option("Frequency parameter p² of the block [1/s²], with --kr.")
-    kr: _Number = option(
-        "Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2."
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class UncertaintyOptions:
-    """How well a block is known; the option that states a value states its median."""
-
-    p2_sigma: _Number = option("Standard deviation of ln p²; 0.1 is some 10 %.")
-    kr_sigma: _Number = option("Standard deviation of ln k_r; 0.1 is some 10 %.")
-    ky_sigma: _Number = option("Standard deviation of ln k_y.")
-    restitution_sigma: _Number = option("Standard deviation of the restitution.")
-    block_draws: str | None = option(
-        "Table of what the one block may be (.csv, .xlsx, .parquet), a row each, with the columns "
-        "of a block table and weight if they weigh differently.",
-        metavar="FILE",
-    )
-
-    def sigmas(self) -> dict[str, float]:
-        """Return the standard deviations that were given, by name."""
-        values = {name: value for name, value in vars(self).items() if name.endswith("sigma")}
-        return {name: value for name, value in values.items() if value is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
-class BlockOptions(ShapeOptions, NumberOptions):
-    """A block by numbers or by its shape."""
-
-    def toppling(
-        self, kind: str | None = None
-    ) -> tuple[str | None, dict[str, float], tuple[str, ...]]:
-        """Return the kind, what predictions read of the block, and warnings.
-
-        Args:
-            kind: how the block fails; None for toppling, or rocking where nothing backs its shape.
-
-        Raises:
-            InputError: an option is missing, or the block is of another mode.
-        """
-        described = self.described()
-        if described is None:
-            if self.p2 is None or self.kr is None:
-                missing = "--p2" if self.p2 is None else "--kr"
-                raise InputError(
-                    f"{missing} is missing: a block is given by --p2 and --kr, or by {WAYS}"
-                )
-            return kind, {"p2": self.p2, "kr": self.kr}, ()
-        from rbfrag.question.blocks import toppling_block
-
-        blocks = toppling_block(described, {}, kind)
-        (group,) = blocks.groups
-        return group.kind, {**group.numbers}, blocks.remarks
-
-
-@dataclass(frozen=True, kw_only=True)
-class StandingOptions:
-    """Whether blocks are backed by a slope."""
-
-    kind: str | None = option(
-        "toppling (backed by a slope) or rocking (free-standing, which fails at weaker shaking). "
-        "Default: what the blocks are given by."
-    )
-    restitution: _Number = option(
-        "Rocking: speed after an impact over that before it, above 0 and up to 1; a column "
-        "restitution goes before. Default: what angular momentum leaves."
-    )
-
-    @property
-    def stated(self) -> dict[str, float]:
-        """What is stated of all blocks, by field."""
-        numbers = {name_of(name): value for name, value in vars(self).items() if name != "kind"}
-        return {name: value for name, value in numbers.items() if value is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,26 +124,22 @@ class BlocksOptions(TableOptions):
 
 
 def numbers_of(
-    given: Given, *, topples: bool = False
+    given: Given, kind: str | None = None
 ) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
     """Return the kind of the one block that options describe, its numbers, and warnings.
 
     Args:
         given: what they say, by field.
-        topples: whether a shape of no stated kind is to topple, or to rock where nothing backs it.
+        kind: how it fails where they do not say so; None for what they say of it.
 
     Raises:
         InputError: it is described twice or in part, or is of another kind.
     """
-    from rbfrag.question.blocks import has_shape, missing_number, one_block, refuse_foreign
-    from rbfrag.solver.kinds import kind_of_mode
+    from rbfrag.question.blocks import missing_number, one_block, refuse_foreign
 
     stated = {field: value for field, value in given.items() if field != "kind"}
-    kind = given.get("kind")
-    if topples and kind is None and has_shape(stated):
-        kind = kind_of_mode("topple", back_fracture=stated.get("back_fracture", True)).kind
     with given.named():
-        blocks = one_block(stated, kind)
+        blocks = one_block(stated, given.get("kind", kind))
     (group,) = blocks.groups
     if lacking := missing_number(group.numbers, group.kind):
         missing, names = lacking
@@ -299,12 +150,6 @@ def numbers_of(
             fields=(*names, "height_m", "width_m"),
         )
     refuse_foreign(group.numbers, group.kind)
-    if topples and "p2" not in group.numbers:
-        raise InputError(
-            f"p2 is no number of a block that is given by {' and '.join(group.numbers)}: this "
-            "command answers for blocks that topple or rock; predict answers for others",
-            fields=("p2", *group.numbers),
-        )
     return group.kind, {**group.numbers}, blocks.remarks
 
 
@@ -375,10 +220,8 @@ class ChartedBlocks(NamedTuple):
 def charted_blocks(
     blocks: str | None,
     rockmass: str | None,
+    planes: Mapping[str, Any],
     *,
-    phi: float,
-    phi_back: float | None,
-    no_back: bool,
     sheet: str | None = None,
 ) -> ChartedBlocks:
     """Return the blocks of one of two files.
@@ -386,9 +229,7 @@ def charted_blocks(
     Args:
         blocks: the option --blocks, a table with alpha1_deg and alpha3_deg.
         rockmass: the option --rockmass, a rock mass file.
-        phi: friction angle that the chart is drawn for [deg].
-        phi_back: that of the back plane [deg]; None for the same.
-        no_back: whether the chart has no back fracture.
+        planes: friction angles that the chart is drawn for, and whether it has a back fracture.
         sheet: the option --sheet.
     """
     warnings: list[str] = []
@@ -405,7 +246,7 @@ def charted_blocks(
 
         mass = read_rock_mass(rockmass)
         columns = block_columns(mass.realise())
-        warnings += _differences(mass, phi, phi_back, no_back)
+        warnings += _differences(mass, planes)
     else:
         return ChartedBlocks(None, None, warnings)
     alpha1, alpha3 = (columns[name] for name in names)
@@ -420,9 +261,10 @@ def charted_blocks(
     return ChartedBlocks(alpha1[known], alpha3[known], warnings)
 
 
-def _differences(mass: RockMass, phi: float, phi_back: float | None, no_back: bool) -> list[str]:
+def _differences(mass: RockMass, planes: Mapping[str, Any]) -> list[str]:
     """Return where a rock mass and the chart it is shown on do not agree."""
     warnings = []
+    phi = planes["phi_deg"]
     stated = mass.variables["friction.phi_deg"]
     if stated.law != "constant" or stated.location != phi:
         warnings.append(
@@ -430,7 +272,7 @@ def _differences(mass: RockMass, phi: float, phi_back: float | None, no_back: bo
             f"is: {stated}"
         )
     back = mass.variables.get("friction.phi_back_deg", stated)
-    of_chart = phi if phi_back is None else phi_back
+    of_chart = planes.get("phi_back_deg", phi)
     if back != stated and (back.law != "constant" or back.location != of_chart):
         warnings.append(
             f"the chart is drawn for a friction angle of the back of {of_chart:g} deg, and that "
@@ -441,9 +283,13 @@ def _differences(mass: RockMass, phi: float, phi_back: float | None, no_back: bo
             "the chart is drawn without cohesion, and that of the rock mass is: "
             f"{mass.variables['friction.cohesion_pa']} Pa"
         )
-    if mass.back_fracture == no_back:
+    if mass.back_fracture != planes.get("back_fracture", True):
         warnings.append(
             "the rock mass has "
-            + ("a back fracture, and the chart none" if no_back else "no back fracture: --no-back")
+            + (
+                "a back fracture, and the chart none"
+                if mass.back_fracture
+                else "no back fracture: --no-back"
+            )
         )
     return warnings

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.question.fields import (
+    OTHER_WORDS,
+    PlaneFields,
+    ScatterFields,
+    ShakingFields,
+    ShapeFields,
+    names_of,
+    option_of,
+)
+
+
+def _options(*classes: Any) -> tuple[str, ...]:
+    """Return the options of the fields that classes declare, with all that they are called."""
+    names = names_of(*classes)
+    words = (word for word, name in OTHER_WORDS.items() if name in names)
+    return (*map(option_of, names), *(f"--{word}" for word in words))
+
 
 NUMBERS = ("--p2", "--kr")
-SHAPE = ("--height", "--width", "--dip", "--alpha1", "--alpha3", "--r3", "--s1", "--s2", "--gamma")
-SIGMAS = (
-    "--p2-sigma", "--kr-sigma", "--ky-sigma", "--ks-sigma", "--ps2-sigma", "--restitution-sigma",
-)  # fmt: skip
-PLANES = ("--beta", "--phi", "--phi-back", "--no-back")
-MEASURES = ("--pgv", "--pga", "--tm", "--pgd", "--sa03", "--sa10", "--sa20", "--sa30")
+SHAPE = _options(ShapeFields)
+PLANES = (*_options(PlaneFields), "--no-back")
+FRICTION = tuple(each for each in PLANES if each not in ("--beta", "--dip"))
+SIGMAS = _options(ScatterFields)
+MEASURES = _options(ShakingFields)
 
 ONCE = "a block is described once"
 
@@ -58,10 +74,9 @@ OF_TABLES = ("hazard", "survival", "shakemap", "nrml", "pelicun")
 """Commands in which a table says all of its blocks; in predict some may be said of all rows."""
 
 CONFLICTS = (
-    Conflict(("--ky",), (*SHAPE, *FILES), ONCE),
-    Conflict((*SHAPE, *FILES, "--rockmass"), NUMBERS, ONCE),
+    Conflict((*FILES, "--rockmass"), NUMBERS, ONCE),
     Conflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
-    Conflict(SHAPE[:-1], FILES, "the file has the shape"),
+    Conflict(tuple(each for each in SHAPE if each != "--gamma"), FILES, "the file has the shape"),
     Conflict(("--polygon",), ("--block",), ONCE),
     Conflict(TABLES, (*SHAPE, *FILES), ONCE),
     Conflict(("--mesh",), (*SHAPE, *FILES), ONCE),
@@ -89,10 +104,8 @@ CONFLICTS = (
         "a mesh stands free on level ground, in the pose that it was measured in",
     ),
     Conflict(("--rockmass",), ("--blocks",), "one of them is enough"),
-    Conflict(PLANES, NUMBERS, "numbers say all about the block"),
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
-    Conflict(PLANES[1:], ("--ky",), "the strength follows from --ky and --beta"),
-    Conflict((*PLANES[1:], "--motion"), ("--blocks",), "the table has the blocks", ("predict",)),
+    Conflict((*FRICTION, "--motion"), ("--blocks",), "the table has the blocks", ("predict",)),
     Conflict(("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"),
     Conflict(
         ("--motion",),

@@ -84,7 +84,7 @@ class FieldOptions(NamedTuple):
     """Fields of a question, each of which is an option of a command.
 
     Args:
-        classes: what declares them.
+        classes: what declares them, or names of single ones.
         without: those of them that the command does not take.
     """
 
@@ -93,7 +93,8 @@ class FieldOptions(NamedTuple):
 
     def options(self) -> Iterator[inspect.Parameter]:
         """Yield the options, as typer reads them."""
-        for name in names_of(*self.classes):
+        every = [(e,) if isinstance(e, str) else names_of(e) for e in self.classes]
+        for name in dict.fromkeys(name for names in every for name in names):
             if name in self.without:
                 continue
             about = declared()[name]
