@@ -224,9 +224,7 @@ def read_blocks(
     kinds = [each or kind or "" for each in columns.get("kind", [""] * size)]
     modes = columns["mode"].tolist() if "mode" in columns else None
     blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
-    for field in stated:
-        if field not in blocks.read:
-            raise InputError(f"{field} does not go with the blocks of {name}", fields=(field,))
+    table.check_read(stated, blocks.read)
     reasons = block_reasons_of(blocks, size)
     columns |= {
         column_of(field): each.copy()

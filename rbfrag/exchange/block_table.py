@@ -111,6 +111,13 @@ class BlockTable:
             sides = ", nor height_m and width_m" if "kr" in block.names else ""
             self._refuse(f"{column_of(missing)}{sides}")
 
+    def check_read(self, given: Collection[str], read: Collection[str]) -> None:
+        """Refuse what is stated of all blocks, and no answer depends on."""
+        for name in given:
+            if name in BLOCK_FIELDS.values() and name not in read:
+                text = f"{name} does not go with the blocks of {self.name}: leave it out"
+                raise InputError(text, fields=(name,))
+
     def need(self, names: Collection[str]) -> None:
         """Refuse a table without some columns."""
         for name in names:

@@ -110,6 +110,7 @@ def predict_table(
             raise InputError(f"{origin}: there is no block in the file")
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
+        table.check_read(given, chosen["read"])
     known = (*chosen.pop("read"), *_SHAKING, *TEXTS, *PLACE, *PORTFOLIO)
     notes = chosen.pop("notes")
     missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])

@@ -110,6 +110,14 @@ def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
     assert float(rows_of(target)[0]["probability"]) == pytest.approx(expected, rel=1e-12)
 
 
+def test_what_is_said_of_all_rows_must_matter(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(TABLE)
+    with pytest.raises(InputError, match="beta_deg does not go with the blocks of"):
+        answer(source, target, beta_deg=5.0)
+    assert not target.exists()
+
+
 def test_an_empty_column_says_nothing(
     answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
