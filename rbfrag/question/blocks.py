@@ -283,14 +283,16 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _One:
-    """Raises the first reason against a single block."""
+    """Raises the first reason against a single block, with what is odd about its angles."""
 
-    def __init__(self) -> None:
+    def __init__(self, odd: Collection[str] = ()) -> None:
         self.remarks: list[str] = []
+        self._odd = odd
 
     def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
         if holds:
-            raise InputError(text.format(**values), fields=fields)
+            text = "; ".join((text.format(**values), *self._odd))
+            raise InputError(text, fields=(*fields, *PLANES))
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         self.refuse(holds, text, **values)
@@ -362,7 +364,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         planes["back_fracture"] = False
     finding, _ = judged(shape.block, **planes)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
-    listener = _One()
+    listener = _One(shape.remarks)
     numbers_read = numbers_of_shape(
         facts,
         Judged(
