@@ -49,8 +49,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rbfrag.solver.described import DescribedBlock
-
 NUMBERS = names_of(NumberFields)
 """Fields that say of a block what its shape would."""
 
@@ -395,41 +393,3 @@ def requested_kind(kind: str | None, given: Collection[str]) -> KindFacts | None
     if not facts.parameters:
         raise InputError(NO_MODEL.format(kind=kind))
     return facts
-
-
-def described_block(
-    described: DescribedBlock, given: Mapping[str, Any], kind: str | None = None
-) -> Blocks:
-    """Return a block that options or a file describe as answers read it.
-
-    Args:
-        described: the block.
-        given: what else is stated of it, by field.
-        kind: how it is asked to fail; None for what it says.
-
-    Raises:
-        InputError: as of :func:`one_block`; the message names the file.
-    """
-    try:
-        return one_block({"block": described.block, **described.conditions, **given}, kind)
-    except InputError as error:
-        raise InputError(f"{described.origin}{error}", fields=error.fields) from None
-
-
-def toppling_block(
-    described: DescribedBlock, given: Mapping[str, Any], kind: str | None = None
-) -> Blocks:
-    """Return a block as answers read it that know of blocks that topple or rock only.
-
-    Args:
-        described: the block.
-        given: what else is stated of it, by field.
-        kind: how it is asked to fail; None for toppling, or rocking where nothing backs it.
-
-    Raises:
-        InputError: as of :func:`one_block`.
-    """
-    backed = described.conditions.get("back_fracture", True)
-    return described_block(
-        described, given, kind or kind_of_mode("topple", back_fracture=backed).kind
-    )

@@ -75,6 +75,7 @@ def test_python_and_requests_know_it(copied: Path) -> None:
     assert answer["same"]
     for warnings in answer["warnings"]:
         assert "hardness is not read: no model asks for it" in warnings
+    assert answer["schema"].count("Rebound hardness of the rock [MPa].") >= 2  # GET and POST
     assert "``hardness``: Rebound hardness of the rock [MPa]." in answer["help"]
 
 

@@ -16,9 +16,8 @@ from rbfrag.bench.cases import Records
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
-from rbfrag.question.blocks import described_block
+from rbfrag.question.blocks import one_block
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.described import DescribedBlock
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.kind import model_of_kind
@@ -392,8 +391,7 @@ def test_without_a_back_plane_a_block_that_topples_rocks() -> None:
     backed = rbfrag.respond(motion, block=block, back_fracture=False, kind="toppling", **planes)
     assert any("no plane backs the block" in text for text in backed.warnings)
     assert not any("no plane backs" in text for text in alone.warnings)
-    described = DescribedBlock(block, {**planes, "back_fracture": False})
-    told = described_block(described, {}, "toppling").remarks
+    told = one_block({"block": block, **planes, "back_fracture": False}, "toppling").remarks
     assert any("no plane backs" in text for text in told)
     assert rbfrag.respond(motion, p2=3.0, kr=0.2).kind == "toppling"
     flat = Block.from_fractures(1.0, 2.0, 90.0)
