@@ -33,12 +33,6 @@ def given_blocks(
 ) -> BlockRows:
     """Return the blocks of a question.
 
-    Args:
-        given: fields of the blocks, with ``kind``.
-        blocks: instead of these, a table.
-        reads: as for `read_blocks`, like `one_kind`.
-        one_kind: see there.
-
     Raises:
         InputError: blocks given in no way or in two, or none that waits for an earthquake.
     """
@@ -66,11 +60,7 @@ def given_blocks(
 
 
 def read_by_models(rows: BlockRows) -> tuple[str, dict[str, Any], tuple[str, ...]]:
-    """Return the kind of blocks of one kind, the numbers that its models read, and what is said.
-
-    Args:
-        rows: the blocks.
-    """
+    """Return the kind of blocks of one kind, the numbers that its models read, and what is said."""
     kind = str(rows.blocks["kind"][0])
     stated, remarks = taken_as_medians(numbers_in(rows.blocks))
     known = {name: values for name, values in stated.items() if not np.isnan(values).all()}

@@ -154,7 +154,6 @@ def nrml_text(functions: Sequence[FragilityFunction], *, description: str = "") 
     Args:
         functions: the functions; those of one asset one after the other, the same limit states
             for every asset.
-        description: a sentence or two.
     """
     if not functions:
         raise InputError("there is no fragility function to write")

@@ -102,7 +102,6 @@ class JobFiles:
         """Return the files of a folder, or those that are named.
 
         Args:
-            folder: folder with the exports of one job.
             named: files that are named, by the fields of this class; they go before the folder.
 
         Raises:
@@ -196,9 +195,6 @@ class _Head:
     def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
         """Yield some columns, some hundred thousand rows at a time.
 
-        Args:
-            columns: int, float or str by name.
-
         Raises:
             InputError: a cell holds no such thing, or a line lacks cells; the message names it.
         """
@@ -285,7 +281,6 @@ def read_events(
     files, PGA and spectral accelerations in g.
 
     Args:
-        files: the files of the job.
         imts: intensity measures to read, as OpenQuake names them: PGV, PGA, SA(1.0).
         investigation_time: years of one event set, where no file of ruptures states it.
         ses: number of event sets of each realization, likewise.

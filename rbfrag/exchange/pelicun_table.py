@@ -107,13 +107,7 @@ def metadata_text(
     descriptions: Sequence[str],
     about: tuple[str, ...],
 ) -> str:
-    """Return what goes beside the table as ``fragility.json``, as simcenter-dlml 3 has it.
-
-    Args:
-        functions: the functions of the table.
-        descriptions: a sentence on each block.
-        about: name, term and method of the model.
-    """
+    """Return what goes beside the table as ``fragility.json``, as simcenter-dlml 3 has it."""
     model, term, method = about
     document: dict[str, object] = {
         "_GeneralInformation": {

@@ -54,12 +54,9 @@ def share_functions(
     of a greater share never exceeds that of a smaller one.
 
     Args:
-        name: identifier of the rock mass.
         p2: frequency parameters of its blocks [1/s²], shape (m,).
         kr: their toppling yield acceleration coefficients, shape (m,).
-        measure: as for :func:`~rbfrag.exchange.block_fragility.block_functions`.
         shares: shares of the blocks in percent, rising, above 0 to 100.
-        levels: number of levels, common to all limit states.
         answering: model, which must know what its blocks share, and db, as in
             :func:`rbfrag.predict`.
 

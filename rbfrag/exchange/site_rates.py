@@ -56,7 +56,6 @@ def blocks_at_sites(
 
     Args:
         files: curves of each file, of one measure, one a site.
-        columns: columns of the blocks.
         site_chosen: one site of several was asked for: blocks of others are left out.
 
     Returns:
@@ -138,8 +137,6 @@ def rate_columns(
     """Return the columns of the table of annual rates, one row a site and block.
 
     Args:
-        sites: the sites.
-        answers: the answers, one a site.
         rows: the table of blocks; what cannot be used of it has its ``reason``, at one site in the
             order of the table, at several at the end.
     """

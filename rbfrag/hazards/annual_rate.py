@@ -66,7 +66,6 @@ def failure_rate(
     probability at that level, the least it can be; below the first level nothing is counted.
 
     Args:
-        curve: the hazard curve.
         fragility: probabilities of failure at levels of its measure; rows are blocks.
         coarse: the same from a table of twice the step, whose error then is part of the estimate;
             None for a fragility that is known at every level: panels where it is abrupt are halved.

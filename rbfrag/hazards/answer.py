@@ -351,7 +351,6 @@ class _Site:
     """The blocks of a site, tabled for the curves of it.
 
     Args:
-        blocks: the blocks in parts.
         tables: P and both ends by bands x blocks of each part; of a class the mean of all blocks.
         order: where the blocks stand in the parts one after the other.
         any_of: P that any fails under full dependence and if independent, laws in rows; None for

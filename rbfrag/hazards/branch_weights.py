@@ -23,7 +23,6 @@ def realization_weights(
 
     Args:
         path: CSV with ``rlz_id`` and ``weight``, lines that begin with # left out.
-        curves: curves, of which branches state ``rlz-NNN`` as their kind.
 
     Raises:
         InputError: the file is none of realizations, or lacks that of a curve.
@@ -66,7 +65,6 @@ def stated_weights(
     Args:
         given: numbers in the order of the curves, also as text: 0.5,0.3,0.2; or the name of a file
             of realizations.
-        curves: the curves.
     """
     if not isinstance(given, str | os.PathLike):
         return given

@@ -23,12 +23,7 @@ def curve_name(curve: HazardCurve) -> str:
 
 
 def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[str]:
-    """Yield what is to be said of a curve of quantiles.
-
-    Args:
-        curve: the curve.
-        answer: what is computed under it.
-    """
+    """Yield what is to be said of a curve of quantiles."""
     if curve.statistic.startswith("quantile"):
         yield (
             f"{curve.statistic} is the hazard of no single model, and {answer} under it no "
@@ -59,7 +54,6 @@ def checked_weights(weights: Sequence[float | None] | None, n: int) -> FloatArra
 
     Args:
         weights: weights of the curves, None for one that is no branch.
-        n: number of curves.
 
     Raises:
         InputError: another number of weights, one that is none, or a sum other than 1.
@@ -86,7 +80,6 @@ def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[floa
     Args:
         values: one a branch along the first axis.
         weights: weights that sum to 1, shape (branches,).
-        q: probabilities.
     """
     order = np.argsort(values, axis=0, kind="stable")
     below = np.cumsum(weights[order], axis=0)

@@ -33,10 +33,6 @@ def as_curves(
 ) -> list[HazardCurve]:
     """Return the curves that an argument gives, of each file the one that it means.
 
-    Args:
-        given: a curve or a file of one, or several of them.
-        meaning: which is meant, as for :func:`rbfrag.hazard`.
-
     Raises:
         InputError: something else, or a file that holds curves of several sites.
     """
@@ -89,14 +85,7 @@ def read_hazard_curves(
 def hazard_curves_in(
     text: str, source: str, *, imt: str | None = None, site: str | None = None
 ) -> list[HazardCurve]:
-    """Return the hazard curves of a file's text.
-
-    Args:
-        text: what the file holds.
-        source: what messages call it.
-        imt: as for :func:`read_hazard_curves`.
-        site: as for :func:`read_hazard_curves`.
-    """
+    """Return the hazard curves of a file's text."""
     if is_openquake_curve(text):
         curves = openquake_curves(text, source)
     elif is_nshm_curve(text):
@@ -146,7 +135,6 @@ def suited_curves(
     """Return the curves of one measure, that of which a model alone knows most.
 
     Args:
-        curves: curves of a file, one or more measures.
         converted_period_s: period of the spectral acceleration that a conversion to PGV has been
             asked for, or None.
 

@@ -39,12 +39,10 @@ class Part(NamedTuple):
 
     Args:
         number: place of the part in the order of all.
-        portfolio: the blocks.
         events: the events, each weighing as in the whole set.
         counts: numbers of failures that curves are given for, rising.
         losses: losses that curves are given for, rising.
         samples: samples of each event; 0 for expected values alone.
-        seed: of the samples.
     """
 
     number: int
@@ -82,7 +80,6 @@ class PartCounts:
     """What fails in the n events of a part.
 
     Args:
-        number: place of the part.
         failures: expected failures, shape (n,).
         loss: expected loss, shape (n,).
         loss_variance: its variance, shape (laws, n); NaN where it is not computed.
@@ -313,7 +310,6 @@ def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:
     """Return how often the samples of events, and of years, reach some numbers.
 
     Args:
-        events: the events.
         drawn: samples, shape (laws, n, draws).
         ends: the numbers, shape (k,).
     """

@@ -100,7 +100,6 @@ def event_weights(
 
     Args:
         realization: realization of each event, shape (n,).
-        weights: weights by realization, which sum to 1.
         duration: of each realization; None for a scenario.
     """
     own = np.array([weights[number] for number in realization.tolist()])

@@ -87,8 +87,6 @@ class JointRate:
             block_rates: rates of the single blocks [1/a], shape (n,).
             thresholds: levels at which blocks fail by the model's copula; None where it is not
                 known.
-            curve: hazard curve of their site.
-            years: period T [a].
         """
         ends: list[str] = []
         warn_of_ends(

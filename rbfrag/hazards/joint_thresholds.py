@@ -65,10 +65,7 @@ class JointThresholds:
 
         Args:
             table: P by draws x bands x blocks.
-            blocks: where the blocks stand.
-            dependence: the copula.
             counts: numbers of failures, from 1 to the number of blocks.
-            seed: seed of the scrambles of the points.
         """
         draws, bands, n, _ = table.values.shape
         values, fewest = (
@@ -117,7 +114,6 @@ class JointThresholds:
         control variate, Hammersley and Handscomb 1964).
 
         Args:
-            curve: hazard curve of the site.
             block_rates: rates of the single blocks [1/a], shape (n,); None for no correction.
 
         Returns:

@@ -341,12 +341,8 @@ def event_losses(
     of random numbers is that of the event, so that the answer does not depend on who computes what.
 
     Args:
-        events: the event set, or a scenario.
-        portfolio: the blocks at its sites.
         samples: samples of each event; 0 for expected values alone, with the probability of any
             failure by the beta-binomial law of the exact mean and variance.
-        seed: of the samples, 0 or more.
-        level: confidence level of intervals.
         run: does the parts of the work, as worker processes may; None for here.
         on_progress: called with the numbers of events done and of all.
 
@@ -509,7 +505,6 @@ def rate_interval(rate: float, squares: float, widest: float, level: float) -> t
         rate: the sum of weights.
         squares: sum of their squares, the variance.
         widest: greatest weight that one more count may have.
-        level: confidence level.
     """
     from scipy.stats import chi2
 
@@ -532,10 +527,7 @@ def share_interval(
     209-212.
 
     Args:
-        share: the mean.
-        variance: its variance.
         least: sum of the squared weights of the realisations, one over their number.
-        level: confidence level.
     """
     z = -normal_quantile(0.5 - 0.5 * level)
     alone = share * (1.0 - share)

@@ -194,12 +194,9 @@ def map_failures(
     """Return how many blocks fail together; they face unknown azimuths.
 
     Args:
-        answer: probabilities of the sites and their blocks.
         numbers: what the model read of the blocks, by field, shape (m,) each.
-        places: where the sites lie.
         weight: how many blocks each one stands for, shape (m,); None for 1.
         draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
-        seed: of the random numbers.
         between: β, 0 to 1.
         range_km: range of the within-event correlation [km]; None for that of the first measure
             that the model reads (:func:`~rbfrag.hazards.spatial_field.correlation_range_km`).

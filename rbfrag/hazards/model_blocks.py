@@ -105,7 +105,6 @@ class ModelPart(NamedTuple):
     Args:
         places: where they stand among all, shape (m,).
         numbers: what the model reads of them, by field, shape (m,) each.
-        model: the model.
     """
 
     places: NDArray[np.intp]
@@ -117,11 +116,6 @@ def parts_by_model(
     given: Mapping[str, Any], measure: str, answering: AnsweringFields
 ) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
     """Return blocks by the model that answers for them.
-
-    Args:
-        given: fields of the blocks.
-        measure: what the model reads of the shaking.
-        answering: which model.
 
     Returns:
         The parts, what is to be said of the blocks, and of each why it cannot be used, empty for
@@ -159,8 +153,6 @@ class ModelBlocks:
         weight: weights of the draws, which sum to 1, shape (k,).
         medians: the same of the medians, shape (m,) each.
         shaking: what the curve's levels are to the model.
-        model: the model.
-        level: confidence level.
         remarks: what is to be said of the blocks.
     """
 
@@ -182,15 +174,7 @@ class ModelBlocks:
         seed: int,
         answering: AnsweringFields,
     ) -> ModelBlocks:
-        """Return the blocks of medians and standard deviations.
-
-        Args:
-            given: fields of the blocks.
-            shaking: what the curve's levels are to the model.
-            draws: number of draws of several uncertain blocks.
-            seed: of the draws.
-            answering: which model answers, and the confidence level.
-        """
+        """Return the blocks of medians and standard deviations."""
         stated = dict(given)
         for sigma in [name for name in stated if name.endswith("_sigma")]:
             of = sigma.removesuffix("_sigma")
@@ -269,7 +253,6 @@ class ModelBlocks:
         sum over nodes, of which its steps are a multiple.
 
         Args:
-            curves: hazard curves of one measure.
             mean: the mean over the blocks instead of each.
         """
         ends = (c.levels[-1] if c.end_level is None else c.end_level for c in curves)

@@ -88,9 +88,7 @@ class Portfolio:
                 kind reads, such as ``p2_1_s2`` [1/s²] and ``kr``, and, if there are, ``site_id``,
                 ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a
                 failure counts), ``loss``, ``loss_sigma`` and standard deviations.
-            site_ids: names of the sites of the event set.
             models: the models that answer, by the kind of blocks.
-            component: what the values of the shaking mean.
 
         Raises:
             InputError: no sites of the blocks, or more blocks than are answered.

@@ -24,10 +24,7 @@ def as_dict(
     Those that cannot be used stand in the list without numbers, at several sites at its end.
 
     Args:
-        curves: a curve of each site.
         names: identifiers of the blocks of each site.
-        answers: the answers, one a site.
-        remarks: warnings that go before those of the answers.
         refused: rows of the table of blocks that cannot be used, by their index: ``block_id``,
             ``site_id`` and ``reason``.
     """
@@ -157,11 +154,7 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
 
 
 def beyond_in_words(answer: HazardAnswer) -> tuple[str, ...]:
-    """Return what shaking beyond the end of a curve may do to one block, where that is much.
-
-    Args:
-        answer: an answer about one block.
-    """
+    """Return what shaking beyond the end of a curve may do to one block, where that is much."""
     rate = float(answer.annual_rate[0])
     most = rate + float(answer.above_at_most[0] - answer.above[0])
     if not most > 2.0 * rate:

@@ -142,12 +142,10 @@ def warn_of_ends(
     """Add warnings where shaking beyond the ends of a curve may matter.
 
     Args:
-        curve: the curve.
         rate: rates of failure [1/a], shape (m,).
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.
         below: probability of failure at the first level, shape (m,).
-        warnings: where they are added.
     """
     unit = curve.measure.replace("sa_g", curve.imt + " in g")
     open_above = above_at_most - above > NOTABLE * rate

@@ -98,7 +98,6 @@ def site_probability(
             :func:`rbfrag.predict` (pgv_m_s [m/s], pga_g and sa10_g [g], …), each of shape (n,).
         numbers: p2 [1/s²] and kr of the blocks, shape (m,), or (n,) with `own_block`, if they are
             not given by name.
-        component: what the measures mean.
         weight: weights of the blocks of a class, shape (m,); None for equal ones.
         own_block: every site has its own block; otherwise all blocks stand at every site.
         std_ln: standard deviations of the measures' logarithms by name, shape (n,); where one that
@@ -187,7 +186,6 @@ def _points(k: int, widest: float, *, across: bool) -> tuple[FloatArray, FloatAr
     low discrepancy (Sobol), whose mean is good to some thousandths of P.
 
     Args:
-        k: number of variables.
         widest: greatest standard deviation that the first one stands for.
         across: False where the others do not vary beside the first.
     """

@@ -88,7 +88,6 @@ class Standing:
         Args:
             annual_rate: rates at which any block fails [1/a], shape (k,).
             weight: their probabilities, shape (k,).
-            age: how long the blocks have stood.
         """
         failures = np.multiply.outer(np.asarray(annual_rate, dtype=np.float64), age.years)
         with np.errstate(divide="ignore"):
@@ -118,9 +117,6 @@ class Standing:
         """Return the factor on the hazard rates at which all stand with a probability.
 
         None where no factor makes survival so improbable: nothing fails, or may fail, ever.
-
-        Args:
-            probability: between 0 and 1.
         """
         target = math.log(probability)
         never = self.log_weight[self.failures == 0.0]
@@ -144,7 +140,6 @@ def weights_given_standing(parts: list[Standing], weight: ArrayLike) -> FloatArr
     """Return weights of hazards after all blocks have stood (Bayes): w S/Σ w S.
 
     Args:
-        parts: survival if each hazard is right, n of them.
         weight: their weights before, which sum to 1, shape (n,).
     """
     with np.errstate(divide="ignore"):

@@ -93,13 +93,9 @@ def plot_curve(
     With few earthquakes the first may be the wider. Outside the fitted ranges the curve is dashed.
 
     Args:
-        model: the model.
-        block: what the model reads of the block, by field.
-        path: file to write: .png, .pdf or .svg.
         over: the measure along the abscissa, by name; None for the one that the model's term
             names first.
         fixed: the other measures that the term reads, by name, held at one value.
-        level: level of both bands.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
 
@@ -164,13 +160,6 @@ def draw_curve(
     """Draw the curve of :func:`plot_curve` into axes.
 
     Args:
-        axes: empty axes.
-        model: the model.
-        block: what the model reads of the block, by field.
-        varied: the measure along the abscissa, by name.
-        held: the other measures that the model reads.
-        level: level of both bands.
-        beside: other fragilities, as for :func:`plot_curve`.
         at: a value of the measure to point out; 0 for none.
     """
     end = max(_right_end(model, block, varied, held), 1.15 * at)

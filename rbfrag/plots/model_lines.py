@@ -26,13 +26,7 @@ FloatArray = NDArray[np.float64]
 def model_answers(
     model: FragilityModel, values: Mapping[str, FloatArray | float], *, level: float = LEVEL
 ) -> PredictionArray:
-    """Return the answers of one model.
-
-    Args:
-        model: the model.
-        values: numbers of blocks and measures of motions by name, at least one of them an array.
-        level: confidence level.
-    """
+    """Return the answers of one model."""
     answer = answer_given(model, values, level)
     assert isinstance(answer, PredictionArray)
     return answer
@@ -110,7 +104,6 @@ def held_measures(
     the axis of k_r.
 
     Args:
-        model: the model that is drawn.
         p2: frequency parameter p² [1/s²].
         pga_g: PGA [g].
         tm_s: mean period [s].
@@ -194,7 +187,6 @@ def failure_line(
     Args:
         model: a model of a term that is one number, or of PGV with PGA.
         x_m_s: intensities [m/s], shape (n,), > 0.
-        probability: between 0 and 1.
         held: what does not change along the line; None for the middle of the fitted ranges.
 
     Returns:
@@ -229,10 +221,7 @@ def predicted_strengths(
     """Return the toppling velocity y [m/s] at which each motion topples a block so likely.
 
     Args:
-        model: the model.
-        table: motions and block sizes, n rows.
         xp_m_s: toppling spectrum of each row [m/s], shape (n,).
-        probability: between 0 and 1.
 
     Returns:
         Shape (n,); NaN where what the model reads is not known.

@@ -67,13 +67,7 @@ class RateQuestion:
 
 @dataclass(frozen=True, eq=False)
 class Rate:
-    """How often a year the block fails.
-
-    Args:
-        curve: the hazard curve.
-        answer: the rate and where it comes from.
-        document: the answer under the keys of the JSON contract.
-    """
+    """How often a year the block fails."""
 
     curve: HazardCurve
     answer: HazardAnswer
@@ -81,13 +75,7 @@ class Rate:
 
 
 class Drawing(NamedTuple):
-    """A block to draw.
-
-    Args:
-        block: the block.
-        stability: how it stands.
-        title: what the drawing is of.
-    """
+    """A block to draw."""
 
     block: Block
     stability: Stability
@@ -101,12 +89,9 @@ class Contents:
     Args:
         sentences: the answer in words, the first one decides.
         tables: rows of name and value under headings.
-        remarks: warnings.
         versions: program, model and data.
         drawing: the block that is drawn; None where its shape is not known.
         numbers: numbers of the block that the model reads.
-        measures: the shaking, by name.
-        model: the model that answered.
         held: what its design chart holds; None for a model that has no chart.
         document: the prediction under the keys of the JSON contract.
         rate: how often a year it fails; None without a hazard curve.
@@ -140,11 +125,6 @@ def contents_of(
     given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[AnsweringFields]
 ) -> Contents:
     """Answer a question about one block.
-
-    Args:
-        given: fields of the block, with ``kind``, and measures of the motion.
-        rate: the question of a rate; None for one shaking alone.
-        answering: model, level and database, as for :func:`rbfrag.predict`.
 
     Raises:
         InputError: a question that cannot be answered.

@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 class Panel(NamedTuple):
-    """One picture.
-
-    Args:
-        name: identifier, in a page that has several.
-        title: what it shows.
-        draw: draws it into an empty figure.
-    """
+    """One picture."""
 
     name: str
     title: str

@@ -49,14 +49,7 @@ _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 
 @in_own_style
 def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None:
-    """Write a report as a page of A4, PDF or PNG by the suffix of the file.
-
-    Args:
-        contents: what it says.
-        title: its title.
-        date: its date; empty for none.
-        target: file to write.
-    """
+    """Write a report as a page of A4, PDF or PNG by the suffix of the file."""
     from matplotlib import rc_context
 
     with rc_context(_RC):

@@ -46,14 +46,7 @@ sub { font-size: 75%; line-height: 0; }
 
 @in_own_style
 def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
-    """Write a report as a page that needs nothing but itself.
-
-    Args:
-        contents: what it says.
-        title: its title.
-        date: its date; empty for none.
-        target: file to write.
-    """
+    """Write a report as a page that needs nothing but itself."""
     first, *others = contents.sentences
     parts = [
         "<!DOCTYPE html>", '<html lang="en">', '<head><meta charset="utf-8">',

@@ -92,14 +92,6 @@ def write_report(
 ) -> Contents:
     """Write the report of a block.
 
-    Args:
-        out: file to write.
-        given: fields of the block, with ``kind``, and measures of the motion.
-        rate: how often a year the block is asked to fail; None for one shaking alone.
-        title: as for :func:`report`.
-        date: as for :func:`report`.
-        answering: as for :func:`report`.
-
     Returns:
         What the report says.
     """
