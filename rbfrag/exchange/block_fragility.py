@@ -14,12 +14,11 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.hazards.shaking import rises_below
 from rbfrag.question.fields import AnsweringFields
-from rbfrag.question.keywords import LEVEL, model_for
+from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
@@ -134,9 +133,7 @@ def probabilities_over(
         for start in range(0, next(iter(columns.values())).size, _CHUNK):
             some = slice(start, start + _CHUNK)
             of_blocks = {name: column[some, None] for name, column in columns.items()}
-            answer = answer_given(model, {**of_blocks, measure: x}, LEVEL, interval=False)
-            assert isinstance(answer, PredictionArray)
-            yield answer.probability
+            yield array_answer(model, {**of_blocks, measure: x}, interval=False).probability
 
     return _TYPES[measure], rows()
 

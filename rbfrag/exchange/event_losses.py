@@ -101,10 +101,7 @@ def losses(
         "the measures are taken as those of single components, which the models are fitted on; "
         "ground motion models of the engine mostly mean rotd50 or the geometric mean: say which"
         if component is None
-        else f"the measures are of {meaning.title}; Beyer and Bommer (2006) relate it to one "
-        "component"
-        if meaning.name != "single"
-        else "the measures are of a single component, as the models are"
+        else meaning.in_words("the measures are")
     )
     texts = (
         *rows.unusable_in_words(FROM_SUMS),

@@ -21,7 +21,6 @@ from rbfrag.exchange.block_fragility import (
 from rbfrag.exchange.fragility_function import discrete_function
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 
@@ -72,10 +71,11 @@ def share_functions(
             "another with --model"
         )
     x = scanned_levels()[::_EVERY]
-    kind, parts = probabilities_over(x, {"p2": p2, "kr": kr}, measure, levels, chosen)
+    numbers = {"p2": p2, "kr": kr}
+    kind, parts = probabilities_over(x, numbers, measure, levels, chosen)
     scores = np.concatenate([_scores(part) for part in parts])
-    p = np.sqrt(p2)
-    blocks = Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p))
+    blocks = Placement.of_numbers(chosen.method.block, numbers)
+    assert blocks is not None
     sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(0)
     counts = [max(1, math.ceil(share / 100.0 * p2.size - 1e-9)) for share in shares]
     reached = np.empty((len(counts), DRAWS))

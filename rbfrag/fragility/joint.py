@@ -8,6 +8,7 @@ Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,6 +19,8 @@ from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
+from rbfrag.fragility.methods import BlockParameters
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -81,6 +84,17 @@ class Placement:
         except ValueError as error:
             raise InputError(f"blocks of a portfolio need columns of one length: {error}") from None
         return cls(*parts)
+
+    @classmethod
+    def of_numbers(
+        cls, block: BlockParameters, numbers: Mapping[str, FloatArray], **labels: ArrayLike
+    ) -> Placement | None:
+        """Return a placement of blocks by what models read of them; None of ones without a size."""
+        if block.size is None:
+            return None
+        p = np.sqrt(numbers[block.size])
+        ln_y = np.log(numbers[block.strength] * STANDARD_GRAVITY_M_S2 / p)
+        return cls.of(np.log(p), ln_y, **labels)
 
     def __post_init__(self) -> None:
         columns = vars(self)

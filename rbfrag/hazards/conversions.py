@@ -35,6 +35,12 @@ class Component:
     ratio: float
     scatter: float
 
+    def in_words(self, what: str) -> str:
+        """Return what values mean: "the curve is", for example, of which component."""
+        if self.name == "single":
+            return f"{what} of a single component, as the models are"
+        return f"{what} of {self.title}; Beyer and Bommer (2006) relate it to one component"
+
 
 COMPONENTS: Mapping[str, Component] = {
     item.name: item

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -12,10 +12,15 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rbfrag.fragility.joint import FailureCount, count_moments
-from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
+from rbfrag.hazards.standing_blocks import (
+    COPULA,
+    DEPENDENT,
+    INDEPENDENT,
+    Normals,
+    normals_by_law,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -121,27 +126,6 @@ class Shaken(NamedTuple):
     outside: FloatArray
 
 
-Normals = Callable[[Portfolio, Shaken, int, np.random.Generator], FloatArray]
-
-
-def _by_copula(
-    portfolio: Portfolio, shaken: Shaken, draws: int, generator: np.random.Generator
-) -> FloatArray:
-    assert portfolio.dependence is not None
-    sampler = JointSampler(portfolio.dependence, portfolio.placement(shaken.block))
-    return sampler.normals(draws, generator)
-
-
-LAWS: Mapping[str, Normals] = {
-    COPULA: _by_copula,
-    DEPENDENT: lambda _, shaken, draws, g: np.repeat(
-        g.standard_normal((draws, 1)), shaken.block.size, axis=1
-    ),
-    INDEPENDENT: lambda _, shaken, draws, g: g.standard_normal((draws, shaken.block.size)),
-}
-"""How the standard normals of the blocks of one event are drawn, by the name of the joint law."""
-
-
 def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
     """Return the joint laws that answer: the stored one, or the two bounds."""
     return (DEPENDENT, INDEPENDENT) if portfolio.dependence is None else (COPULA,)
@@ -174,8 +158,10 @@ def count_part(part: Part) -> PartCounts:
                 portfolio, shaken, bounds[:, event]
             )
             continue
-        for law, name in enumerate(laws):
-            drawn[law, event], any_fails[law, event] = _sampled(part, event, shaken, LAWS[name])
+        known = portfolio.dependence
+        where = None if known is None else portfolio.placement(own)
+        for law, normals in enumerate(normals_by_law(known, where, own.size).values()):
+            drawn[law, event], any_fails[law, event] = _sampled(part, event, shaken, normals)
     if drawn is not None:
         if part.samples > 1:
             variance = drawn[:, :, 1].var(axis=-1, ddof=1)
@@ -267,7 +253,7 @@ def _sampled(part: Part, event: int, shaken: Shaken, normals: Normals) -> tuple[
         some = slice(start, min(start + at_once, draws))
         k = some.stop - start
         p = probability(k)
-        fails = normals(portfolio, shaken, k, generator) <= ndtri(p)
+        fails = normals(k, generator) <= ndtri(p)
         with_any += int(fails[:, counted].any(axis=1).sum())
         result[0, some] = fails @ portfolio.weight[own]
         if portfolio.loss is not None:

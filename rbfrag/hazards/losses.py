@@ -189,30 +189,20 @@ class LossAnswer(Tabular):
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
         events, scenario = self.events, self.events.is_scenario
-        any_rate = self.annual_rate_any
-        any_error = None if any_rate is None else self.error(self.any_fails[0])
-        loss_error = self.error(self.loss) if self.has_losses else None
-        means: dict[str, Any] = {
-            "average_annual_failures": None if scenario else self.average_annual_failures,
-            "average_annual_failures_error": None if scenario else self.error(self.failures),
-            "annual_rate_any": None if scenario else any_rate,
-            "annual_rate_any_error": None if scenario else any_error,
-        }
-        if self.has_losses:
-            means["average_annual_loss"] = None if scenario else self.average_annual_loss
-            means["average_annual_loss_error"] = None if scenario else loss_error
+        stated: list[tuple[str, str, FloatArray]] = [
+            ("average_annual_failures", "expected_failures", self.failures),
+            ("annual_rate_any", "probability_any", self.any_fails[0]),
+            *([("average_annual_loss", "expected_loss", self.loss)] if self.has_losses else []),
+        ]
+        means: dict[str, Any] = {}
+        for annual, given_event, values in stated:
+            mean = getattr(self, annual)
+            error = None if mean is None else self.error(values)
+            means |= {annual: mean, f"{annual}_error": error}
+            if scenario:
+                means |= {annual: None, f"{annual}_error": None}
+                means |= {given_event: mean, f"{given_event}_error": error}
         if scenario:
-            means |= {
-                "expected_failures": self.average_annual_failures,
-                "expected_failures_error": self.error(self.failures),
-                "probability_any": any_rate,
-                "probability_any_error": any_error,
-            }
-            if self.has_losses:
-                means |= {
-                    "expected_loss": self.average_annual_loss,
-                    "expected_loss_error": loss_error,
-                }
             means |= self._quantiles()
         what = "probability_any" if scenario else "annual_rate_any"
         bounds = {
@@ -220,6 +210,7 @@ class LossAnswer(Tabular):
             for name, values in zip((DEPENDENT, INDEPENDENT), self.bounds, strict=True)
         }
         duration = events.duration
+        losses = self._exceedance("loss_exceedance", "loss", self.loss_exceedance)
         return {
             "events": int(events.event_id.size),
             "events_with_shaking": int(np.unique(events.event).size),
@@ -228,11 +219,7 @@ class LossAnswer(Tabular):
             "joint_law": self.laws[0] if len(self.laws) == 1 else NO_LAW,
             "bounds": bounds,
             **self._exceedance("exceedance", "count", self.exceedance),
-            **(
-                self._exceedance("loss_exceedance", "loss", self.loss_exceedance)
-                if self.has_losses
-                else {}
-            ),
+            **(losses if self.has_losses else {}),
             "investigation_time": None if duration is None else duration.investigation_time,
             "ses_per_logic_tree_path": None if duration is None else duration.ses,
             "realizations": len(events.realization_weights),

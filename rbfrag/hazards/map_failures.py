@@ -14,7 +14,7 @@ that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -24,18 +24,15 @@ from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
-from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.hazards.correlations import correlations
 from rbfrag.hazards.site_probability import SiteProbability
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.hazards.standing_blocks import COPULA, normals_by_law
 
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
-Normals = Callable[[int, np.random.Generator], FloatArray]
 
 BETWEEN = 0.346**2 / (0.346**2 + 0.552**2)
 """β, the share of the map's variance that is taken as between-event, 0.28.
@@ -46,8 +43,6 @@ Earthquake Spectra 30(3), 1057-1085 (τ = 0.346, φ = 0.552). A ShakeMap states 
 alone. Where many stations recorded the earthquake, its B is nearly known and less is shared; the
 deviation itself, which is conditional on the stations, is then smaller near them.
 """
-
-COPULA, DEPENDENT, INDEPENDENT = "the model's copula", "fully_dependent", "independent"
 
 LEFT_OUT = 1e-4
 """Part of the expected failures that the least probable blocks may hold and not be drawn."""
@@ -113,7 +108,11 @@ class MapFailures:
         """Return the numbers under the keys of the JSON contract."""
         one = self.by_law.get(COPULA)
         known = dict.fromkeys(Failures.KEYS) if one is None else one.as_dict()
-        bounds = {} if one else {name: law.as_dict() for name, law in self.by_law.items()}
+        bounds = (
+            {}
+            if one
+            else {name.replace(" ", "_"): law.as_dict() for name, law in self.by_law.items()}
+        )
         return {
             "expected_failures": self.expected,
             **known,
@@ -218,11 +217,13 @@ def map_failures(
         range_km = correlation_range_km(answer.shaking.names[0])
     used, here = np.unique(site, return_inverse=True)
     residuals = _Residuals(answer.shaking, used, places.only(used), between, range_km)
-    laws = _laws(answer, {n: v[blocks] for n, v in columns.items()}, places.group[site])
+    model, own = answer.shaking.model, {n: values[blocks] for n, values in columns.items()}
+    where = Placement.of_numbers(model.method.block, own, site=places.group[site], polarity=UNKNOWN)
+    laws = normals_by_law(model.dependence, where, site.size)
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
-    given = {name: values[blocks, None] for name, values in columns.items()}
+    given = {name: values[:, None] for name, values in own.items()}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
     start = 0
     for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):
@@ -231,10 +232,7 @@ def map_failures(
         start += count
         shaken = answer.shaking.shaken(used, logs)
         values = {name: measure[here] for name, measure in shaken.items()}
-        prediction = answer_given(
-            answer.shaking.model, {**given, **values}, answer.level, interval=False
-        )
-        assert isinstance(prediction, PredictionArray)
+        prediction = array_answer(model, {**given, **values}, interval=False)
         for name, normals in laws.items():
             fails = ndtr(normals(count, generator).T) <= prediction.probability
             drawn[name][part] = weights[blocks] @ fails
@@ -267,25 +265,6 @@ def _worth_drawing(expected: FloatArray) -> Indices:
     below = np.cumsum(expected[order])
     first = int(np.searchsorted(below, LEFT_OUT * below[-1])) if below.size else 0
     return np.sort(order[first:])
-
-
-def _laws(
-    answer: SiteProbability, numbers: Mapping[str, FloatArray], site: Indices
-) -> dict[str, Normals]:
-    """Return draws of Z of some blocks, shape (draws, n), by the law that joins them."""
-    law, block = answer.shaking.model.dependence, answer.shaking.model.method.block
-    strength = numbers[block.strength]
-    if law is not None and block.size is not None:
-        p = np.sqrt(numbers[block.size])
-        y = strength * STANDARD_GRAVITY_M_S2 / p
-        where = Placement.of(np.log(p), np.log(y), site=site, polarity=UNKNOWN)
-        return {COPULA: JointSampler(law, where).normals}
-    return {
-        DEPENDENT: lambda draws, generator: np.broadcast_to(
-            generator.standard_normal((draws, 1)), (draws, strength.size)
-        ),
-        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, strength.size)),
-    }
 
 
 class _Residuals:

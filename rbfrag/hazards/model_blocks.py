@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import PredictionArray, array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.shaking import Shaking
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import AnsweringFields, V
@@ -239,12 +237,7 @@ class ModelBlocks:
 
     def placement(self) -> Placement | None:
         """Return the blocks as those of one site with unknown azimuths; None without a size."""
-        block = self.model.method.block
-        if block.size is None:
-            return None
-        p = np.sqrt(self.medians[block.size])
-        ln_y = np.log(self.medians[block.strength] * STANDARD_GRAVITY_M_S2 / p)
-        return Placement.of(np.log(p), ln_y, polarity=UNKNOWN)
+        return Placement.of_numbers(self.model.method.block, self.medians, polarity=UNKNOWN)
 
     def tabled(self, curves: Sequence[HazardCurve], *, mean: bool = False) -> BlockTable:
         """Return P and the ends of its interval over the levels of some curves.
@@ -297,9 +290,7 @@ class ModelBlocks:
     def _predicted(
         self, numbers: Mapping[str, FloatArray], shaking: Mapping[str, Any]
     ) -> PredictionArray:
-        answer = answer_given(self.model, {**numbers, **shaking}, self.level)
-        assert isinstance(answer, PredictionArray)
-        return answer
+        return array_answer(self.model, {**numbers, **shaking}, self.level)
 
 
 def _standard_draws(

@@ -16,11 +16,9 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.blocks import numbers_in
 
 FloatArray = NDArray[np.float64]
@@ -31,8 +29,6 @@ MOST_BLOCKS = 100_000
 
 _REACH, _STEP, _FEWEST_POINTS = 5.0, 0.1, 9
 """How far a logarithm's scatter is integrated, in standard deviations, and in which steps of it."""
-
-_LEVEL = 0.95  # no interval is computed: any level will do
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,11 +183,11 @@ class Portfolio:
 
     def placement(self, some: NDArray[np.intp]) -> Placement:
         """Return some of the blocks as those of one earthquake, of unknown azimuths."""
-        block = self.answering[0].method.block
-        assert block.size is not None
-        p = np.sqrt(self.numbers[block.size][some])
-        ln_y = np.log(self.numbers[block.strength][some] * STANDARD_GRAVITY_M_S2 / p)
-        return Placement.of(np.log(p), ln_y, site=self.site[some], polarity=UNKNOWN)
+        numbers = {name: values[some] for name, values in self.numbers.items()}
+        block, site = self.answering[0].method.block, self.site[some]
+        placement = Placement.of_numbers(block, numbers, site=site, polarity=UNKNOWN)
+        assert placement is not None
+        return placement
 
     def scatter_points(self) -> tuple[FloatArray, FloatArray]:
         """Return standard normal points of component, ln p² and ln k_r, shape (k, 3), and weights.
@@ -244,9 +240,7 @@ class Portfolio:
             for scattered, factor in zip((block.size, block.strength), factors, strict=True):
                 if scattered is not None:
                     part[scattered] = part[scattered] * of_these(factor)
-            part = block.filled(part)
-            answer = answer_given(model, part, _LEVEL, interval=False)
-            assert isinstance(answer, PredictionArray)
+            answer = array_answer(model, block.filled(part), interval=False)
             p[..., own], in_domain[..., own] = answer.probability, answer.in_domain
         if np.isnan(p).any():
             wrong = int(some[np.argwhere(np.isnan(p))[0][-1]])

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
@@ -65,12 +64,7 @@ class Shaking:
                 "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
             )
         else:
-            warnings.append(
-                f"the curve is of {meaning.title}; Beyer and Bommer (2006) relate it to one "
-                "component"
-                if meaning.name != "single"
-                else "the curve is of a single component, as the models are"
-            )
+            warnings.append(meaning.in_words("the curve is"))
         scatter = math.hypot(meaning.scatter, spread)
         steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
         xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
@@ -182,9 +176,8 @@ def rise_in_words(
     x = np.geomspace(low, high, _LEVELS)
     every = 1 + next(iter(numbers.values())).size // _MOST_BLOCKS
     some = {field: values[::every, None] for field, values in numbers.items()}
-    answer = answer_given(model, {**model.method.block.filled(some), name: x}, 0.95, interval=False)
-    assert isinstance(answer, PredictionArray)
-    p = answer.probability
+    given = {**model.method.block.filled(some), name: x}
+    p = array_answer(model, given, interval=False).probability
     rises = p[:, 0] - p.min(axis=1) > _NOTABLE_RISE
     if not rises.any():
         return ()

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import PredictionArray, array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.site_shaking import SiteShaking
@@ -122,9 +121,7 @@ def site_probability(
     def answers(site: Indices, block: Indices, points: FloatArray) -> PredictionArray:
         """Return answers for pairs of site and block at normal scores, shape (pairs, points)."""
         own = {name: values[block, None] for name, values in columns.items()}
-        answer = answer_given(chosen, {**own, **shaking.at(site, points)}, level)
-        assert isinstance(answer, PredictionArray)
-        return answer
+        return array_answer(chosen, {**own, **shaking.at(site, points)}, level)
 
     k = len(shaking.names)
     in_domain = np.empty(n, dtype=bool)

@@ -6,12 +6,15 @@ model comes with both ends of its interval, which go through the law as P does.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards.annual_rate import FailureRate, Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
@@ -24,6 +27,27 @@ ONE_BLOCK = "one block"
 COPULA = "the model's copula"
 INDEPENDENT = "independent"
 DEPENDENT = "fully dependent"
+
+Normals = Callable[[int, np.random.Generator], FloatArray]
+"""Draws standard normals of some blocks, shape (draws, n)."""
+
+
+def normals_by_law(law: Dependence | None, where: Placement | None, n: int) -> dict[str, Normals]:
+    """Return how the normals of n blocks of one earthquake are drawn, by the name of the law.
+
+    Args:
+        law: the copula; None where it is not known, which leaves the bounds.
+        where: the blocks; None where they have no size.
+        n: their number.
+    """
+    if law is not None and where is not None:
+        return {COPULA: JointSampler(law, where).normals}
+    return {
+        DEPENDENT: lambda draws, generator: np.broadcast_to(
+            generator.standard_normal((draws, 1)), (draws, n)
+        ),
+        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, n)),
+    }
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
@@ -20,7 +21,6 @@ from rbfrag.plots.model_lines import (
     HeldMeasures,
     failure_line,
     held_measures,
-    model_answers,
 )
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ def _is_fitted(
 ) -> np.ndarray:
     """Return where intensities x and velocities y, of one shape, are of the fitted ones."""
     kr = np.nan_to_num(y) * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-    answers = model_answers(model, held.values(model, x, kr))
+    answers = array_answer(model, held.values(model, x, kr))
     fitted: np.ndarray = answers.in_domain & np.isfinite(y)
     return fitted
 

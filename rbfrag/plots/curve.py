@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
@@ -29,7 +30,6 @@ from rbfrag.plots.canvas import (
     save_figure,
 )
 from rbfrag.plots.labels import as_written
-from rbfrag.plots.model_lines import model_answers
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.words import numbers_in_words
 from rbfrag.solver.kinds import mode_of_kind
@@ -165,7 +165,7 @@ def draw_curve(
     end = max(_right_end(model, block, varied, held), 1.15 * at)
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
-    answer = model_answers(model, {**block, varied: x, **held}, level=level)
+    answer = array_answer(model, {**block, varied: x, **held}, level)
     known = answer.in_domain
     percent = f"{100.0 * level:g} %"
     if not np.isnan(answer.event_low).all():
@@ -190,7 +190,7 @@ def draw_curve(
     axes.set(xlabel=AXIS[varied], ylabel=f"probability that the block {fails}")
     light_grid(axes)
     if at > 0.0:
-        pointed = model_answers(model, {**block, varied: np.array([at]), **held}, level=level)
+        pointed = array_answer(model, {**block, varied: np.array([at]), **held}, level)
         p = float(pointed.probability[0])
         axes.plot([at, at, 0.0], [0.0, p, p], color=RED, lw=0.9, ls="--")
         axes.plot(at, p, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9)
@@ -219,7 +219,7 @@ def _right_end(
         y_m_s = 0.1 * k
     unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else k
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
-    answer = model_answers(model, {**block, varied: x, **held})
+    answer = array_answer(model, {**block, varied: x, **held})
     high = np.flatnonzero(answer.probability > 0.97)
     if high.size:
         return float(x[high[0]])

@@ -15,21 +15,10 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.question.keywords import LEVEL
 
 FloatArray = NDArray[np.float64]
-
-
-def model_answers(
-    model: FragilityModel, values: Mapping[str, FloatArray | float], *, level: float = LEVEL
-) -> PredictionArray:
-    """Return the answers of one model."""
-    answer = answer_given(model, values, level)
-    assert isinstance(answer, PredictionArray)
-    return answer
 
 
 ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa03", "sa10", "sa20", "sa30", "pga_tm", "pgd_tm")
@@ -152,7 +141,7 @@ def depends_on_size(model: FragilityModel) -> bool:
         return True
     x = np.ones(_RATIOS.size)
     least, most = (
-        model_answers(
+        array_answer(
             model,
             HeldMeasures(p2).values(model, x, _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2),
         ).probability
@@ -197,7 +186,7 @@ def failure_line(
 
     def toppling(y_m_s: FloatArray, x_m_s: FloatArray) -> FloatArray:
         kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-        return model_answers(model, held.values(model, x_m_s, kr)).probability
+        return array_answer(model, held.values(model, x_m_s, kr)).probability
 
     return _of_probability(probability, toppling, x_m_s)
 
@@ -240,9 +229,7 @@ def predicted_strengths(
     def toppling(y_m_s: FloatArray, _: FloatArray, *columns: FloatArray) -> FloatArray:
         one = dict(zip(given, columns, strict=True))
         kr = y_m_s * np.sqrt(one["p2"]) / STANDARD_GRAVITY_M_S2
-        answer = answer_given(model, {**one, "kr": kr}, 0.95, interval=False)
-        assert isinstance(answer, PredictionArray)
-        return answer.probability
+        return array_answer(model, {**one, "kr": kr}, interval=False).probability
 
     result = np.full(x.shape, np.nan)
     result[known] = _of_probability(probability, toppling, x[known], *given.values())

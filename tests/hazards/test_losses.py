@@ -25,6 +25,7 @@ from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import Part, count_part
 from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
+from rbfrag.hazards.standing_blocks import normals_by_law
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.question import predict
 from tests.exchange.openquake_job import write_job
@@ -185,7 +186,9 @@ def test_sampled_frequencies_are_the_probabilities(tmp_path: Path, seed: int) ->
     ((event, shaken),) = event_counts._shaken(part)
     generator = np.random.default_rng(seed)
     p = event_counts._probabilities(part, shaken, generator)(draws)
-    normals = event_counts.LAWS[answer.laws[0]](answer.portfolio, shaken, draws, generator)
+    where = answer.portfolio.placement(shaken.block)
+    laws = normals_by_law(answer.portfolio.dependence, where, shaken.block.size)
+    normals = laws[answer.laws[0]](draws, generator)
     frequency = (normals <= np.vectorize(_quantile)(p)).mean(axis=0)
     error = np.sqrt(shaken.probability * (1.0 - shaken.probability) / draws)
     assert event == 0
