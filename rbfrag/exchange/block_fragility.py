@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import NamedTuple, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
@@ -20,8 +19,7 @@ from rbfrag.hazards.shaking import rises_below
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped"}
 """The limit state of a block by its mode."""

@@ -21,8 +21,7 @@ from rbfrag.files import as_path, reading
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
 from rbfrag.hazards.measure_type import IntensityType, openquake_type
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 FILES = {
     "gmf_data": re.compile(r"gmf[-_]data.*\.csv"),

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rbfrag.errors import InputError
@@ -23,8 +22,7 @@ from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 DRAWS = 20_000
 """Draws of what the blocks share: probabilities have a standard error of at most 0.0035."""

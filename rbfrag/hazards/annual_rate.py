@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.curve import HazardCurve
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 Fragility = Callable[[FloatArray], FloatArray]
 """From levels of the curve's measure, shape (n,), to probabilities of failure, shape (m, n)."""

@@ -43,8 +43,7 @@ from rbfrag.question.blocks import taken_as_medians
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
 """Quantiles of the rates over the branches of a logic tree."""

@@ -6,12 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.curve import HazardCurve
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 _ADDS_UP = 2e-3
 """How far weights may add up to something else than 1."""

@@ -7,14 +7,13 @@ from functools import cached_property
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.frames import Tabular
 from rbfrag.question.shaking import doubts_about, doubts_about_rates
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""

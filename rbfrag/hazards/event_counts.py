@@ -21,8 +21,8 @@ from rbfrag.hazards.standing_blocks import (
     Normals,
     normals_by_law,
 )
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Indices = NDArray[np.intp]
 

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.hazards.annual_rate import FailureRate, probability_in
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.shaking import warn_of_ends
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 NO_LAW = "bounds"
 """Joint law where only bounds are known."""

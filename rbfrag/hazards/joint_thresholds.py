@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rbfrag.fragility.dependence import Dependence
@@ -19,8 +18,7 @@ from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_points import REPLICATES, LatentPoints
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.model_blocks import BlockTable
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 _VALUES, _OF_DRAWS = 2**19, 2**23
 _MOST_POINTS, _FEWEST_POINTS = 2**14, 2**10

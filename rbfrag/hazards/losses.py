@@ -30,8 +30,8 @@ from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import NOTABLE, rise_in_words
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.solver.kinds import mode_of_kind
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Run = Callable[[Iterator[Part], int], Iterator[PartCounts]]
 """Does the parts of the work, of which the number is given, and yields the results in any order."""
 

@@ -30,8 +30,8 @@ from rbfrag.hazards.site_probability import SiteProbability
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
 from rbfrag.hazards.standing_blocks import COPULA, normals_by_law
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 BETWEEN = 0.346**2 / (0.346**2 + 0.552**2)

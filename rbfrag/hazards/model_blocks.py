@@ -23,9 +23,8 @@ from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
-
-FloatArray = NDArray[np.float64]
 
 TABLE_STEP, SMOOTH_STEP = 0.01, 0.02
 """Greatest step of ln x between the nodes of a table of P, as it is and smoothed by scatter."""

@@ -20,8 +20,8 @@ from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.question.blocks import numbers_in
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MOST_BLOCKS = 100_000

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
@@ -18,8 +17,7 @@ from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 from rbfrag.question.fields import declared
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 _SCATTER_POINTS = 25
 _REACH = 6.0

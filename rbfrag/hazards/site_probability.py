@@ -18,8 +18,8 @@ from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 REACH = 4.0

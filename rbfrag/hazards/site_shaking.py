@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.correlations import correlations
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

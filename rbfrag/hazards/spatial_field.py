@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 EARTH_RADIUS_KM = 6371.0

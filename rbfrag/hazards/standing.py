@@ -12,14 +12,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import normal_steps
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 _AGES = 401
 _REACH = 10.0

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement
@@ -20,8 +19,7 @@ from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
 from rbfrag.hazards.shaking import warn_of_ends
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 ONE_BLOCK = "one block"
 COPULA = "the model's copula"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
@@ -28,8 +28,7 @@ from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, Stan
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 DRAWS = 128
 """Draws of the blocks' parameters where several uncertain blocks are given."""

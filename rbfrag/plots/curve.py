@@ -11,7 +11,6 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
@@ -33,11 +32,11 @@ from rbfrag.plots.labels import as_written
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.words import numbers_in_words
 from rbfrag.solver.kinds import mode_of_kind
+from rbfrag.solver.results import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 AXIS = {
     "pgv_m_s": "peak ground velocity, PGV [m/s]",

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
@@ -17,9 +16,7 @@ from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction_array import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-
-FloatArray = NDArray[np.float64]
-
+from rbfrag.solver.results import FloatArray
 
 ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa03", "sa10", "sa20", "sa30", "pga_tm", "pgd_tm")
 """Terms that are one number."""
