@@ -13,7 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_array import array_answer
+from rbfrag.fragility.prediction import array_answer
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.hazards.shaking import rises_below
 from rbfrag.question.fields import AnsweringFields

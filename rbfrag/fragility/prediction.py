@@ -168,6 +168,17 @@ def answer_given(
     return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
+def array_answer(
+    model: FragilityModel, given: Mapping[str, Any], level: float = 0.95, *, interval: bool = True
+) -> PredictionArray:
+    """Return the answer of one model for values by name, some of which are arrays."""
+    from rbfrag.fragility.prediction_array import PredictionArray
+
+    answer = answer_given(model, given, level, interval=interval)
+    assert isinstance(answer, PredictionArray)
+    return answer
+
+
 def single_numbers(given: Mapping[str, ArrayLike]) -> dict[str, float] | None:
     """Return the values of a question as floats; None where one of them is an array."""
     singles: dict[str, float] = {}

@@ -17,7 +17,6 @@ from rbfrag.fragility.checks import Finding, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
-from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.frames import Tabular
@@ -166,15 +165,6 @@ class _Columns:
     in_domain: NDArray[np.bool_]
     unknown: FloatArray | None = None
     block_sd: FloatArray | None = None
-
-
-def array_answer(
-    model: FragilityModel, given: Mapping[str, Any], level: float = 0.95, *, interval: bool = True
-) -> PredictionArray:
-    """Return the answer of one model for values by name, some of which are arrays."""
-    answer = answer_given(model, given, level, interval=interval)
-    assert isinstance(answer, PredictionArray)
-    return answer
 
 
 def predict_many(

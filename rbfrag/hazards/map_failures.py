@@ -24,7 +24,7 @@ from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
-from rbfrag.fragility.prediction_array import array_answer
+from rbfrag.fragility.prediction import array_answer
 from rbfrag.hazards.correlations import correlations
 from rbfrag.hazards.site_probability import SiteProbability
 from rbfrag.hazards.site_shaking import SiteShaking

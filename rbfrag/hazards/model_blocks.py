@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_array import PredictionArray, array_answer
+from rbfrag.fragility.prediction import array_answer
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility

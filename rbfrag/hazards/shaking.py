@@ -11,7 +11,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_array import array_answer
+from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named

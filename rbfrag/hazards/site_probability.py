@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
-from rbfrag.fragility.prediction_array import PredictionArray, array_answer
+from rbfrag.fragility.prediction import array_answer
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.site_shaking import SiteShaking

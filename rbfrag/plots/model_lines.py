@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_array import array_answer
+from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
