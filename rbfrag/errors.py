@@ -44,7 +44,7 @@ _LONG_WORD = re.compile(r"(\S{60})\S{140,}")
 _BLANKS = re.compile(r"[ \t]*[\r\n\t]\s*")
 # control characters, line separators, and marks that turn the direction of writing around
 _UNPRINTABLE = re.compile(
-    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+    "[\x00-\x1f\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]"
 )
 
 

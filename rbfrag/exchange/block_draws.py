@@ -43,7 +43,8 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         )
     size = next(iter(drawn.values())).size
     if has_shape(drawn):
-        blocks = many_blocks(drawn, size, rows=True)
+        with table.named():
+            blocks = many_blocks(drawn, size, rows=True)
         for each in (*blocks.refused, *blocks.unstable):
             raise InputError(f"{path}: draw {each.places[0] + 1}: {each.texts()[0]}")
         if len(blocks.groups) > 1:

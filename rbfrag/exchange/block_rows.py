@@ -223,7 +223,8 @@ def read_blocks(
         columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
     kinds = [each or kind or "" for each in columns.get("kind", [""] * size)]
     modes = columns["mode"].tolist() if "mode" in columns else None
-    blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
+    with table.named():
+        blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
     table.check_read(stated, blocks.read)
     reasons = block_reasons_of(blocks, size)
     columns |= {

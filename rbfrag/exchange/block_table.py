@@ -118,6 +118,14 @@ class BlockTable:
                 text = f"{name} does not go with the blocks of {self.name}: leave it out"
                 raise InputError(text, fields=(name,))
 
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Name the table where something is refused of all of its blocks."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}", fields=error.fields) from None
+
     def need(self, names: Collection[str]) -> None:
         """Refuse a table without some columns."""
         for name in names:

@@ -144,7 +144,8 @@ def _answer(
             raise InputError(f"{column_of(name)} is {what} {table.name}: give it once, or of all")
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
-    predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)
+    with table.named():
+        predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "reason")

@@ -278,6 +278,14 @@ def test_columns_that_must_be_whole_are_refused_with_all_their_lines(tmp_path: P
     )
 
 
+@pytest.mark.parametrize("read", [read_blocks, read_draws])
+def test_what_is_wrong_with_all_rows_names_the_file(tmp_path: Path, read: Any) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("alpha1_deg,alpha3_deg,r3_m\n-10,20,1\n")
+    with pytest.raises(InputError, match=r"a\.csv: beta_deg is missing: the mode"):
+        read(path)
+
+
 def test_a_long_list_has_room_in_a_message() -> None:
     places = [f"line {i} (block {'n' * 60}{i})" for i in range(5000)]
     reasons = [f"kr = {i} is not a number" if i % 2 else "p2 is empty" for i in range(5000)]

@@ -60,6 +60,8 @@ def open_table(
         return _of_one_part(_given_part(source), "row")
     path = Path(source)
     suffix = path.suffix.lower()
+    if sheet is not None and suffix != ".xlsx":
+        raise InputError(f"{path} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
     if suffix in GEOJSON:
         return _of_one_part(read_points(path), "feature")
     if suffix not in SUFFIXES:
@@ -70,8 +72,6 @@ def open_table(
     stack.enter_context(_reading(path))
     if suffix == ".xlsx":
         return open_workbook(path, stack, sheet)
-    if sheet is not None:
-        raise InputError(f"{path} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
     if suffix == ".parquet":
         return open_parquet(path, stack)
     return open_csv(path, stack, fast=path.is_file() and path.stat().st_size > _LARGE)
