@@ -312,19 +312,11 @@ def model_section(models: Sequence[FitReport]) -> str:
     names = textwrap.fill(", ".join(f"`{report.name}`" for report in models), 120)
     return f"""## Models
 
-<<<<<<< HEAD
-Fitted without vertical motion ([how](../theory/fragility.md), [how
-well](model-choice.md), [blocks that slide or slump](other-kinds.md),
-[free-standing blocks](../theory/rocking.md)) to what is shipped; those of slumping and of rocking
-to grids of blocks whose results are too many to be shipped. One of each kind is the default;
-`rbfrag models show` prints the coefficients with their errors, and the domain.
-=======
 Fitted without vertical motion ([how](../theory/fragility.md), [how well](model-choice.md), [blocks
 that slide or slump](other-kinds.md), [free-standing blocks](../theory/rocking.md)) to what is
 shipped, of {models[0].events} earthquakes; those of slumping and of rocking to grids of blocks
 whose results are too many to be shipped. One of each kind is the default. `rbfrag models
 show` prints coefficients, errors and domain.
->>>>>>> main
 
 {names}
 

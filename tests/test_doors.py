@@ -63,6 +63,7 @@ SHAPES: list[dict[str, Any]] = [
     {"height_m": 1.0, "width_m": 2.0, "beta_deg": -10.0, "phi_deg": 30.0, "displacement_m": 0.5},
     # topples: the displacement is not read
     {"height_m": 2.0, "width_m": 0.4, "beta_deg": 4.0, "phi_deg": 35.0, "displacement_m": 0.1},
+    {"height_m": 2.0, "width_m": 0.4, "beta_deg": 4.0, "phi_deg": 35.0, "displacement_m": -0.1},
     # on the boundary between two modes, and beside it
     {"height_m": 1.0, "width_m": 1.0, "phi_deg": 45.0, "displacement_m": 0.1},
     {"height_m": 1.0, "width_m": 1.0, "phi_deg": 45.0000001, "displacement_m": 0.1},

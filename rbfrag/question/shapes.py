@@ -201,7 +201,7 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
     """Refuse values that are out of the ranges of their fields, and say where angles are odd.
 
     Args:
-        stated: sides, angles and planes, by field; NaN where a friction angle is not known.
+        stated: values by field; NaN where a friction angle or a displacement is not stated.
         listener: hears of it.
         columns: call fields as the columns of tables that are written.
     """
@@ -215,7 +215,7 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
             continue
         about, unknown = fields[name], value != value
         shown = column_of(name) if columns else name
-        if not is_friction:
+        if not is_friction and name != "displacement_m":
             text = "is empty" if columns else "is no number"
             listener.refuse(unknown, f"{shown} {text}", name)
         text = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
@@ -238,6 +238,7 @@ def numbers_of_shape(
         stated: restitutions and standard deviations that are stated, by field.
         listener: hears why shapes cannot be answered for.
     """
+    check_ranges({"displacement_m": displacement_m}, listener)
     k, mode = judged.k, judged.mode
     words: dict[str, Any] = {"k": k, "mode": words_of_mode(mode), "kind": facts.kind}
     angles = {"beta": judged.beta_deg, "alpha1": judged.body.alpha1_deg}

@@ -79,9 +79,10 @@ def _drawn(
         return kind_of_mode(result.mode, back_fracture=given.get("back_fracture", True)).kind
 
     numbers = {name: given[name] for name in ("p2", "kr") if name in given}
-    others = [name for name in given if name not in (*numbers, "back_fracture")]
-    if numbers or not others:
+    shape = None if numbers else shape_of(given)
+    if shape is None:
         require(numbers, "p2", "kr")
+        others = [name for name in given if name not in (*numbers, "back_fracture")]
         if others:
             raise InputError(
                 f"{others[0]} does not go with p2 and kr: a block is these two numbers, or a shape "
@@ -90,8 +91,6 @@ def _drawn(
             )
         body, result = level_rectangle(**numbers)
         return body, result, kind_of(result), numbers
-    shape = shape_of(given)
-    assert shape is not None  # planes without one are refused
     result = stability(shape.block, **shape.rough())
     kind = kind_of(result)
     slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
