@@ -331,7 +331,8 @@ def _answer_with_diagnostics(
         if refuse_nan and holds.any():
             first = int(np.flatnonzero(holds)[0])
             where = tuple(int(i) for i in np.unravel_index(places[first], shape))
-            raise InputError(f"element {where}: {finding.about(float(finding.value[first]))}")
+            text = f"element {where}: {finding.about(float(finding.value[first]))}"
+            raise InputError(text, fields=(finding.name,))
         say(holds, finding)
 
     def unstable(holds: NDArray[np.bool_], _: Finding) -> None:

@@ -117,7 +117,7 @@ def refuse_elements(reasons: NDArray[np.object_], why: str = "") -> None:
     """
     wrong = elements(reasons)
     if reasons.size == 1 and wrong:
-        raise InputError(reasons[0])
+        raise InputError(reasons[0], fields=("displacement_m", "phi_deg", "beta_deg"))
     if wrong and (why or len(wrong) == reasons.size):
         refuse("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
 

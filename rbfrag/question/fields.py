@@ -535,7 +535,7 @@ def by_field(words: Mapping[str, Any]) -> dict[str, Any]:
         name = name_of(word)
         if name in given:
             raise InputError(
-                f"{word} does not go with {words_of[name]}: both say the same, {name}",
+                f"{word} does not go with {words_of[name]}: both say the same",
                 fields=(word, words_of[name]),
             )
         words_of[name] = word

@@ -155,7 +155,7 @@ def scenario(
     measures = {name: float(value) for name, value in measures.items()}
     for refusal in refusals(measures, measures):
         if refusal.holds:
-            raise InputError(refusal.about(refusal.value))
+            raise InputError(refusal.about(refusal.value), fields=(refusal.name,))
     if not measures:
         raise InputError("a scenario needs a measure of the motion: give pgv_m_s, or others")
     checked_level(level)
