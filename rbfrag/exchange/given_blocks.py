@@ -21,7 +21,7 @@ from rbfrag.question.blocks import (
     one_block,
     taken_as_medians,
 )
-from rbfrag.question.fields import column_of
+from rbfrag.question.fields import BlockFields, column_of
 
 
 def given_blocks(
@@ -50,7 +50,8 @@ def given_blocks(
         (group,) = described.groups
         rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
         return replace(rows, remarks=described.remarks)
-    refuse_elements(block_reasons_of(*blocks_of_arrays(given)))
+    reasons = block_reasons_of(*blocks_of_arrays(given))
+    refuse_elements(reasons, fields=BlockFields.__optional_keys__)
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, known.values()))
     except ValueError:

@@ -7,7 +7,7 @@ table of which none can be used, is refused by :func:`refuse`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -108,16 +108,19 @@ def refuse(
     )
 
 
-def refuse_elements(reasons: NDArray[np.object_], why: str = "") -> None:
+def refuse_elements(
+    reasons: NDArray[np.object_], why: str = "", fields: Collection[str] = ()
+) -> None:
     """Refuse arrays of blocks, by their elements; without `why` only where none can be used.
 
     Args:
         reasons: of each element, empty where it can be used, shape (m,).
         why: why the others do not do.
+        fields: fields that a door spells in the reason of a single one.
     """
     wrong = elements(reasons)
     if reasons.size == 1 and wrong:
-        raise InputError(reasons[0], fields=("displacement_m", "phi_deg", "beta_deg"))
+        raise InputError(reasons[0], fields=fields)
     if wrong and (why or len(wrong) == reasons.size):
         refuse("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
 

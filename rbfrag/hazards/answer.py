@@ -40,7 +40,7 @@ from rbfrag.hazards.model_blocks import (
 )
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
 from rbfrag.question.blocks import taken_as_medians
-from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
@@ -233,7 +233,7 @@ def hazard(
     reading = Shaking.of(curves[0], **meaning)
     given, medians = taken_as_medians(given)
     own, remarks, reason = parts_by_model(given, reading.name, answering)
-    refuse_elements(reason)
+    refuse_elements(reason, fields=BlockFields.__optional_keys__)
     sound = np.asarray(reason == "", dtype=bool)
     size = int(sound.sum())
     counts = _checked_counts(at_least, size)

@@ -22,7 +22,7 @@ from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.shaking import Shaking
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.fields import AnsweringFields, BlockFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
@@ -182,7 +182,7 @@ class ModelBlocks:
         if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
         parts, remarks, reason = parts_by_model(stated, shaking.name, answering)
-        refuse_elements(reason, ALL_STAND)
+        refuse_elements(reason, ALL_STAND, BlockFields.__optional_keys__)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)
             raise InputError(f"the blocks are of kinds {kinds}: ask of each kind by itself")
