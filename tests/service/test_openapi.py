@@ -1,10 +1,5 @@
 """The OpenAPI document says what the service does."""
 
-import json
-import subprocess
-import sys
-from textwrap import dedent
-
 import pytest
 
 from benchmarks import service_fuzz
@@ -68,37 +63,6 @@ def test_every_quantity_has_its_unit(client):
             for parameter in operation.get("parameters", ()):
                 if parameter["name"] not in NO_UNIT:
                     assert "[" in parameter["description"], parameter["name"]
-
-
-FURTHER = dedent(
-    """
-    import json
-    from typing import Annotated
-    from rbfrag.question import fields
-    about = fields.Field("Mean {kr}", "m", least=0.0)
-    fields.BlockFields.__annotations__["rough_m"] = Annotated[float, about]
-    from fastapi.testclient import TestClient
-    from rbfrag.service.app import make_app
-    from rbfrag.service.settings import Settings
-    client = TestClient(make_app(Settings()))
-    asked = {"p2": 3, "kr": 0.1, "pgv": 0.6, "rough": 1}
-    answers = client.get("/v1/predict", params=asked), client.post("/v1/predict", json=asked)
-    document = client.get("/v1/openapi.json").json()["paths"]["/v1/predict"]
-    print(json.dumps([document, *(each.text for each in answers)]))
-    """
-)
-
-
-def test_a_field_that_is_declared_is_a_parameter_of_requests():
-    done = subprocess.run([sys.executable, "-c", FURTHER], capture_output=True, text=True)
-    document, *answers = json.loads(done.stdout)
-    (one,) = (each for each in document["get"]["parameters"] if each["name"] == "rough")
-    assert one["description"] == "Mean kr [m]."
-    assert one["schema"]["anyOf"][0] == {"type": "number", "minimum": 0.0}
-    sent = document["post"]["requestBody"]["content"]["application/json"]["schema"]["properties"]
-    assert "array" in {each["type"] for each in sent["rough"]["anyOf"]}
-    for answer in answers:
-        assert "rough does not go with kind toppling" in answer or "probability" in answer
 
 
 def test_a_null_in_a_body_is_as_if_left_out(client):
