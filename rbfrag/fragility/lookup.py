@@ -132,7 +132,8 @@ def find_model(
     if kind is not None and chosen.row.kind != kind:
         raise InputError(f"model {chosen.name!r} is of kind {chosen.kind}, not {kind}")
     block = chosen.method.block
-    _check_block(chosen.kind, block, given, chosen)
+    if not MEASURES.issuperset(given):  # of measures alone the caller has the block
+        check_numbers(chosen.kind, block, given, chosen)
     if block.criterion is not None or rotation_deg is not None:
         _check_criterion(chosen.kind, block, rotation_deg)
         if chosen.criterion != rotation_deg:
@@ -187,7 +188,8 @@ def _suited_in(
         raise UnknownModelError(f"{store.place} holds no {kind} model: {_how_to_make(kind)}")
     suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
     block = store.model(suited[0]).method.block if suited else block_of_question
-    _check_block(kind, block, given, None)
+    if not MEASURES.issuperset(given):
+        check_numbers(kind, block, given)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
     for row in suited:
@@ -232,19 +234,23 @@ def _merit(row: ModelRow) -> tuple[bool, float]:
     return not row.is_default, held_out_loss(row)
 
 
-def _check_block(
-    kind: str, block: BlockParameters, given: Collection[str], model: FragilityModel | None
+SIDES = ("height_m", "width_m")
+
+
+def check_numbers(
+    kind: str, block: BlockParameters, given: Collection[str], model: FragilityModel | None = None
 ) -> None:
     """Refuse a question that describes its block in another way than a kind needs it.
 
-    Measures of the motion alone are no description: the caller has the block.
+    Args:
+        kind: how the block fails.
+        block: what describes such a block.
+        given: names of what is given of block and shaking.
+        model: the model that is asked for, if it decides about the kind.
     """
-    described = [name for name in given if name not in MEASURES]
     missing = [name for name in block.names if name not in given]
     own = {*block.names, *block.options, *block.sigmas}
-    others = [name for name in described if name not in own]
-    if not described or not (missing or others):
-        return
+    others = [name for name in given if name not in MEASURES and name not in own]
     if others and len(missing) == len(block.names):
         who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
         raise InputError(
@@ -254,10 +260,13 @@ def _check_block(
     if missing:
         raise InputError(
             f"{missing[0]} is missing: a block of kind {kind} is given by "
-            f"{' and '.join(block.names)}",
-            fields=block.names,
+            f"{' and '.join(block.names)}, or by its shape, such as {' and '.join(SIDES)}",
+            fields=(*block.names, *SIDES),
         )
-    raise InputError(f"{others[0]} does not go with kind {kind}: leave it out", fields=(others[0],))
+    if others:
+        raise InputError(
+            f"{others[0]} does not go with kind {kind}: leave it out", fields=(others[0],)
+        )
 
 
 def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | None) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
+from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
@@ -143,12 +144,8 @@ def answer_given(
     weights: ArrayLike | None = None,
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
-    for name in model.method.block.names:
-        if name not in given:
-            raise InputError(
-                f"{name} is missing: a block of kind {model.kind} is given by "
-                f"{' and '.join(model.method.block.names)}"
-            )
+    if not given.keys() >= {*model.method.block.names}:
+        check_numbers(model.kind, model.method.block, given)
     quantiles = quantiles_of(checked_level(level))
     if weights is not None:
         from rbfrag.fragility.uncertain import drawn_model

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of
+from rbfrag.fragility.lookup import block_of, check_numbers
 from rbfrag.question.fields import (
     BlockFields,
     FailureFields,
@@ -133,36 +133,6 @@ def kinds_by_numbers(given: Collection[str]) -> list[KindFacts]:
     ]
 
 
-def missing_number(
-    given: Collection[str], kind: str | None = None
-) -> tuple[str, tuple[str, ...]] | None:
-    """Return the first number that a block by numbers lacks, and all of its kind; None for none.
-
-    Args:
-        given: names of the numbers.
-        kind: how the block is asked to fail; None for what the numbers say.
-    """
-    block = block_of(given, kind)
-    missing = [name for name in block.names if name not in given]
-    return (missing[0], block.names) if missing and kind in (None, block.kind) else None
-
-
-def refuse_foreign(given: Collection[str], kind: str | None = None) -> None:
-    """Refuse numbers that a block of a kind has not.
-
-    Args:
-        given: names of the numbers.
-        kind: how the block fails; None for what the numbers say.
-    """
-    block = block_of(given, kind)
-    known = (*block.names, *block.options, *block.sigmas)
-    if foreign := [name for name in given if name not in known]:
-        raise InputError(
-            f"{foreign[0]} does not go with kind {kind or block.kind}: leave it out",
-            fields=(foreign[0],),
-        )
-
-
 def numbers_in(columns: Mapping[str, Any]) -> dict[str, Any]:
     """Return what answers read of blocks, by field, from columns of a table that was written."""
     return {
@@ -194,6 +164,12 @@ def _listed_numbers(value: Any) -> list[float]:
     return [each for each in (numbers if isinstance(numbers, list) else [numbers]) if each == each]
 
 
+FREE_NEEDS_NONE = (
+    "; a rectangle that stands free needs none to rock and overturn: predict and respond answer "
+    "with kind rocking"
+)
+
+
 class Shape(NamedTuple):
     """A block by its shape, and its planes.
 
@@ -212,9 +188,11 @@ class Shape(NamedTuple):
 
     def known(self) -> Shape:
         """Return the shape, or refuse one of which the friction is not known."""
-        if "phi_deg" not in self.planes:
-            raise InputError(FRICTION_MISSING, fields=("phi_deg",))
-        return self
+        if "phi_deg" in self.planes:
+            return self
+        stands_free = self.is_rectangle and not self.planes.get("back_fracture", True)
+        text = f"{FRICTION_MISSING}{FREE_NEEDS_NONE if stands_free else ''}"
+        raise InputError(text, fields=("phi_deg", "kind"))
 
     def rough(self) -> dict[str, Any]:
         """Return the planes, with a friction that leaves a rectangle no choice but to topple."""
@@ -281,15 +259,15 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _One:
-    """Raises the first reason against a single block, with what is odd about its angles."""
+    """Raises the first reason against a single block, with what is suspicious about its angles."""
 
-    def __init__(self, odd: Collection[str] = ()) -> None:
+    def __init__(self, suspicious: Collection[str] = ()) -> None:
         self.remarks: list[str] = []
-        self._odd = odd
+        self._suspicious = suspicious
 
     def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
         if holds:
-            text = "; ".join((text.format(**values), *self._odd))
+            text = "; ".join((text.format(**values), *self._suspicious))
             raise InputError(text, fields=(*fields, *PLANES))
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
@@ -340,6 +318,9 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     given, unread = read_by_some(without_kv(given))
     shape = shape_of(given)
     if shape is None:
+        block = block_of(given, kind)
+        if kind in (None, block.kind):  # what another kind reads the choice of its model says
+            check_numbers(block.kind, block, given)
         return Blocks((Group(kind, given),), unread)
     from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged

@@ -115,15 +115,18 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical --json` prints."""
     from rbfrag.fragility.methods import TOPPLING_BLOCK
-    from rbfrag.question.blocks import one_block
+    from rbfrag.question.blocks import has_shape, one_block
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
-    (group,) = one_block(query.given(), TOPPLING_BLOCK.kind).groups
-    require(group.numbers, "p2")
+    numbers = query.given()
+    if has_shape(numbers):
+        (group,) = one_block(numbers, TOPPLING_BLOCK.kind).groups
+        numbers = {**group.numbers}
+    require(numbers, "p2")
     result = search(
         _motion(body, query),
-        p2=group.numbers["p2"],
+        p2=numbers["p2"],
         polarity="reverse" if query.reverse else "forward",
         full_map=query.map,
     )

@@ -123,7 +123,7 @@ def test_block_names_the_command_for_a_block_that_stands_free(
     shell: Shell, refuses: Refuses
 ) -> None:
     shape = ("block", "--height", "2", "--width", "0.5", "--no-back")
-    assert "rbfrag predict --kind rocking" in refuses(*shape)
+    assert "predict and respond answer with --kind rocking" in refuses(*shape)
     warned = shell.json(*shape, "--phi", "40")["warnings"]
     assert any("rbfrag predict --kind rocking" in text for text in warned)
 

@@ -135,21 +135,12 @@ def numbers_of(
     Raises:
         InputError: it is described twice or in part, or is of another kind.
     """
-    from rbfrag.question.blocks import missing_number, one_block, refuse_foreign
+    from rbfrag.question.blocks import one_block
 
     stated = {field: value for field, value in given.items() if field != "kind"}
     with given.named():
         blocks = one_block(stated, given.get("kind", kind))
     (group,) = blocks.groups
-    if lacking := missing_number(group.numbers, group.kind):
-        missing, names = lacking
-        of_kind = f" of kind {group.kind}" if group.kind else ""
-        raise InputError(
-            f"{missing} is missing: a block{of_kind} is given by {' and '.join(names)}, or by its "
-            "shape, such as height_m and width_m",
-            fields=(*names, "height_m", "width_m"),
-        )
-    refuse_foreign(group.numbers, group.kind)
     return group.kind, {**group.numbers}, blocks.remarks
 
 
