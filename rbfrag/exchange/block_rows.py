@@ -155,11 +155,8 @@ class BlockRows:
     def refused_by_row(self) -> dict[int, dict[str, str]]:
         """Return ``block_id``, ``site_id`` and ``reason`` of what cannot be used, by its row."""
         names = [name for name in ("block_id", "site_id", "reason") if name in self.refused]
-        texts = zip(*(self.refused[name].tolist() for name in names), strict=True)
-        return {
-            row: dict(zip(names, each, strict=True))
-            for row, each in zip(self.refused["row"].tolist(), texts, strict=True)
-        }
+        rows = enumerate(self.refused["row"].tolist())
+        return {row: {name: self.refused[name][i] for name in names} for i, row in rows}
 
     def _refuse(self, why: str) -> NoReturn:
         reasons = self.refused["reason"].tolist()

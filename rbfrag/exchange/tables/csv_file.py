@@ -162,7 +162,7 @@ def csv_writer(
             ]
         writer.writerows(zip(*columns, strict=True))
 
-    if not fast or not dialect.is_default:
+    if not fast or dialect.delimiter != "," or dialect.marked:
         return write_cells
     try:
         arrow, _ = pyarrow()

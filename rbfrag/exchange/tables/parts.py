@@ -80,11 +80,6 @@ class Dialect:
     decimal: str = "."
     marked: bool = False
 
-    @property
-    def is_default(self) -> bool:
-        """Whether it is the one with commas and points that we write by ourselves."""
-        return self.delimiter == "," and not self.marked
-
 
 @dataclass(eq=False)
 class TableFile:

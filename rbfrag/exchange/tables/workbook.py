@@ -8,7 +8,7 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,6 @@ from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.tables.parts import (
     Part,
     Parts,
-    Rows,
     TableFile,
     Write,
     cells_of,
@@ -85,7 +84,9 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
             )
         chosen = book.worksheets[0] if sheet is None else sheets[sheet]
         chosen.reset_dimensions()  # what programs state there is not always so
-        names, _, rows, remarks = split_header(_rows(origin, chosen), "row")
+        filled = _rows(origin, chosen)
+        stack.callback(filled.close)
+        names, _, rows, remarks = split_header(filled, "row")
 
     def read(numeric: Container[str]) -> Parts:
         for part in parts_of_rows(names, rows, empty=None):
@@ -96,7 +97,7 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
     return TableFile(names, read, remarks, sheets=() if sheet else [*sheets])
 
 
-def _rows(origin: Path, sheet: Any) -> Rows:
+def _rows(origin: Path, sheet: Any) -> Generator[tuple[int, Sequence[Any]], None, None]:
     with _damage(origin):
         for number, row in enumerate(sheet.iter_rows(values_only=True), 1):
             if any(cell is not None and str(cell).strip() for cell in row):
