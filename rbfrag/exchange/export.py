@@ -18,11 +18,9 @@ from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.frames import Tabular
-from rbfrag.hazards.curve import ANSWERED
-from rbfrag.hazards.measure_type import openquake_type
+from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.words import numbers_in_words
@@ -192,7 +190,7 @@ class _Request(NamedTuple):
         )
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
         rows = given_blocks(given, blocks)
-        table, measure = rows.whole(EACH_NEEDED), _measure(request.get("imt", "PGV"))
+        table, (measure, _) = rows.whole(EACH_NEEDED), requested_measure(request.get("imt", "PGV"))
         kind, read, medians = read_by_models(rows)
         names = [str(each) for each in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):
@@ -228,15 +226,6 @@ class _Request(NamedTuple):
             for row in rows
             for known in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
         ]
-
-
-def _measure(imt: str) -> str:
-    """Return the measure that functions are of, as `predict` calls it."""
-    kind = openquake_type(imt, "--imt")
-    measure = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
-    if measure is None:
-        raise InputError(f"--imt {imt}: use one of {ANSWERED}")
-    return measure
 
 
 def _answer(

@@ -156,7 +156,7 @@ def shakemap(
     if not shaking.integrated:
         warnings.append(
             f"the map's uncertainty of {' and '.join(shaking.names)} is not given: its values "
-            "are taken as certain; name uncertainty.xml with --uncertainty"
+            "are taken as certain; uncertainty.xml has it"
         )
     places = Places.of(lon, lat, table.get("site_id") if own else None)
     failures = map_failures(answer, read, places, weight=weight, draws=draws, seed=seed)

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.files import as_path, reading
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
-from rbfrag.hazards.measure_type import IntensityType, openquake_type
+from rbfrag.hazards.measure_type import IntensityType, openquake_type, requested_measure
 from rbfrag.solver.results import FloatArray
 
 FILES = {
@@ -121,7 +120,7 @@ class JobFiles:
                 if len(fits) > 1:
                     raise InputError(
                         f"{place} has {' and '.join(fits[:3])}: keep the files of one job in a "
-                        f"folder of their own, or name the file with {_option(what)}"
+                        f"folder of their own, or name the file of {what.replace('_', '-')}"
                     )
                 if fits:
                     chosen[what] = place / fits[0]
@@ -130,17 +129,13 @@ class JobFiles:
             where = "" if folder is None else f" in {folder}"
             raise InputError(
                 f"there is no file of {missing[0].replace('_', '-')}{where}: export it (oq export "
-                f"… -e csv), or name it with {_option(missing[0])}"
+                "… -e csv), or name that file"
             )
         return cls(**chosen)
 
     def paths(self) -> dict[str, Path]:
         """Return the files by what they hold."""
         return {name: path for name in FILES if (path := getattr(self, name)) is not None}
-
-
-def _option(name: str) -> str:
-    return "--" + name.replace("_", "-")
 
 
 @dataclass(frozen=True)
@@ -422,7 +417,8 @@ def _duration(
         )
         raise InputError(
             f"{where}, which states how long the events took; without it no rate can be given: "
-            "name the file with --ruptures, or give --investigation-time and --ses as in job.ini"
+            "name that file, or give investigation_time and ses as in job.ini",
+            fields=("investigation_time", "ses"),
         )
     sets = known["ses_per_logic_tree_path"]
     if not math.isfinite(sets) or sets != int(sets):
@@ -491,16 +487,13 @@ def _measure_columns(head: _Head, imts: Sequence[str]) -> dict[str, tuple[str, f
                 continue  # another measure than those that models read
     chosen: dict[str, tuple[str, float]] = {}
     for imt in imts:
-        kind = openquake_type(imt, "--imt")
-        name = SPECTRAL.get(kind.period_s) if kind.period_s is not None else kind.measure
-        if name is None:
-            periods = ", ".join(f"SA({period:g})" for period in SPECTRAL)
-            raise InputError(f"--imt: no model reads {imt}; of spectral accelerations {periods}")
+        name, kind = requested_measure(imt)
         if kind not in present:
             have = ", ".join(kind.imt for kind in present) or "none"
             raise InputError(
                 f"{head.path}, line {head.lines}: there is no column gmv_{kind.imt}; the measures "
-                f"are {have}: choose with --imt"
+                f"are {have}: choose with imt",
+                fields=("imt",),
             )
         chosen[name] = present[kind], kind.factor
     return chosen

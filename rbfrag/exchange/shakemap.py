@@ -176,7 +176,8 @@ class GridReading:
                 f"{columns} x {rows} = {columns * rows}"
             )
             if not allow_partial:
-                raise InputError(f"{message}: with --allow-partial it is read as it is")
+                text = f"{message}: with allow_partial it is read as it is"
+                raise InputError(text, fields=("allow_partial",))
             warnings.append(f"{message}: read as it is")
         fields = {
             "lon": self._degrees(table, "LON", 180.0),

@@ -66,7 +66,7 @@ def share_functions(
         raise InputError(
             f"model {chosen.name!r} does not know what the blocks of one earthquake share, so how "
             "many of a rock mass fail together is not known: fit it on more earthquakes, or name "
-            "another with --model"
+            "another model"
         )
     x = scanned_levels()[::_EVERY]
     numbers = {"p2": p2, "kr": kr}

@@ -37,13 +37,14 @@ def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
     if len(measures) > 1:
         raise InputError(
             f"the curves are of {', '.join(measures)}: give curves of one measure, or choose it "
-            "with --imt"
+            "with imt",
+            fields=("imt",),
         )
     places = list(dict.fromkeys(curve.place for curve in curves if curve.place))
     if len(places) > 1:
         raise InputError(
             f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks "
-            "stand at one: choose it with --site"
+            "stand at one: choose it by its number or name"
         )
 
 

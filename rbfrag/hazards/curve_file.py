@@ -52,7 +52,8 @@ def _one_curve(path: str | os.PathLike[str], meaning: CurveKeywords) -> HazardCu
     curves = suited_in(path, **meaning)
     if len(curves) > 1:
         raise InputError(
-            f"{path} has {len(curves)} sites, and the blocks stand at one: choose it with --site"
+            f"{path} has {len(curves)} sites, and the blocks stand at one: choose it by its number "
+            "or name"
         )
     return curves[0]
 
@@ -100,7 +101,7 @@ def hazard_curves_in(
 
 
 def _of_imt(curves: list[HazardCurve], imt: str, source: str) -> list[HazardCurve]:
-    kind = openquake_type(imt, "--imt")
+    kind = openquake_type(imt, "imt")
     selected = [
         curve
         for curve in curves
@@ -160,7 +161,7 @@ def suited_curves(
 def _with_choice(curve: HazardCurve, names: list[str]) -> HazardCurve:
     text = (
         f"of {', '.join(names)} the curve of {curve.imt} is taken, the measure that tells most of "
-        "toppling by itself: choose another with --imt"
+        "toppling by itself: imt chooses another"
     )
     return replace(curve, warnings=(*curve.warnings, text))
 

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.hazards.curve import ANSWERED
 
 _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
@@ -47,5 +49,16 @@ def openquake_type(imt: str, where: str) -> IntensityType:
             return IntensityType("sa_g", 1.0, period)
     raise InputError(
         f"{where}: intensity measure {imt!r} is not known: PGA [g], PGV [cm/s] and "
-        "SA(period) [g] are"
+        "SA(period) [g] are",
+        fields=("imt",),
     )
+
+
+def requested_measure(imt: str) -> tuple[str, IntensityType]:
+    """Return the measure that is asked for, as `predict` calls it, and its meaning."""
+    kind = openquake_type(imt, "imt")
+    name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
+    if name is None:
+        text = f"imt = {imt}: no model reads it: use one of {ANSWERED}"
+        raise InputError(text, fields=("imt",))
+    return name, kind

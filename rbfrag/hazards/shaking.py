@@ -83,41 +83,43 @@ def _measure(
     """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
     if convert is None:
         if sigma is not None:
-            raise InputError("--convert-sigma belongs to --convert: leave it out")
+            both = ("convert_sigma", "convert")
+            raise InputError("convert_sigma belongs to convert: leave it out", fields=both)
         if curve.known_as is None:
-            raise InputError(_no_model(curve))
+            raise InputError(_no_model(curve), fields=("convert",))
         return curve.known_as, 1.0, 0.0
     if curve.measure != "sa_g":
         raise InputError(
-            f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
-            f"{curve.imt}"
+            f"{curve.source}: convert = {convert} is for spectral accelerations; the curve is of "
+            f"{curve.imt}",
+            fields=("convert",),
         )
     used = velocity_conversion(convert)
     if not curve.is_of(used.period_s):
         raise InputError(
             f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
-            f"choose the curve with --imt 'SA({used.period_s:g})'"
+            f"choose the curve with imt 'SA({used.period_s:g})'",
+            fields=("imt",),
         )
     spread = used.scatter if sigma is None else sigma
     if not 0.0 < spread < math.inf:
         raise InputError(
-            f"--convert-sigma = {spread:g}: give the standard deviation of ln PGV about the "
-            "conversion, above zero; no conversion is without scatter"
+            f"convert_sigma = {spread:g}: give the standard deviation of ln PGV about the "
+            "conversion, above zero; no conversion is without scatter",
+            fields=("convert_sigma",),
         )
     warnings.append(
         f"PGV = {used.factor:.4g} m/s per g times {curve.imt} in the median ({used.source}); "
         f"ln PGV scatters about it by {spread:g}, which is integrated"
     )
     if curve.known_as is not None:
-        warnings.append(
-            f"there are models of {curve.imt} itself: without --convert nothing is converted"
-        )
+        warnings.append(f"there are models of {curve.imt} itself: it need not be converted")
     return "pgv_m_s", used.factor, spread
 
 
 def _no_model(curve: HazardCurve) -> str:
     also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
-    converted = f", or convert it to PGV with --convert {' or '.join(also)}" if also else ""
+    converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
     return (
         f"{curve.source}: no model reads {curve.imt}: give a curve of one of {ANSWERED}{converted}"
     )

@@ -232,7 +232,7 @@ def test_plot(shell: Shell, curve: Path) -> None:
     [
         ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
          "no model reads SA(0.5): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3), or"
-         " convert it to PGV with --convert bommer_alarcon_2006"),
+         " turn it into PGV with --convert bommer_alarcon_2006"),
         ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
          "no model reads SA(0.75): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3)"),
         ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),

@@ -95,7 +95,7 @@ def test_files_by_name_and_time_by_option(shell: Shell, job: Path) -> None:
 
 def test_what_is_refused(refuses: Refuses, job: Path) -> None:
     blocks = ("--blocks", "blocks.csv")
-    assert "name it with --gmf-data" in refuses("losses", *blocks)
+    assert "there is no file of gmf-data" in refuses("losses", *blocks)
     assert "is no folder" in refuses("losses", "nowhere", *blocks)
     assert "no column gmv_PGA" in refuses("losses", job, *blocks, "--imt", "PGA")
     assert "--samples" in refuses("losses", job, *blocks, "--expected", "--samples", "5")

@@ -115,9 +115,9 @@ def test_measures_by_name(tmp_path: Path) -> None:
 
 def test_time_is_stated_never_guessed(tmp_path: Path) -> None:
     folder = write_job(tmp_path, ruptures=False)
-    with pytest.raises(InputError, match="--investigation-time and --ses"):
+    with pytest.raises(InputError, match="investigation_time and ses"):
         read(folder)
-    with pytest.raises(InputError, match="--investigation-time and --ses"):
+    with pytest.raises(InputError, match="investigation_time and ses"):
         read(folder, ses=2)
     assert read(folder, investigation_time=50.0, ses=2).weight[3] == pytest.approx(0.003)
     with pytest.raises(InputError, match="investigation_time is 50, given is 100"):
@@ -170,7 +170,9 @@ def test_refusals_name_the_line(
 def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:
     folder = write_job(tmp_path / "job")
     shutil.copy(folder / "events_5.csv", folder / "events_6.csv")
-    with pytest.raises(InputError, match=r"events_5\.csv and events_6\.csv.*--events"):
+    with pytest.raises(
+        InputError, match=r"events_5\.csv and events_6\.csv.*name the file of events"
+    ):
         read(folder)
     named = JobFiles.of(folder, {"events": folder / "events_6.csv"})
     assert read_events(named).event_id.size == len(EVENTS)

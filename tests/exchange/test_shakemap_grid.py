@@ -66,7 +66,7 @@ def test_blank_units_are_those_of_the_manual(formats_dir: Path) -> None:
 
 def test_version_4_has_another_order_and_lies_about_its_size(formats_dir: Path) -> None:
     path = formats_dir / "shakemap_v4_grid_cropped.xml"
-    with pytest.raises(InputError, match=r"10 nodes, .* 741 x 575 = 426075: with --allow-partial"):
+    with pytest.raises(InputError, match=r"10 nodes, .* 741 x 575 = 426075: with allow_partial"):
         read_shakemap(path)
     found = read_shakemap(path, allow_partial=True)
     assert found.measures["pga_g"][0] == pytest.approx(0.006399)
