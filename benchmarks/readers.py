@@ -33,7 +33,7 @@ from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables.files import write_block_table
-from rbfrag.hazards.branch_weights import realization_weights
+from rbfrag.hazards.branches import realization_weights
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.measure_type import IntensityType

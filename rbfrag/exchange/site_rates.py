@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,13 +12,12 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import column_of
-
-OTHERS = ("ky", "displacement_m", "ks", "ps2_1_s2")
-"""Columns of numbers that only blocks of other kinds have."""
+from rbfrag.solver.kinds import KINDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +124,11 @@ def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, 
 
 
 def _numbers(site: SiteBlocks, *, alone: bool) -> dict[str, Any]:
-    """Return p² and k_r, and what else answers read of blocks of other kinds; NaN of a class."""
-    nothing = float("nan")
-    columns = {column_of(name): values for name, values in numbers_in(site.columns).items()}
-    names = dict.fromkeys(("p2_1_s2", "kr", *(n for n in columns if n in OTHERS)))
-    return {name: columns.get(name, nothing) if alone else nothing for name in names}
+    """Return p² and k_r, and what else describes blocks of other kinds; NaN of a class."""
+    known = numbers_in(site.columns)
+    others = (name for facts in KINDS.values() for name in facts.parameters if name in known)
+    names = dict.fromkeys((*TOPPLING_BLOCK.names, *others))
+    return {column_of(n): known.get(n, math.nan) if alone else math.nan for n in names}
 
 
 def rate_columns(

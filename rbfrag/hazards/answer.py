@@ -19,16 +19,15 @@ from rbfrag.fragility.unusable import (
 )
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
-from rbfrag.hazards.branch_weights import Weights, stated_weights
 from rbfrag.hazards.branches import (
-    checked_weights,
+    Weights,
+    branch_curves,
     curve_name,
     quantile_warning,
-    refuse_unlike,
     weighted_quantiles,
 )
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
-from rbfrag.hazards.curve_file import CurveLike, as_curves
+from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import (
@@ -226,9 +225,7 @@ def hazard(
         numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
     )
     level = answering.get("level", LEVEL)
-    curves = as_curves(curve, **meaning)
-    refuse_unlike(curves)
-    weight = checked_weights(stated_weights(weights, curves), len(curves))
+    curves, weight = branch_curves(curve, weights, meaning)
     checked_years(years)
     reading = Shaking.of(curves[0], **meaning)
     given, medians = taken_as_medians(given)

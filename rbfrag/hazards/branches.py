@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.files import csv_rows, source_text
+from rbfrag.hazards.curve import CurveKeywords, HazardCurve
+from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.solver.results import FloatArray
 
 _ADDS_UP = 2e-3
 """How far weights may add up to something else than 1."""
+
+
+_REALIZATION = re.compile(r"rlz-0*(\d+)")
+
+Weights = Sequence[float | None] | str | os.PathLike[str]
+"""Weights of branches in the order of the curves, or OpenQuake's file of them."""
 
 
 def curve_name(curve: HazardCurve) -> str:
@@ -27,6 +37,21 @@ def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[str]:
             f"{curve.statistic} is the hazard of no single model, and {answer} under it no "
             f"quantile of {answer}: branches with their weights say more"
         )
+
+
+def branch_curves(
+    given: CurveLike | Sequence[CurveLike], weights: Weights | None, meaning: CurveKeywords
+) -> tuple[list[HazardCurve], FloatArray | None]:
+    """Return curves of one site and measure, and the weights of those that are branches.
+
+    Args:
+        given: curves or their files.
+        weights: as for :func:`rbfrag.hazard`.
+        meaning: which curves are meant.
+    """
+    curves = as_curves(given, **meaning)
+    refuse_unlike(curves)
+    return curves, checked_weights(_stated_weights(weights, curves), len(curves))
 
 
 def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
@@ -85,3 +110,57 @@ def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[floa
     ordered = np.take_along_axis(values, order, axis=0)
     first = [(below >= level - 1e-9).argmax(axis=0) for level in q]
     return np.stack([np.take_along_axis(ordered, at[None], axis=0)[0] for at in first])
+
+
+def realization_weights(
+    path: str | os.PathLike[str], curves: Sequence[HazardCurve]
+) -> list[float | None]:
+    """Return the weight of each curve by OpenQuake's realizations file; None for no branch.
+
+    Args:
+        path: CSV with ``rlz_id`` and ``weight``, lines that begin with # left out.
+
+    Raises:
+        InputError: the file is none of realizations, or lacks that of a curve.
+    """
+    text = source_text(path, "the realizations of a logic tree")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    header, *rows = [cells for _, cells in csv_rows("\n".join(lines), path)] or [[]]
+    weights: dict[int, float] = {}
+    for cells in rows:
+        row = dict(zip(header, cells, strict=False))
+        try:
+            weights[int(row["rlz_id"])] = float(row["weight"])
+        except (KeyError, ValueError):
+            raise InputError(
+                f"{path}: {','.join(cells)[:80]!r} is no realization: the columns rlz_id and "
+                "weight hold numbers"
+            ) from None
+    branches = [_REALIZATION.fullmatch(curve.statistic) for curve in curves]
+    if not any(branches):
+        raise InputError(
+            f"{path} has weights of realizations, and none of the curves is one (kind='rlz-001'): "
+            "give the curves of the realizations"
+        )
+    numbers = [None if match is None else int(match.group(1)) for match in branches]
+    for number in numbers:
+        if number is not None and number not in weights:
+            raise InputError(f"{path}: there is no rlz_id {number}, and a curve is of it")
+    return [None if number is None else weights[number] for number in numbers]
+
+
+def _stated_weights(
+    given: Weights | None, curves: Sequence[HazardCurve]
+) -> Sequence[float | None] | None:
+    """Return the weight of each curve, None where none are given.
+
+    Args:
+        given: numbers in the order of the curves, also as text: 0.5,0.3,0.2; or the name of a file
+            of realizations.
+    """
+    if not isinstance(given, str | os.PathLike):
+        return given
+    try:
+        return [float(part) for part in os.fspath(given).split(",")]
+    except ValueError:
+        return realization_weights(given, curves)

@@ -47,24 +47,31 @@ class JointRate:
     """Earthquakes that fail several blocks of one site.
 
     Args:
-        annual_rate_any: annual rate of earthquakes with at least one failure [1/a]; None where
-            only its bounds are known.
-        annual_rate_any_ci: both ends of its interval from the parameters of the fragility.
-        probability_any: probability of at least one such earthquake in the period.
-        at_least: the same for numbers of failures; empty where only bounds are known.
+        at_least: how often earthquakes fail some numbers of blocks or more, the first any; empty
+            where only bounds are known.
+        annual_rate_any_ci: both ends of the interval of the first rate from the parameters of the
+            fragility.
         joint_law: how the blocks of one earthquake fail together.
         bounds: the rate and the probability under full dependence, where the block of the greatest
             P fails first, and if blocks fail independently at each level of the shaking.
         warnings: what these numbers take for granted.
     """
 
-    annual_rate_any: float | None
-    annual_rate_any_ci: tuple[float, float] | None
-    probability_any: float | None
     at_least: tuple[CountRate, ...]
+    annual_rate_any_ci: tuple[float, float] | None
     joint_law: str
     bounds: Mapping[str, Mapping[str, float]]
     warnings: tuple[str, ...]
+
+    @property
+    def annual_rate_any(self) -> float | None:
+        """Annual rate of earthquakes with at least one failure [1/a]; None without a law."""
+        return self.at_least[0].annual_rate if self.at_least else None
+
+    @property
+    def probability_any(self) -> float | None:
+        """Probability of at least one such earthquake in the period; None without a law."""
+        return self.at_least[0].probability if self.at_least else None
 
     @classmethod
     def of(
@@ -101,7 +108,7 @@ class JointRate:
         }
         here = tuple(f"annual_rate_any: {text}" for text in ends)
         if thresholds is None:
-            return cls(None, None, None, (), NO_LAW, bounds, here)
+            return cls((), None, NO_LAW, bounds, here)
         rates_at, errors = thresholds.rates(curve, block_rates)
         tiny = np.finfo(np.float64).tiny
         at_least = tuple(
@@ -113,16 +120,8 @@ class JointRate:
                 thresholds.counts, rates_at[:, 0, 0], errors, strict=True
             )
         )  # fmt: skip
-        first = at_least[0]
-        return cls(
-            annual_rate_any=first.annual_rate,
-            annual_rate_any_ci=(float(rates_at[0, 0, 1]), float(rates_at[0, 0, 2])),
-            probability_any=first.probability,
-            at_least=at_least,
-            joint_law=COPULA,
-            bounds=bounds,
-            warnings=here,
-        )
+        ends_of_any = float(rates_at[0, 0, 1]), float(rates_at[0, 0, 2])
+        return cls(at_least, ends_of_any, COPULA, bounds, here)
 
     @classmethod
     def mean(cls, parts: Sequence[JointRate], weights: FloatArray) -> JointRate:
@@ -137,7 +136,7 @@ class JointRate:
         }
         warnings = tuple(dict.fromkeys(text for part in parts for text in part.warnings))
         if parts[0].joint_law == NO_LAW:
-            return cls(None, None, None, (), NO_LAW, bounds, warnings)
+            return cls((), None, NO_LAW, bounds, warnings)
         at_least = tuple(
             CountRate(
                 first.count,
@@ -152,15 +151,7 @@ class JointRate:
             meant(part.annual_rate_any_ci[i] for part in parts if part.annual_rate_any_ci)
             for i in (0, 1)
         )
-        return cls(
-            annual_rate_any=at_least[0].annual_rate,
-            annual_rate_any_ci=(low, high),
-            probability_any=at_least[0].probability,
-            at_least=at_least,
-            joint_law=parts[0].joint_law,
-            bounds=bounds,
-            warnings=warnings,
-        )
+        return cls(at_least, (low, high), parts[0].joint_law, bounds, warnings)
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""

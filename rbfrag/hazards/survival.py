@@ -12,15 +12,9 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
-from rbfrag.hazards.branch_weights import Weights, stated_weights
-from rbfrag.hazards.branches import (
-    checked_weights,
-    curve_name,
-    quantile_warning,
-    refuse_unlike,
-)
+from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
-from rbfrag.hazards.curve_file import CurveLike, as_curves
+from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.model_blocks import ModelBlocks, RateKeywords
 from rbfrag.hazards.shaking import NOTABLE, Shaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
@@ -187,9 +181,7 @@ def survival(
     given, meaning, answering = parts_of(
         numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
     )
-    each = as_curves(curves, **meaning)
-    refuse_unlike(each)
-    weight = checked_weights(stated_weights(weights, each), len(each))
+    each, weight = branch_curves(curves, weights, meaning)
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     if fragility is None:

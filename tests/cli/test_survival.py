@@ -123,7 +123,7 @@ def test_refusals_of_a_logic_tree(
     branch, weights = tree / "hazard_curve-rlz-000-PGV_7.csv", tree / "realizations_7.csv"
     asked = (*BLOCK, "--age", "3000")
     at = ("--site", "SLIDE-A")
-    assert "choose it with --site" in refuses("survival", branch, *asked)
+    assert "choose it by its number or name" in refuses("survival", branch, *asked)
     assert "add up to 0.5, not 1" in refuses("survival", branch, *at, *asked, "--weights", weights)
     assert "none of the curves is one" in refuses("survival", curve, *asked, "--weights", weights)
     Path("few.csv").write_text("rlz_id,branch_path,weight\n1,A~B,1.0\n")
