@@ -25,6 +25,7 @@ from rbfrag.question.fields import (
     names_of,
 )
 from rbfrag.question.shapes import (
+    BOND,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
@@ -228,7 +229,16 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     for name in ("beta_deg", "phi_deg"):
         if name not in planes and not is_rectangle:
             raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
-    return Shape(block, {**planes, **stated}, is_rectangle, tuple(listener.remarks))
+    return Shape(
+        block, {**planes, **stated, **bond_of(planes)}, is_rectangle, tuple(listener.remarks)
+    )
+
+
+def bond_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return cohesion and density where they are stated, or refuse what is out of its range."""
+    bond = {name: number(given[name], name, "a number") for name in BOND if name in given}
+    check_ranges(bond, _One())
+    return bond
 
 
 def on_planes(given: Mapping[str, Any]) -> Shape:

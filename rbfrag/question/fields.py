@@ -104,7 +104,7 @@ class Field:
                 if above is not None
                 else f"{low} to {high.removeprefix('up to ')}"
             )
-        return (f"not below {least}" if least is not None else low) or high
+        return (f"at least {least}" if least is not None else low) or high
 
     @property
     def what(self) -> str:

@@ -20,11 +20,13 @@ from rbfrag.question.blocks import (
     Blocks,
     Group,
     Refused,
+    bond_of,
     kinds_by_numbers,
     read_by_some,
     requested_kind,
 )
 from rbfrag.question.shapes import (
+    BOND,
     FRICTION_MISSING,
     LEAST_M,
     MOST_M,
@@ -45,7 +47,7 @@ from rbfrag.solver.stability.modes import MODES, words_of_mode
 _IF_EMPTY = {"beta_deg": 0.0, "leaves_g": HIGHEST}
 """What an option stands for that is not stated: a level base, and a back plane never left."""
 
-OF_ALL = ("back_fracture", "cohesion_pa", "density_kg_m3")
+OF_ALL = ("back_fracture", *BOND)
 """Fields that hold one value for all blocks."""
 
 _FACTS = tuple(KINDS.values())
@@ -116,6 +118,7 @@ class _Sorted:
         self.size, self.rows = size, rows
         self.of_all = {name: given[name] for name in OF_ALL if name in given}
         self.backed = bool(self.of_all.get("back_fracture", True))
+        self.bond = bond_of(self.of_all)
         self.given = {name: value for name, value in given.items() if name not in OF_ALL}
         self.groups: list[Group] = []
         self.refused: list[Refused] = []
@@ -316,10 +319,9 @@ class _Sorted:
         # a friction angle that leaves a rectangle no choice: between that of its toe and 90°
         phi = np.where(taken, 0.5 * (blocks.alpha3_deg + 90.0), phi)
         back = np.where(np.isnan(back), phi, back)
-        bond = {name: value for name, value in self.of_all.items() if name != "back_fracture"}
         judged_all = stability_arrays(
             blocks, beta_deg=stated["beta_deg"], phi_deg=phi, phi_back_deg=back,
-            back_fracture=not free_standing, **bond,
+            back_fracture=not free_standing, **self.bond,
         )  # fmt: skip
         codes = np.broadcast_to(judged_all.mode_code, (n,))
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
@@ -357,7 +359,7 @@ class _Sorted:
             self.kinds[of_these] = _FACTS.index(facts)
             judged = Judged(
                 blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
-                _at(back, here), _at(taken, here), self.backed, bool(bond.get("cohesion_pa")),
+                _at(back, here), _at(taken, here), self.backed, bool(self.bond.get("cohesion_pa")),
             )  # fmt: skip
             names = [
                 name for name in _numbers_of(facts)

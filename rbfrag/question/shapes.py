@@ -185,7 +185,9 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     return first
 
 
-PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", "cohesion_pa", "density_kg_m3")
+BOND = ("cohesion_pa", "density_kg_m3")
+
+PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND)
 """Fields that describe a block only beside its shape; the dip stands with numbers too."""
 
 SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
