@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import BLOCK_FIELDS, opened_table
+from rbfrag.exchange.block_table import opened_table
 from rbfrag.fragility.unusable import in_list
 from rbfrag.question.blocks import has_shape
+from rbfrag.question.fields import BlockFields, names_of
 from rbfrag.question.many import many_blocks
 
 FloatArray = NDArray[np.float64]
-
-_FIELDS = tuple(name for name in BLOCK_FIELDS.values() if not name.endswith("_sigma"))
 
 
 def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], FloatArray]:
@@ -29,7 +28,8 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         InputError: the file cannot be read, describes no block, or weights that are none.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    with opened_table(path, (*_FIELDS, "weight"), ()) as table:
+    fields = [name for name in names_of(BlockFields) if not name.endswith("_sigma")]
+    with opened_table(path, (*fields, "weight"), ()) as table:
         columns, faults, lines = table.whole()
     if faults:
         places = [f"{table.file.word} {lines[i]}" for i in sorted(faults)]

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import BLOCK_FIELDS, opened_table
+from rbfrag.exchange.block_table import opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
 from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import column_of
+from rbfrag.question.fields import BlockFields, column_of, names_of
 from rbfrag.question.many import many_blocks
 from rbfrag.question.shapes import OF_A_SHAPE
 from rbfrag.solver.kinds import KINDS, facts_of
@@ -205,11 +205,12 @@ def read_blocks(
     if not hasattr(source, "items"):
         source = as_path(source, "blocks", "a table of blocks")
     stated = for_all or {}
-    with opened_table(source, (*BLOCK_FIELDS.values(), *reads), TEXTS, sheet=sheet) as table:
+    fields = names_of(BlockFields)
+    with opened_table(source, (*fields, *reads), TEXTS, sheet=sheet) as table:
         table.check(stated, kind)
         columns, faults, lines = table.whole()
     name, size = table.name, len(lines)
-    values = {field: columns.pop(field) for field in BLOCK_FIELDS.values() if field in columns}
+    values = {field: columns.pop(field) for field in fields if field in columns}
     for field, value in stated.items():
         own = values.get(field, np.full(size, np.nan))
         values[field] = np.where(np.isnan(own), value, own)

@@ -17,18 +17,12 @@ from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
-from rbfrag.question.fields import BlockFields, column_of, columns_declared, names_of
+from rbfrag.question.fields import BlockFields, column_of, names_of
 from rbfrag.question.shapes import SHAPES
 from rbfrag.question.table import Header, columns_in
 
-BLOCK_FIELDS = {column_of(name): name for name in names_of(BlockFields)}
-"""The fields that describe blocks, by what written tables call them."""
-
-IF_EMPTY = {name: 0.0 for name in columns_declared() if name.endswith("_sigma")} | {
-    "count": 1.0,
-    "weight": 1.0,
-}
-"""What an empty cell of a field stands for."""
+IF_EMPTY = {"count": 1.0, "weight": 1.0}
+"""What an empty cell stands for; of a standard deviation it is 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +67,8 @@ class BlockTable:
             empty = np.isnan(values)
             if others or not empty.all():
                 self.filled.add(name)
-            numbers[name] = np.where(empty, IF_EMPTY[name], values) if name in IF_EMPTY else values
+            stands_for = 0.0 if name.endswith("_sigma") else IF_EMPTY.get(name)
+            numbers[name] = values if stands_for is None else np.where(empty, stands_for, values)
         return numbers, faults
 
     def text(self, part: Part, name: str) -> list[str] | None:
@@ -114,7 +109,7 @@ class BlockTable:
     def check_read(self, given: Collection[str], read: Collection[str]) -> None:
         """Refuse what is stated of all blocks, and no answer depends on."""
         for name in given:
-            if name in BLOCK_FIELDS.values() and name not in read:
+            if name in names_of(BlockFields) and name not in read:
                 text = f"{name} does not go with the blocks of {self.name}: leave it out"
                 raise InputError(text, fields=(name,))
 
