@@ -254,3 +254,11 @@ def write_text(text: str, target: Path) -> None:
     """
     with written_whole(target) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")
+
+
+def number_at(text: str, where: str) -> float:
+    """Return the number that a text is; `where` it stands, for messages."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where}: {text!r} is not a number") from None

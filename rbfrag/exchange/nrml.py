@@ -17,6 +17,7 @@ from rbfrag.exchange.fragility_function import (
     lognormal_function,
 )
 from rbfrag.exchange.xml_source import Node, read_xml
+from rbfrag.files import number_at
 from rbfrag.hazards.measure_type import IntensityType, openquake_type
 
 _UNITS = {"g": 1.0, "cm/s": 0.01, "m/s": 1.0}
@@ -110,7 +111,7 @@ def _function(
             raise InputError(f"{where}: {imt} in {unit!r} is not known: g, or cm/s for PGV")
         kind = IntensityType(kind.measure, _UNITS[unit], kind.period_s)
     limit = levels.attributes.get("noDamageLimit")
-    lowest = None if limit is None else kind.factor * _number(limit, where)
+    lowest = None if limit is None else kind.factor * number_at(limit, where)
     if form == "continuous":
         mean, sd = (_parameter(curve.attributes, key, where) for key in ("mean", "stddev"))
         if not (mean > 0.0 and sd > 0.0):
@@ -123,8 +124,8 @@ def _function(
         median, beta = kind.factor * mean / math.sqrt(spread), math.sqrt(math.log(spread))
         return lognormal_function(name, state, kind, median, beta, where, lowest)
     if form == "discrete":
-        x = np.array([_number(word, where) for word in levels.text.split()])
-        poes = np.array([_number(word, where) for word in curve.text.split()])
+        x = np.array([number_at(word, where) for word in levels.text.split()])
+        poes = np.array([number_at(word, where) for word in curve.text.split()])
         return discrete_function(name, state, kind, kind.factor * x, poes, where, lowest)
     raise InputError(f"{where}: format {form!r} is neither continuous nor discrete")
 
@@ -132,14 +133,7 @@ def _function(
 def _parameter(parameters: Mapping[str, str], key: str, where: str) -> float:
     if key not in parameters:
         raise InputError(f"{where}: {key} is missing")
-    return _number(parameters[key], where)
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{where}: {text!r} is not a number") from None
+    return number_at(parameters[key], where)
 
 
 _FAR = 8.0

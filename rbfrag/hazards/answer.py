@@ -37,7 +37,7 @@ from rbfrag.hazards.model_blocks import (
     RateKeywords,
     parts_by_model,
 )
-from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
+from rbfrag.hazards.shaking import NOTABLE, Shaking, ends_in_words
 from rbfrag.question.blocks import taken_as_medians
 from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
@@ -416,10 +416,8 @@ class _Site:
             return rows[self.order] if rows.shape[0] == self.order.size else rows
 
         rate, low, high = (joined("annual_rate", row) for row in range(3))
-        warnings: list[str] = []
-        warn_of_ends(
-            curve, rate, joined("above"), joined("above_at_most"), joined("below"), warnings
-        )
+        ends = joined("above"), joined("above_at_most")
+        warnings = [*ends_in_words(curve, rate, *ends, joined("below"))]
         edges, contribution = failures[0].edges, joined("contribution")
         joint = None
         if self.any_of is not None:
@@ -427,9 +425,8 @@ class _Site:
             joint = JointRate.of(any_bounds, rate, self.thresholds, curve, years)
             warnings.extend(joint.warnings)
         return _Rates(
-            rate, low, high, joined("numerical_error"), joined("above"), joined("above_at_most"),
-            edges, contribution, joint, warnings,
-        )  # fmt: skip
+            rate, low, high, joined("numerical_error"), *ends, edges, contribution, joint, warnings
+        )
 
     def domain_warnings(
         self, edges: FloatArray, contribution: FloatArray, rate: FloatArray

@@ -12,7 +12,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.files import csv_rows, is_number, json_document, source_text
+from rbfrag.files import csv_rows, is_number, json_document, number_at, source_text
 from rbfrag.hazards.conversions import velocity_conversion
 from rbfrag.hazards.curve import (
     ANSWERED,
@@ -244,7 +244,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     """
     rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
-    years = _number(_stated("investigation_time", head, source), f"{source}, line 1")
+    years = number_at(_stated("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
     kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
@@ -256,7 +256,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     for place, name in enumerate(names):
         match = _LEVEL.fullmatch(name)
         if match:
-            levels.append(kind.factor * _number(match.group(1), f"{source}, line 2"))
+            levels.append(kind.factor * number_at(match.group(1), f"{source}, line 2"))
             places.append(place)
         elif name not in _SITE_COLUMNS:
             raise InputError(
@@ -272,7 +272,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
         where = f"{source}, line {line}"
         if len(row) != len(names):
             raise InputError(f"{where}: {len(row)} cells under {len(names)} columns")
-        poe = np.array([_number(row[place], where) for place in places])
+        poe = np.array([number_at(row[place], where) for place in places])
         wrong = ~((poe >= 0.0) & (poe <= 1.0))
         if wrong.any():
             raise InputError(
@@ -308,17 +308,10 @@ def _stated(name: str, head: str, source: str, default: str | None = None) -> st
     return next(group for group in match.groups() if group is not None)
 
 
-def _number(text: str, where: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{where}: {text!r} is not a number") from None
-
-
 def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> float | None:
     if name not in cells:
         return None
-    value = _number(cells[name], where)
+    value = number_at(cells[name], where)
     if not abs(value) <= limit:
         raise InputError(f"{where}: {name} = {value:g} lies off the map (-{limit:g} to {limit:g})")
     return value

@@ -11,7 +11,7 @@ import numpy as np
 from rbfrag.hazards.annual_rate import FailureRate, probability_in
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
-from rbfrag.hazards.shaking import warn_of_ends
+from rbfrag.hazards.shaking import ends_in_words
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
 
@@ -93,11 +93,8 @@ class JointRate:
             thresholds: levels at which blocks fail by the model's copula; None where it is not
                 known.
         """
-        ends: list[str] = []
-        warn_of_ends(
-            curve, any_bounds.annual_rate[1:], any_bounds.above[1:], any_bounds.above_at_most[1:],
-            any_bounds.below[1:], ends,
-        )  # fmt: skip
+        names = ("annual_rate", "above", "above_at_most", "below")
+        ends = ends_in_words(curve, *(getattr(any_bounds, name)[1:] for name in names))
         rates = any_bounds.annual_rate
         bounds = {
             name.replace(" ", "_"): {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Unpack
 
@@ -125,15 +125,14 @@ def _no_model(curve: HazardCurve) -> str:
     )
 
 
-def warn_of_ends(
+def ends_in_words(
     curve: HazardCurve,
     rate: FloatArray,
     above: FloatArray,
     above_at_most: FloatArray,
     below: FloatArray,
-    warnings: list[str],
-) -> None:
-    """Add warnings where shaking beyond the ends of a curve may matter.
+) -> Iterator[str]:
+    """Yield where shaking beyond the ends of a curve may matter.
 
     Args:
         rate: rates of failure [1/a], shape (m,).
@@ -145,12 +144,12 @@ def warn_of_ends(
     open_above = above_at_most - above > NOTABLE * rate
     if open_above.any():
         worst = float((above_at_most - above)[open_above].max())
-        warnings.append(
+        yield (
             f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
             f"{worst:.3g} failures a year to the answer"
         )
     if (below > NOTABLE).any():
-        warnings.append(
+        yield (
             f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
             f"is already {float(below.max()):.3g}: weaker shaking is not counted"
         )

@@ -18,7 +18,7 @@ from rbfrag.hazards.annual_rate import FailureRate, Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
-from rbfrag.hazards.shaking import warn_of_ends
+from rbfrag.hazards.shaking import ends_in_words
 from rbfrag.solver.results import FloatArray
 
 ONE_BLOCK = "one block"
@@ -112,12 +112,10 @@ class StandingBlocks:
         if self.of_model is not None:
             share = self.of_model.share_outside(np.sqrt(failures.edges[1:] * failures.edges[:-1]))
             outside = float(part @ share) / max(float(part.sum()), np.finfo(np.float64).tiny)
-        warnings: list[str] = []
-        rate, above, most, below = (
-            self._mean(failures, name, several)[None]
-            for name in ("annual_rate", "above", "above_at_most", "below")
+        names = ("annual_rate", "above", "above_at_most", "below")
+        warnings = ends_in_words(
+            curve, *(self._mean(failures, name, several)[None] for name in names)
         )
-        warn_of_ends(curve, rate, above, most, below, warnings)
         mean = float(self.weight @ rates[0, :, 0])
         return AnyRate(rates, mean, outside, tuple(warnings))
 

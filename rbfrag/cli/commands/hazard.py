@@ -112,10 +112,7 @@ def hazard(
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     table, is_class, remarks, rows = blocks.given_blocks(given)
-    files = [
-        suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
-        for path in curve
-    ]
+    files = [suited_in(path, **vars(meaning)) for path in curve]
     sites, joined, missing = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
     if rows is not None:
         of_none = np.isin(np.arange(rows.blocks["row"].size), [*missing])
@@ -129,9 +126,8 @@ def hazard(
     answers = [
         answer(
             one.curves, **one.numbers, weights=wanted.weights,
-            at_least=wanted.counts(len(one.names), most),
-            convert=meaning.convert, convert_sigma=meaning.convert_sigma,
-            component=meaning.component, years=wanted.years, one_class=is_class, **answering,
+            at_least=wanted.counts(len(one.names), most), years=wanted.years, one_class=is_class,
+            **vars(meaning), **answering,
         )
         for one in sites
     ]  # fmt: skip

@@ -89,11 +89,10 @@ def survival(
     if rows is not None:
         rows.whole(ALL_STAND)
         remarks += rows.remarks
-    read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
+    read = as_curves(curves, **vars(meaning))
     answer = answered(
-        read, age_years=known.age, age_sd_years=known.age_sd, weights=weights,
-        **several.numbers, convert=meaning.convert, convert_sigma=meaning.convert_sigma,
-        component=meaning.component, draws=known.draws, seed=known.seed, **answering,
+        read, age_years=known.age, age_sd_years=known.age_sd, weights=weights, draws=known.draws,
+        seed=known.seed, **several.numbers, **vars(meaning), **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
     if plot is not None:
