@@ -14,14 +14,39 @@ from rbfrag.bench.cases import choose_combinations, find_records
 from rbfrag.bench.critical_search import search_runs
 from rbfrag.bench.tables import markdown
 from rbfrag.bench.timing import timed
-from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.batch import run_blocks
+from rbfrag.solver.excitation import Excitation, Nodes, excitation
+from rbfrag.solver.integrator.batch import IntArray
+from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.integrator.single_run import HANDED, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
+from rbfrag.solver.results import FloatArray
 
 READINGS = 5
 
 MANY = 400
+
+
+@kernel
+def run_blocks(
+    nodes: Nodes,
+    kr: FloatArray,
+    p: FloatArray,
+    order: int,
+    ph_max: float,
+    whole: IntArray,
+    real: FloatArray,
+) -> None:
+    """Run one block after another over one record; arguments as of `run_batch`."""
+    # made once for all blocks: the coefficients of a step, and neither history nor hand-over
+    u = np.empty(9)
+    no_rows = np.empty((4, 0))
+    to_the_end = np.empty(0, HANDED)
+    for j in range(kr.size):
+        (
+            whole[0, j], real[0, j], real[1, j], real[2, j], real[3, j],
+            whole[1, j], whole[2, j], _,
+        ) = run_toppling(nodes, kr[j], p[j], order, ph_max, no_rows, to_the_end, u)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

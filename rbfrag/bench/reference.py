@@ -69,11 +69,7 @@ def reference(case: Case) -> Answer:
                 k[i] + da * at, da * part, w[i] + dw * at, dw * part, from_rest,
             )  # fmt: skip
             from_rest = False
-            path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
-            landing = _first_root(path)
-            for turn in _roots(u):
-                if landing is None or turn < landing:
-                    peak = max(peak, _value(path, turn))
+            path, landing, peak = _followed(theta, u, peak)
             if landing is None:
                 theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
                 at = at + part if parts > 1 else Real(1)
@@ -129,11 +125,7 @@ def rocking_reference(case: Case, restitution: float) -> Answer:
                 side * (k[i] + da * at), side * da * part, w[i] + dw * at, dw * part, from_rest,
             )  # fmt: skip
             from_rest = False
-            path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
-            landing = _first_root(path)
-            for turn in _roots(u):
-                if landing is None or turn < landing:
-                    peak = max(peak, _value(path, turn))
+            path, landing, peak = _followed(theta, u, peak)
             if landing is None:
                 theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
                 at = at + part if at + part < 1 - EVEN else Real(1)
@@ -185,9 +177,12 @@ def _value(x: list[Real], t: Real) -> Real:
     return total
 
 
-def _first_root(x: list[Real]) -> Real | None:
-    roots = _roots(x)
-    return roots[0] if roots else None
+def _followed(theta: Real, u: list[Real], peak: Real) -> tuple[list[Real], Real | None, Real]:
+    """Return the rotation over a step, where it falls to zero first, and the greatest so far."""
+    path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
+    landing = next(iter(_roots(path)), None)
+    turns = (turn for turn in _roots(u) if landing is None or turn < landing)
+    return path, landing, max([peak, *(_value(path, turn) for turn in turns)])
 
 
 def _roots(x: list[Real]) -> list[Real]:

@@ -13,7 +13,7 @@ from sqlalchemy import Connection
 from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.sequences import PairWork, SequenceTask, run_pair
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
-from rbfrag.db.check.maps import BORDER_ERROR, contradictions
+from rbfrag.db.check.maps import BORDER_ERROR, ROTATION_ERROR, contradictions
 from rbfrag.db.motions import load_motion
 from rbfrag.db.rows import Interval
 from rbfrag.db.shock_pairs import (
@@ -49,9 +49,6 @@ _VALUES = (
     "reentrant",
     "n_runs",
 )
-
-ROTATION_ERROR = 1e-6
-"""Relative error of a rotation or displacement that another processor's last bits can make."""
 
 
 class End(NamedTuple):

@@ -18,6 +18,9 @@ _CLEARANCE = 1.01e-8
 BORDER_ERROR = 1e-7
 """Relative error of a border that another processor's last bits can make."""
 
+ROTATION_ERROR = 1e-6
+"""The same of a rotation or displacement."""
+
 
 def interval_problems(
     row: RowMapping,

@@ -15,7 +15,7 @@ from rbfrag.db.campaigns import (
     POINT_COLUMNS,
     known_combinations,
 )
-from rbfrag.db.check.maps import BORDER_ERROR, contradictions
+from rbfrag.db.check.maps import BORDER_ERROR, ROTATION_ERROR, contradictions
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
 from rbfrag.db.keys import key_of_row
@@ -45,9 +45,6 @@ _INPUTS = (
 _INCIDENTAL = ("campaign_id", "motion_id", "vertical_motion_id", "warnings")
 _OF_A_MAP = ("island_width", "kr_over_pga_resolved", "reentrant")
 _VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL, *_OF_A_MAP))
-
-ROTATION_ERROR = 1e-6
-"""Relative error of a rotation that another processor's last bits can make."""
 
 AnyRow = RowMapping | Mapping[str, Any]
 

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.solver.excitation import Excitation, Nodes
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.single_run import HANDED, run_toppling
+from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.taylor import PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
 from rbfrag.solver.results import FloatArray
@@ -42,28 +40,6 @@ class Runs:
     error_rad: FloatArray
     steps: IntArray
     samples_moved: IntArray
-
-
-@kernel
-def run_blocks(
-    nodes: Nodes,
-    kr: FloatArray,
-    p: FloatArray,
-    order: int,
-    ph_max: float,
-    whole: IntArray,
-    real: FloatArray,
-) -> None:
-    """Run one block after another over one record; arguments as of `run_batch`."""
-    # made once for all blocks: the coefficients of a step, and neither history nor hand-over
-    u = np.empty(9)
-    no_rows = np.empty((4, 0))
-    to_the_end = np.empty(0, HANDED)
-    for j in range(kr.size):
-        (
-            whole[0, j], real[0, j], real[1, j], real[2, j], real[3, j],
-            whole[1, j], whole[2, j], _,
-        ) = run_toppling(nodes, kr[j], p[j], order, ph_max, no_rows, to_the_end, u)  # fmt: skip
 
 
 def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Runs:
