@@ -10,12 +10,11 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.motions import intensity, response_spectrum
-
-FloatArray = NDArray[np.float64]
+from rbfrag.motions.polarity import FloatArray
 
 LONGEST_S = 1e100
 """Beyond this nothing can be integrated."""

@@ -3,6 +3,9 @@
 Velocity and displacement are the exact integrals of that record, started from rest, with
 no detrending: PGV and PGD are the extremes of those integrals, inside intervals as well as
 at samples, so they do not depend on where the samples happen to lie.
+
+Every function takes the samples `acceleration_g` [g], shape (n,), n >= 1, and the lengths
+`interval_s` of the intervals between them [s], shape (n - 1,), >= 0; a zero is a jump.
 """
 
 from __future__ import annotations
@@ -11,12 +14,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.motions.polarity import FloatArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-
-FloatArray = NDArray[np.float64]
 
 TM_BAND_HZ = (0.25, 20.0)
 """Frequencies that the mean period uses, both edges included [Hz]."""
@@ -62,9 +63,6 @@ def intensity_measures(
     """Return all intensity measures of a piecewise-linear record.
 
     Args:
-        acceleration_g: samples [g], shape (n,), n >= 1.
-        interval_s: lengths of the intervals between them [s], shape (n - 1,), >= 0; a zero
-            is a jump.
         dt_s: the sampling interval [s], or None for samples that are not equally spaced
             (then there is no mean period).
     """
@@ -99,10 +97,6 @@ def velocity_m_s(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatArr
     """Return the ground velocity at each sample, from rest [m/s], shape (n,).
 
     The trapezoidal sum, which is exact for a piecewise-linear record.
-
-    Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: lengths of the intervals between them [s], shape (n - 1,).
     """
     steps = (0.5 * STANDARD_GRAVITY_M_S2) * interval_s * (acceleration_g[:-1] + acceleration_g[1:])
     return _running_sum(steps)
@@ -112,10 +106,6 @@ def displacement_m(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatA
     """Return the ground displacement at each sample, from rest [m], shape (n,).
 
     Exact for a piecewise-linear record: an interval adds v dt + (2 a0 + a1) dt²/6.
-
-    Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: lengths of the intervals between them [s], shape (n - 1,).
     """
     velocity = velocity_m_s(acceleration_g, interval_s)
     bend = (STANDARD_GRAVITY_M_S2 / 6.0) * interval_s * interval_s
@@ -124,12 +114,7 @@ def displacement_m(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatA
 
 
 def cumulative_absolute_velocity(acceleration_g: FloatArray, interval_s: FloatArray) -> float:
-    """Return CAV = ∫|a| dt [m/s], exact for a piecewise-linear record (EPRI 1988, NP-5930).
-
-    Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: lengths of the intervals between them [s], shape (n - 1,).
-    """
+    """Return CAV = ∫|a| dt [m/s], exact for a piecewise-linear record (EPRI 1988, NP-5930)."""
     a0, a1 = acceleration_g[:-1], acceleration_g[1:]
     total = np.abs(a0) + np.abs(a1)
     # an interval that crosses zero holds two triangles of heights |a0|, |a1|
@@ -139,12 +124,7 @@ def cumulative_absolute_velocity(acceleration_g: FloatArray, interval_s: FloatAr
 
 
 def running_energy(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatArray:
-    """Return ∫a² dt from the first sample to each [g²·s], shape (n,), exact.
-
-    Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: lengths of the intervals between them [s], shape (n - 1,).
-    """
+    """Return ∫a² dt from the first sample to each [g²·s], shape (n,), exact."""
     a0, a1 = acceleration_g[:-1], acceleration_g[1:]
     return _running_sum(interval_s * (a0 * a0 + a0 * a1 + a1 * a1) / 3.0)
 
@@ -158,8 +138,6 @@ def significant_duration(
     record.
 
     Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: lengths of the intervals between them [s], shape (n - 1,).
         energy: what :func:`running_energy` returned.
 
     Returns:

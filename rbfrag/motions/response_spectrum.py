@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rbfrag.motions.polarity import FloatArray
+
 ComplexArray = NDArray[np.complex128]
 
 DAMPING = 0.05

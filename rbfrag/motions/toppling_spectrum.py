@@ -22,12 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.polarity import Polarity, driving_acceleration_g
+from rbfrag.motions.polarity import FloatArray, Polarity, driving_acceleration_g
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-
-FloatArray = NDArray[np.float64]
 
 SERIES_BELOW = 0.5
 """p·h below which the weights of an interval are summed as power series in it."""

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rbfrag.motions.text.record_file import Count, Field, FloatArray, RecordFile, Trace
+from rbfrag.motions.polarity import FloatArray
+from rbfrag.motions.text.record_file import Count, Field, RecordFile, Trace
 
 FORMAT = "K-NET/KiK-net ASCII"
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError, UnitNotStatedError
+from rbfrag.motions.polarity import FloatArray
 from rbfrag.motions.text.file import (
     MOST_DIGITS,
     finite_number,
@@ -26,8 +26,6 @@ from rbfrag.motions.text.file import (
     shown,
     without_blank_end,
 )
-
-FloatArray = NDArray[np.float64]
 
 SAME_DT = 1e-9
 """Intervals that differ by less were computed from different fields of one header; relative."""

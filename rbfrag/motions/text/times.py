@@ -9,11 +9,9 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError
-
-FloatArray = NDArray[np.float64]
+from rbfrag.motions.polarity import FloatArray
 
 ROUNDING = 1e-9
 """Times added up in a program drift in their last digits; relative to the largest time."""
