@@ -30,6 +30,7 @@ from rbfrag.question.fields import (
     parameter_of,
 )
 from rbfrag.question.fields import Field as Declared
+from rbfrag.question.keywords import LEVEL
 from rbfrag.service.documents import with_fields
 
 T = TypeVar("T", bound=BaseModel)
@@ -49,7 +50,7 @@ _NOT_SENT = frozenset({"block", "db"})
 _HOW = ("kind", *names_of(RequestFields))
 """Fields that say how a question is answered."""
 
-_DEFAULTS = {"level": 0.95}
+_DEFAULTS = {"level": LEVEL}
 
 
 def _limited(of: Any, about: Declared) -> Any:
