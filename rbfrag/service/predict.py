@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
-from pydantic import ValidationError
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import models_in_memory
@@ -14,8 +13,8 @@ from rbfrag.question.document import prediction_document
 from rbfrag.question.question import ask, described
 from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows
-from rbfrag.service.problem import READ, SENT, refusal
-from rbfrag.service.reading import check_json, json_of, json_text, sent_as
+from rbfrag.service.problem import READ, SENT
+from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool, in_thread
 
@@ -48,10 +47,7 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     """
     import numpy as np
 
-    try:
-        rows = PredictRows.model_validate(json_of(body))
-    except ValidationError as error:
-        raise refusal(PredictRows.model_fields, error.errors(), sent=True) from None
+    rows = read_as(PredictRows, json_of(body))
     lengths = {name: len(value) for name, value in rows if isinstance(value, list)}
     for name, length in lengths.items():
         if length > row_limit:

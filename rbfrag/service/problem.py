@@ -170,15 +170,12 @@ _short = Repr()
 _short.maxstring = _short.maxother = 60
 
 
-def refusal(
-    fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]], *, sent: bool = False
-) -> InputError:
+def refusal(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]) -> InputError:
     """Return in words why values do not suit a model.
 
     Args:
         fields: the fields of the model, by name.
         errors: what pydantic says, each with its place in the values.
-        sent: the values are the JSON of a body.
     """
     # a name that is unknown explains one that is missing
     first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
@@ -193,10 +190,6 @@ def refusal(
     if worst["type"] == "extra_forbidden":
         known = ", ".join(fields)
         return InputError(f"there is no parameter {name[:60]!r}; known are {known}")
-    if sent and worst["type"] == "finite_number":
-        value = json.dumps(worst["input"])
-        words = f"{value} is no JSON number: give a finite one, or null for a missing one"
-        return MalformedError(words)
     indices = "".join(f"[{each}]" for each in worst["loc"][1:] if isinstance(each, int))
     return InputError(_sentence(name + indices, worst, fields[name].description or ""))
 

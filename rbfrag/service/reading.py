@@ -6,7 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 from urllib.parse import parse_qsl
 
 from fastapi import Request, Response
@@ -48,6 +48,7 @@ MOST_NAMES = 40
 _CLOSE = {"connection": "close"}
 """What still comes is not read."""
 
+T = TypeVar("T", bound=BaseModel)
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
@@ -148,7 +149,7 @@ def json_of(body: bytes) -> Any:
     if not body:
         raise MalformedError("the body is empty, and not JSON")
     try:
-        return json.loads(body, object_pairs_hook=unique_keys)
+        return json.loads(body, object_pairs_hook=unique_keys, parse_constant=_no_number)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise MalformedError(f"the body is not JSON: {where}: {error.msg}") from None
@@ -156,10 +157,27 @@ def json_of(body: bytes) -> Any:
         raise MalformedError(f"byte {error.start} of the body is not UTF-8 text") from None
     except RecursionError:
         raise MalformedError("the body is nested too deeply") from None
-    except InputError as error:  # a key that is there twice
+    except InputError as error:  # a key that is there twice, or NaN
         raise MalformedError(str(error)) from None
     except ValueError as error:  # a number of thousands of digits
         raise MalformedError(f"the body is not JSON: {error}") from None
+
+
+def _no_number(word: str) -> NoReturn:
+    raise InputError(f"{word} is no JSON number: give a finite one, or null for a missing one")
+
+
+def read_as(model: type[T], values: Any) -> T:
+    """Return values that a request states, or refuse what is none of a model.
+
+    Args:
+        model: what may be stated.
+        values: the parameters of a query, or the JSON of a body.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise refusal(model.model_fields, error.errors()) from None
 
 
 class QueryRoute(APIRoute):
@@ -178,10 +196,7 @@ class QueryRoute(APIRoute):
             values = query_of(request)
             given: dict[str, Any] = {}
             if model is not None:
-                try:
-                    given["query"] = model.model_validate(values)
-                except ValidationError as error:
-                    raise refusal(model.model_fields, error.errors()) from None
+                given["query"] = read_as(model, values)
             if request.method != "POST":
                 document = await self.endpoint(**given)
                 return document if isinstance(document, Response) else json_answer(document)

@@ -6,18 +6,16 @@ A task takes a body and the parameters of its operation, and returns JSON.
 from __future__ import annotations
 
 import asyncio
-import json
 import multiprocessing
 import signal
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from fastapi import Request
 from pebble import ProcessExpired, ProcessPool
 
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.files import unique_keys
 from rbfrag.service.block import require
 from rbfrag.service.parameters import (
     CriticalQuery,
@@ -33,7 +31,7 @@ from rbfrag.service.problem import (
     RequestRefusedError,
     SeveralTracesError,
 )
-from rbfrag.service.reading import json_text
+from rbfrag.service.reading import json_of, json_text
 from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
@@ -66,10 +64,7 @@ def rock_mass(
     from rbfrag.rockmasses.scenario import scenario
 
     if form == "json":
-        try:
-            document = json.loads(body, parse_constant=_no_number, object_pairs_hook=unique_keys)
-        except (ValueError, RecursionError) as error:
-            raise MalformedError(f"the body is not JSON: {error}") from None
+        document = json_of(body)
         if not isinstance(document, dict):
             raise InputError("the body is a JSON object with the tables base, back and friction")
         described = rock_mass_of_tables(document)
@@ -92,10 +87,6 @@ def rock_mass(
     return json_text(
         as_dict(realisations, mode_counts(realisations), crossings(realisations), answer)
     )
-
-
-def _no_number(word: str) -> NoReturn:
-    raise ValueError(f"{word} is no number in JSON")
 
 
 def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
