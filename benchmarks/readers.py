@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table
+from rbfrag.exchange.tables import files
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.branches import realization_weights
 from rbfrag.hazards.curve import hazard_curve
@@ -223,6 +225,11 @@ def _predict(path: Path) -> object:
     return predict_table(path, out, given={"pgv_m_s": 0.5}, model=None, level=0.95, db=None)
 
 
+def _predict_by_arrow(path: Path) -> object:
+    with patch.object(files, "_LARGE", 0):  # as if the file were a large one
+        return _predict(path)
+
+
 @cache
 def _job(what: str) -> tuple[bytes, ...]:
     with tempfile.TemporaryDirectory() as folder:
@@ -254,6 +261,7 @@ READERS: tuple[Reader, ...] = (
     Reader("blocks GeoJSON", ".geojson", lambda: GEOJSON, read_blocks),
     Reader("block draws", ".csv", lambda: BLOCKS, read_draws),
     Reader("predicted CSV", ".csv", lambda: BLOCKS, _predict),
+    Reader("predicted CSV of a large table", ".csv", lambda: BLOCKS, _predict_by_arrow),
     Reader("predicted Parquet", ".parquet", lambda: _blocks(".parquet"), _predict),
     Reader("predicted Excel", ".xlsx", lambda: _blocks(".xlsx"), _predict),
     Reader("mesh OBJ", ".obj", lambda: _meshes(".obj"), block_from_mesh),

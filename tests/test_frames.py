@@ -86,7 +86,7 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
         (lambda: rbfrag.read_motions(3), "path is of type int"),
         (lambda: rbfrag.read_hazard_curves(3), "path is of type int"),
         (lambda: rbfrag.block_from_mesh(3), "path is of type int"),
-        (lambda: rbfrag.losses(3, "blocks.csv"), "folder is of type int"),
+        (lambda: rbfrag.losses(3, {"p2": [3.0], "kr": [0.1]}), "folder is of type int"),
         (lambda: rbfrag.losses(".", 3), "blocks is of type int"),
         (lambda: rbfrag.respond(3, p2=3.0, kr=0.1), "motion is of type int"),
         (lambda: rbfrag.respond_draws(3, p2=3.0, kr=0.1), "motion is of type int"),

@@ -91,8 +91,8 @@ def losses(
         DatabaseError: the database cannot be read.
     """
     given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
-    job = JobFiles.of(folder, files)
     rows = given_blocks(given, blocks, reads=PORTFOLIO, one_kind=False)
+    job = JobFiles.of(folder, files)
     meaning = component_named("single" if component is None else component)
     events = read_events(job, imts=imt, **lasted)
     rows, models = _with_models(_at_sites(rows, events.site_ids), tuple(events.measures), answering)

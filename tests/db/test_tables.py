@@ -73,9 +73,9 @@ class TestDictionary:
 
     def test_the_page_has_every_column(self) -> None:
         text = PAGE.read_text(encoding="utf-8")
-        common = text.split("## Columns of several tables\n")[1].split("\n## ")[0]
+        common = text.split("### Columns of several tables\n")[1].split("\n### ")[0]
         for table in data_dictionary():
-            section = text.split(f"\n## {table.name}\n")[1].split("\n## ")[0]
+            section = text.split(f"\n### {table.name}\n")[1].split("\n### ")[0]
             for column in table.columns:
                 row = columns_as_markdown([column]).splitlines()[-1]
                 assert row in section or (row in common and f"`{column.name}`" in section), row

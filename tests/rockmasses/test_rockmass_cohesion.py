@@ -150,7 +150,7 @@ def test_a_chart_of_modes_says_that_it_knows_no_cohesion(tmp_path: Path) -> None
     for text, told in ((TOML, False), (TOML + COHESION, True)):
         file = tmp_path / "mass.toml"
         file.write_text("realisations = 50\n" + text)
-        shown = charted_blocks(None, str(file), phi=30.0, phi_back=None, no_back=False)
+        shown = charted_blocks(None, str(file), {"phi_deg": 30.0})
         assert any("without cohesion" in warning for warning in shown.warnings) == told
 
 
