@@ -615,11 +615,7 @@ def _warnings(
                 f"{int(rare.sum())} of {portfolio.size} blocks fail less than once in the "
                 f"{effective:.6g} years that the events cover: their rates are not resolved"
             )
-    warnings += _rises(events, portfolio)
-    weak = _weakest_at_thin_shaking(events, portfolio)
-    if weak is not None:
-        warnings.append(weak)
-    return tuple(warnings)
+    return (*warnings, *_rises(events, portfolio), *_weakest_at_thin_shaking(events, portfolio))
 
 
 def _rises(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
@@ -637,21 +633,20 @@ def _rises(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
             yield from rise_in_words(model, numbers, float(ends.min()), float(ends.max()))
 
 
-def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> str | None:
-    """Return a warning where blocks fail at shaking that the engine may have left out.
+def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
+    """Yield a warning where blocks fail at shaking that the engine may have left out.
 
     Its minimum_intensity stands in no file; few rows lie below it.
     """
     here = np.isin(events.site, portfolio.site)
     if not here.any() or events.is_scenario:
-        return None
+        return
     name = portfolio.measures[0]
     thin = {n: np.full(1, np.quantile(v[here], _THIN)) for n, v in events.measures.items()}
     p, _ = portfolio.probability(np.arange(portfolio.size), thin, (0.0, 0.0, 0.0))
-    if not p.max() > NOTABLE:
-        return None
-    return (
-        f"at {name} = {thin[name][0]:.3g}, below which the files have few rows, a block already "
-        f"fails with a probability of {p.max():.2g}: if minimum_intensity of the job was not far "
-        "below that, failures are missing from the answer"
-    )
+    if p.max() > NOTABLE:
+        yield (
+            f"at {name} = {thin[name][0]:.3g}, below which the files have few rows, a block "
+            f"already fails with a probability of {p.max():.2g}: if minimum_intensity of the job "
+            "was not far below that, failures are missing from the answer"
+        )
