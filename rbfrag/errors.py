@@ -58,33 +58,37 @@ def one_paragraph(message: str) -> str:
     return text
 
 
+def spelled(text: str, fields: Collection[str], spell: Callable[[str], str]) -> str:
+    """Return a text with fields as a door spells them."""
+    if not fields:
+        return text
+    names = "|".join(sorted(map(re.escape, fields), key=len, reverse=True))
+    # no part of another word, of a path or of a file's name
+    whole = rf"(?<![\w./-])(?:{names})(?![\w/]|[.-]\w)"
+    return re.sub(whole, lambda match: spell(match[0]), text)
+
+
 class RbfragError(Exception):
-    """Base of all errors raised on purpose; the message is meant for a person."""
-
-    exit_status: ClassVar[int] = 2
-
-    def __init__(self, message: str = "") -> None:
-        super().__init__(one_paragraph(message))
-
-
-class InputError(RbfragError, ValueError):
-    """A value, option or file that cannot be used.
+    """Base of all errors raised on purpose; the message is meant for a person.
 
     Args:
         message: what is wrong; fields stand in it under their keywords.
         fields: those of them that a door may spell in its own way.
     """
 
+    exit_status: ClassVar[int] = 2
+
     def __init__(self, message: str = "", *, fields: Collection[str] = ()) -> None:
-        super().__init__(message)
+        super().__init__(one_paragraph(message))
         self.fields = tuple(fields)
 
     def spelled(self, spell: Callable[[str], str]) -> str:
         """Return the message with its fields as a door spells them."""
-        if not self.fields:
-            return str(self)
-        names = "|".join(sorted(map(re.escape, self.fields), key=len, reverse=True))
-        return re.sub(rf"(?<![\w-])(?:{names})\b", lambda match: spell(match[0]), str(self))
+        return spelled(str(self), self.fields, spell)
+
+
+class InputError(RbfragError, ValueError):
+    """A value, option or file that cannot be used."""
 
 
 class UnknownFieldError(InputError, TypeError):
@@ -111,25 +115,34 @@ class MotionFileError(InputError):
         path: the file.
         reason: what is wrong, with the offending value, and what to do.
         line: 1-based line number of the trouble, when there is one.
+        fields: as of every error.
     """
 
-    def __init__(self, path: str | PathLike[str], reason: str, *, line: int | None = None) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        reason: str,
+        *,
+        line: int | None = None,
+        fields: Collection[str] = (),
+    ) -> None:
         self.path = fspath(path)
         # a damaged file may hold a word of any length, which no person wants to see whole
         self.reason = _LONG_WORD.sub(r"\1…", reason)
         self.line = line
         where = self.path if line is None else f"{self.path}, line {line}"
-        super().__init__(f"{where}: {self.reason}")
+        super().__init__(f"{where}: {self.reason}", fields=fields)
 
     def __reduce__(self) -> tuple[object, ...]:
         # Exceptions with keyword arguments do not survive the trip between processes otherwise.
-        return (_rebuild_motion_file_error, (type(self), self.path, self.reason, self.line))
+        parts = (type(self), self.path, self.reason, self.line, self.fields)
+        return (_rebuild_motion_file_error, parts)
 
 
 def _rebuild_motion_file_error(
-    kind: type[MotionFileError], path: str, reason: str, line: int | None
+    kind: type[MotionFileError], path: str, reason: str, line: int | None, fields: tuple[str, ...]
 ) -> MotionFileError:
-    return kind(path, reason, line=line)
+    return kind(path, reason, line=line, fields=fields)
 
 
 class UnknownFormatError(MotionFileError):

@@ -121,3 +121,29 @@ def test_no_exception_is_left_over() -> None:
     for name, reason in EXCEPTIONS.items():
         assert name in names
         assert isinstance(reason, str) or set(reason) <= names[name]
+
+
+TO_COPY = {
+    "fragility/model.py": "the command that fits a model again, to be copied",
+    "service/guard.py": "options of rbfrag serve, for who runs it",
+    "service/work.py": "options of rbfrag serve, for who runs it",
+}
+"""Where options of the command line stand outside of it, and why."""
+
+
+def test_options_are_spelled_by_the_command_line_alone() -> None:
+    spelled = []
+    for path in SOURCES:
+        where = path.relative_to(ROOT / "rbfrag").as_posix()
+        if where.startswith("cli/") or where in TO_COPY:
+            continue
+        tree = ast.parse(path.read_text())
+        docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        spelled += [
+            f"{where}:{node.lineno}: {node.value}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant)
+            if isinstance(node.value, str) and id(node) not in docstrings
+            if re.search("--[a-z]", node.value)
+        ]
+    assert not spelled, "\n".join(spelled)

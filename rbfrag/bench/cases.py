@@ -62,7 +62,9 @@ def find_records(folder: str | os.PathLike[str] | None = None) -> Records:
         return Records(motions, f"{len(motions)} sample records of rbfrag[samples]")
     root = Path(folder if folder is not None else os.environ[RECORDS_VARIABLE])
     if not root.exists():
-        raise InputError(f"there is no folder of records {root}: name one with --records")
+        raise InputError(
+            f"there is no folder of records {root}: name one with records", fields=("records",)
+        )
     motions = _read(root)
     if not motions:
         raise InputError(f"no horizontal accelerogram can be read in {root}: name another folder")

@@ -149,7 +149,7 @@ def add_motions(
             f"paths is of type {type(paths).__name__}: give a file or folder, or a list of them"
         )
     if suite is not None and not suite.strip():
-        raise InputError("--suite: the name is empty; give one or leave it out")
+        raise InputError("suite: the name is empty; give one or leave it out", fields=("suite",))
     checked_name(suite or "", "the suite")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
@@ -205,10 +205,12 @@ def _take_note_of_units(
 ) -> None:
     other = next((trace.other_unit for trace in traces if trace.other_unit), "")
     if other and alone:
-        raise MotionFileError(file, f"{other} is stated for it, not {units}: leave --units out")
+        raise MotionFileError(
+            file, f"{other} is stated for it, not {units}: leave units out", fields=("units",)
+        )
     if other:
         run.warnings.append(
-            f"{file} is in {other}, as is stated for it, not in {units}: --units is for the files "
+            f"{file} is in {other}, as is stated for it, not in {units}, which is for the files "
             "that state none"
         )
 

@@ -49,8 +49,8 @@ def motion_pairs(
     if not pairs:
         where = "the database" if suite is None else f"suite {suite!r}"
         raise InputError(
-            f"--sequence: there are no motions of two earthquakes in {where}: "
-            "rbfrag motions add PATH --metadata CSV  brings some and says which they are"
+            f"there are no motions of two earthquakes in {where}: "
+            "add some with a table of metadata that says which they are"
         )
 
     def longest_first(pair: MotionPair) -> tuple[int, str, str]:

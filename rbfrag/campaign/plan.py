@@ -131,7 +131,9 @@ def plan_campaign(
             needed.
     """
     if vertical not in ("without", "with", "both"):
-        raise InputError(f"--vertical must be without, with or both, not {vertical!r}")
+        raise InputError(
+            f"vertical must be without, with or both, not {vertical!r}", fields=("vertical",)
+        )
     rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     if not rows:
         where = "the database" if suite is None else f"suite {suite!r}"
@@ -144,7 +146,7 @@ def plan_campaign(
     if vertical != "without" and not fitting:
         raise InputError(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
-            f"{_first(lacking)}; add the vertical components, or leave --vertical out"
+            f"{_first(lacking)}; add the vertical components, or leave them out"
         )
     warnings = []
     if lacking:
@@ -229,7 +231,9 @@ def strengths_of(number: int) -> tuple[float, ...]:
         number: how many values, from 0.99 down to the search limit 0.01; at least 2.
     """
     if not 2 <= number <= MOST_VALUES:
-        raise InputError(f"--grid: the number of values must be 2 to {MOST_VALUES}, not {number}")
+        raise InputError(
+            f"grid: the number of values must be 2 to {MOST_VALUES}, not {number}", fields=("grid",)
+        )
     values = np.geomspace(GRID_TOP, SEARCH_LIMIT, number)
     values[[0, -1]] = GRID_TOP, SEARCH_LIMIT
     return tuple(values.tolist())
@@ -244,7 +248,9 @@ def checked_ratios(values: Sequence[float], what: str) -> tuple[float, ...]:
     ratios = sorted((positive(value, what, "k_r/PGA") for value in values), reverse=True)
     for one, next_one in pairwise(ratios):
         if one == next_one:
-            raise InputError(f"{what}: {one:g} is in the list twice: name each value once")
+            raise InputError(
+                f"{what}: {one:g} is in the list twice: name each value once", fields=(what,)
+            )
     return tuple(ratios)
 
 

@@ -79,7 +79,9 @@ def refuse_kind(name: str) -> None:
         InputError: there is no such kind, or a motion leaves its blocks where they were.
     """
     if not model_of_kind(name).carries_state:
-        raise InputError(f"--sequence does not go with --kind {name}: {STARTS_ANEW}")
+        raise InputError(
+            f"sequence does not go with kind {name}: {STARTS_ANEW}", fields=("sequence", "kind")
+        )
 
 
 def simulate_sequences(
@@ -100,7 +102,7 @@ def simulate_sequences(
         draws: first motions that are drawn for each second one.
     """
     if draws < 1:
-        raise InputError(f"--draws must be at least 1, not {draws}")
+        raise InputError(f"draws must be at least 1, not {draws}", fields=("draws",))
     blocks, limits = kind.sequence_blocks(cases), kind.sequence_limits(cases)
     started = time.perf_counter()
     with opened_database(db) as engine:

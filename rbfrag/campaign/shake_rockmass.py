@@ -49,7 +49,7 @@ def shake(
         WorkFailedError: a worker died.
     """
     if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs must be at least 1, not {jobs}")
+        raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
     plan = plan_shaking(blocks, motion, **shaking)
     total = int(plan.places.size)
     workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))

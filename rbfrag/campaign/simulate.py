@@ -49,19 +49,9 @@ from rbfrag.solver.results import MAP_DEPTH, CriticalResult
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""
 
-DESCRIBED = {
-    "p2": "--p2",
-    "rotations_deg": "--rotation",
-    "displacements_m": "--displacement",
-    "family": "family",
-    "restitution_factors": "--restitution-factor",
-}
-OPTIONS = DESCRIBED | {
-    "grid": "--grid",
-    "store_responses": "--store-responses",
-    "full_map": "--map",
-}
-"""What may be asked of a kind, as the command line calls it; the former describe its blocks."""
+DESCRIBED = ("p2", "rotations_deg", "displacements_m", "family", "restitution_factors")
+OPTIONS = (*DESCRIBED, "grid", "store_responses", "full_map")
+"""What may be asked of a kind; the former describe its blocks."""
 
 
 class CampaignOptions(TypedDict, total=False):
@@ -155,8 +145,10 @@ def simulate(
     depth = positive(request.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
     if sequence:
         if vertical != "without" or full_map:
-            one = "--map" if full_map else "--vertical"
-            raise InputError(f"{one} does not go with --sequence: leave one of them out")
+            one = "full_map" if full_map else "vertical"
+            raise InputError(
+                f"{one} does not go with sequence: leave one of them out", fields=(one, "sequence")
+            )
         return simulate_sequences(
             model_of_kind(kind),
             cases,
@@ -195,13 +187,15 @@ def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[
     if kind not in known:
         why = KINDS[kind].no_search if kind in KINDS else ""
         raise InputError(
-            f"--kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}"
+            f"kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}",
+            fields=("kind",),
         )
     for name in given:
         if name not in known[kind].campaign_options:
             owners = [each for each, model in known.items() if name in model.campaign_options]
             raise InputError(
-                f"{OPTIONS[name]} goes with --kind {' or '.join(owners)}, not with {kind}"
+                f"{name} goes with kind {' or '.join(owners)}, not with {kind}",
+                fields=(name, "kind"),
             )
     return model_of_kind(kind).cases(**described)
 
@@ -284,11 +278,11 @@ def _wanted(
 ) -> Wanted:
     selected = store_responses or ()
     histories = [value for value in selected if value != "critical"]
-    blocks = strengths_of(grid) if isinstance(grid, int) else checked_ratios(grid or (), "--grid")
+    blocks = strengths_of(grid) if isinstance(grid, int) else checked_ratios(grid or (), "grid")
     return Wanted(
         full_map=full_map,
         blocks=blocks,
-        histories=checked_ratios(histories, "--store-responses"),
+        histories=checked_ratios(histories, "store_responses"),
         critical_history="critical" in selected,
     )
 

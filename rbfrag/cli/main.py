@@ -59,6 +59,19 @@ _UsageError: Any = typer.BadParameter.__base__
 """What typer raises for a wrong command line; where it stands depends on typer's version."""
 
 
+_OPTIONS = {
+    "full_map": "--map",
+    "rotations_deg": "--rotation",
+    "displacements_m": "--displacement",
+    "restitution_factors": "--restitution-factor",
+}
+"""Options of campaigns and searches that Python calls otherwise."""
+
+
+def _option(name: str) -> str:
+    return _OPTIONS.get(name) or option_of(name)
+
+
 class _Commands(TyperGroup):
     """Loads a command when it is called, and turns every error raised on purpose into a message."""
 
@@ -90,8 +103,7 @@ class _Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except RbfragError as error:
-            text = error.spelled(option_of) if isinstance(error, InputError) else str(error)
-            print(f"rbfrag: {text}", file=sys.stderr)
+            print(f"rbfrag: {error.spelled(_option)}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
         except OSError as error:
             if error.filename is None:  # a closed pipe, say

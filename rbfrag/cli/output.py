@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from os import PathLike
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, spelled
 from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
+from rbfrag.question.fields import declared, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -71,10 +72,11 @@ def _cut(text: str, size: int) -> str:
     return text if len(text) <= size else f"{text[: size - 1]}…"
 
 
-def print_warnings(warnings: Iterable[str]) -> None:
-    """Print warnings on standard error, one a line."""
+def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
+    """Print warnings on standard error, one a line, with fields as options."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        text = spelled(warning, ("excel_text", *fields), option_of)
+        print(f"warning: {text}", file=sys.stderr)
 
 
 def write_table(columns: Mapping[str, Any], out: str | PathLike[str], *, excel_text: bool) -> None:
@@ -253,7 +255,7 @@ def show_prediction(
         print()
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
-    print_warnings(warnings)
+    print_warnings(warnings, [name for name in declared() if "_" in name])
 
 
 def _short(document: Mapping[str, Any]) -> dict[str, object]:

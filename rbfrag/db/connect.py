@@ -129,7 +129,8 @@ def sqlalchemy_url(place: Path | str) -> URL:
         url = make_url(place)
     except (exc.ArgumentError, ValueError):
         raise InputError(
-            "--db: the URL cannot be read: write it as postgresql://user@host:5432/name"
+            "db: the URL cannot be read: write it as postgresql://user@host:5432/name",
+            fields=("db",),
         ) from None
     return url.set(drivername="postgresql+psycopg")
 

@@ -85,7 +85,6 @@ def _check_server_database(connection: Connection, label: str) -> None:
     )
     if revision is None:
         raise NotADatabaseError(
-            f"{label} holds no rbfrag tables yet: make them with  rbfrag motions add FILES "
-            f"--db {label}"
+            f"{label} holds no rbfrag tables yet: add motions to it, by rbfrag motions add"
         )
     check_revision(str(revision), label)

@@ -55,7 +55,9 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
         )
     text = os.fspath(db)
     if not text:
-        raise InputError("the database name is empty: give --db a path or an SQLAlchemy URL")
+        raise InputError(
+            "the database name is empty: give db a path or an SQLAlchemy URL", fields=("db",)
+        )
     if "\0" in text:
         raise InputError(f"the database name {text!r} holds a NUL character")
     if "://" not in text:
@@ -66,12 +68,14 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
         return text
     if dialect != "sqlite":
         raise InputError(
-            f"--db {scheme}://…: rbfrag stores in SQLite (a path) or PostgreSQL (postgresql://…)"
+            f"db {scheme}://…: rbfrag stores in SQLite (a path) or PostgreSQL (postgresql://…)",
+            fields=("db",),
         )
     name = rest.removeprefix("/")
     if not name or name == ":memory:" or "?" in name or not rest.startswith("/"):
         raise InputError(
-            f"--db {text}: give an SQLite database as a path, or as sqlite:///path without options"
+            f"db {text}: give an SQLite database as a path, or as sqlite:///path without options",
+            fields=("db",),
         )
     return Path(name)
 
@@ -93,7 +97,7 @@ def check_revision(revision: str, where: str) -> None:
     if revision in REVISIONS:
         raise SchemaVersionError(
             f"{where}: the database has schema {revision}, this rbfrag needs {SCHEMA_REVISION}: "
-            f"run  rbfrag db upgrade --db {where}"
+            "upgrade it by rbfrag db upgrade"
         )
     raise SchemaVersionError(
         f"{where}: the database has schema {revision}, newer than {SCHEMA_REVISION} of this "

@@ -149,8 +149,8 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
         return ModelRow(**{**{name: by_name[name] for name in COLUMNS}, **decoded})
     except (ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise DatabaseError(
-            f"model {by_name['name']} is damaged in the database ({error}): fit it again with "
-            "--replace, or restore the database from a copy"
+            f"model {by_name['name']} is damaged in the database ({error}): fit it again in its "
+            "place, or restore the database from a copy"
         ) from error
 
 
@@ -184,11 +184,11 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
         where: the database as the user names it.
     """
     if not known:
-        return f"{where} holds no model yet: make one with  rbfrag fit --term pgv --method wls"
+        return f"{where} holds no model yet: make one by rbfrag fit"
     if name is None:
         return (
-            f"{where} has no default model: choose one of {', '.join(known)} with --model, or "
-            "with  rbfrag models default NAME"
+            f"{where} has no default model: name one of {', '.join(known)}, or choose "
+            "the default by rbfrag models default"
         )
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 

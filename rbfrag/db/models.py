@@ -42,8 +42,8 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     chosen = {other.name: bool(other.is_default) for other in connection.execute(query)}
     if row.name in chosen and not replace:
         raise InputError(
-            f"there is a model {row.name!r} already: give another --name, or replace it with "
-            "--replace"
+            f"there is a model {row.name!r} already: give it another name, or set replace",
+            fields=("replace",),
         )
     values["is_default"] = row.is_default or chosen.get(row.name, False)
     # first of all: a damaged model may be replaced, but not changed

@@ -40,15 +40,20 @@ def require_sqlite_file(path: Path) -> None:
     try:
         kind = path.stat().st_mode
         if stat.S_ISDIR(kind):
-            raise NotADatabaseError(f"{path} is a folder: --db wants the database file")
+            raise NotADatabaseError(
+                f"{path} is a folder: db wants the database file", fields=("db",)
+            )
         if not stat.S_ISREG(kind):
-            raise NotADatabaseError(f"{path} is no ordinary file: --db wants the database file")
+            raise NotADatabaseError(
+                f"{path} is no ordinary file: db wants the database file", fields=("db",)
+            )
         with path.open("rb") as stream:
             head = stream.read(len(_MAGIC))
     except FileNotFoundError:
         raise DatabaseNotFoundError(
-            f"there is no database at {path}: name another with --db, or make it with  "
-            "rbfrag motions add FILES"
+            f"there is no database at {path}: name another with db, or make it by "
+            "rbfrag motions add",
+            fields=("db",),
         ) from None
     except NotADirectoryError:
         raise DatabaseNotFoundError(
@@ -57,10 +62,13 @@ def require_sqlite_file(path: Path) -> None:
     except OSError as error:
         raise DatabaseError(f"cannot read the database {path}: {error.strerror or error}") from None
     if not head:
-        raise NotADatabaseError(f"{path} is empty: delete it, or name another database with --db")
+        raise NotADatabaseError(
+            f"{path} is empty: delete it, or name another database with db", fields=("db",)
+        )
     if head != _MAGIC:
         raise NotADatabaseError(
-            f"{path} is no database: its content is not SQLite's; name another with --db"
+            f"{path} is no database: its content is not SQLite's; name another with db",
+            fields=("db",),
         )
 
 
@@ -130,7 +138,8 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         if application != APPLICATION_ID:
             raise NotADatabaseError(
-                f"{path} is an SQLite database, but not one of rbfrag's: name another with --db"
+                f"{path} is an SQLite database, but not one of rbfrag's: name another with db",
+                fields=("db",),
             )
         (tables,) = connection.execute(
             "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (VERSION_TABLE,)
@@ -167,7 +176,8 @@ def explained_sqlite_error(
     if code == _READONLY:
         return DatabaseReadOnlyError(
             f"{path} cannot be written: make the file and its folder writable, or copy the "
-            "database elsewhere and name it with --db"
+            "database elsewhere and name it with db",
+            fields=("db",),
         )
     if code == _CANTOPEN:
         return DatabaseReadOnlyError(
@@ -179,7 +189,9 @@ def explained_sqlite_error(
             "the same command again"
         )
     if code == _NOTADB:
-        return NotADatabaseError(f"{path} is no SQLite database: name another with --db")
+        return NotADatabaseError(
+            f"{path} is no SQLite database: name another with db", fields=("db",)
+        )
     if code == _CORRUPT:
         return DatabaseError(
             f"{path} is damaged ({error}): run  rbfrag db check  and restore it from a copy"

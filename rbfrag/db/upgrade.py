@@ -188,7 +188,8 @@ def _draft_file(place: Path, folder: Path) -> Path:
     except OSError as error:
         raise DatabaseReadOnlyError(
             f"cannot make the database {place}: {error.strerror or error}; name a folder that can "
-            "be written with --db"
+            "be written with db",
+            fields=("db",),
         ) from error
     os.close(handle)
     draft = Path(name)

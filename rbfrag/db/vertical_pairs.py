@@ -125,8 +125,7 @@ def _pair(row: MotionRow, verticals: Sequence[MotionRow]) -> VerticalPair:
     if is_downward_name(vertical.component):
         return VerticalPair(
             row.id,
-            reason=f"motion {vertical.id} was stored raw with downward positive: add it without "
-            "--raw",
+            reason=f"motion {vertical.id} was stored raw with downward positive: add it processed",
         )
     reason = why_not_together(
         dt_s=(row.dt_s, vertical.dt_s),

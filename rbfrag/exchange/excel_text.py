@@ -50,7 +50,7 @@ def formula_warnings(columns: Mapping[str, Any]) -> list[str]:
             if is_formula(cell):
                 return [
                     f"the cell {cell[:40]!r} of the column {name} begins with {cell[0]}, which "
-                    "Excel takes for a formula: --excel-text writes it as text"
+                    "Excel takes for a formula; excel_text writes it as text"
                 ]
     return []
 

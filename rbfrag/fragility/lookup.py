@@ -169,6 +169,16 @@ def suited_models(
     return [*store.suited[key]]
 
 
+def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[str, ...]:
+    """Return what is to be said of measures that are given and that a model does not read."""
+    read = model.term.inputs
+    return tuple(
+        f"{name} was not used: model {model.name} reads {' and '.join(read)}"
+        for name in given
+        if name in MEASURES and name not in read
+    )
+
+
 def _suited_in(
     store: _Store, given: tuple[str, ...], kind: str | None, rotation_deg: float | None
 ) -> list[FragilityModel]:

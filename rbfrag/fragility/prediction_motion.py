@@ -27,8 +27,8 @@ from rbfrag.motions.toppling_spectrum import toppling_spectrum
 Polarity = Literal["forward", "reverse", "both"]
 
 SIMULATED = (
-    "what a known motion does to an uncertain block is simulated, by  rbfrag respond MOTION --draws"
-    "  or rbfrag.respond_draws"
+    "what a known motion does to an uncertain block is simulated, by rbfrag respond with draws or "
+    "rbfrag.respond_draws"
 )
 
 

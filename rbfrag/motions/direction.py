@@ -136,7 +136,7 @@ def why_not_together(
     if lead_in_samples[0] != lead_in_samples[1]:
         return (
             f"processing put {lead_in_samples[0]} samples before the horizontal component and "
-            f"{lead_in_samples[1]} before the vertical: process both alike, or none (--raw)"
+            f"{lead_in_samples[1]} before the vertical: process both alike, or neither"
         )
     first, second = start_time
     if first is not None and second is not None:

@@ -37,7 +37,8 @@ def export_motions(
     if chosen not in FORMATS:
         raise InputError(
             f"{target.name}: the format {chosen!r} is none of {', '.join(FORMATS)}: end the name "
-            "with .csv or .at2, or give --format"
+            "with .csv or .at2, or give format",
+            fields=("format",),
         )
     if not motions:
         raise InputError("there is no motion to export: name at least one")

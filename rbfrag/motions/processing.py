@@ -107,13 +107,15 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
         raise InputError(
             f"{motion.label}: a corner of {high_pass.corner_hz:g} Hz is not below the "
             f"{nyquist_hz:g} Hz that dt = {motion.dt_s:g} s resolves: check dt, or add the record "
-            "as it is (--raw)"
+            "as it is (raw)",
+            fields=("raw",),
         )
     zeros = high_pass.padding_s / motion.dt_s
     if not motion.npts + 2.0 * zeros <= MOST_SAMPLES:
         raise InputError(
             f"{motion.label}: {high_pass.padding_s:g} s of zeros are {zeros:.0f} samples at dt = "
-            f"{motion.dt_s:g} s: check dt, or add the record as it is (--raw)"
+            f"{motion.dt_s:g} s: check dt, or add the record as it is (raw)",
+            fields=("raw",),
         )
     padding = math.ceil(zeros)
     if not motion.pga_g < LARGEST_PGA_G:
@@ -129,7 +131,8 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
     except ValueError:
         raise InputError(
             f"{motion.label}: {samples.size} samples are too few to filter: add the record as it "
-            "is (--raw)"
+            "is (raw)",
+            fields=("raw",),
         ) from None
     start = motion.start_time
     return replace(

@@ -116,7 +116,9 @@ def _check_stated(units: str | None, dt_s: float | None) -> None:
     if units is not None:
         acceleration_unit(units)
     if dt_s is not None and not 0.0 < dt_s < float("inf"):
-        raise InputError(f"--dt must be a positive number of seconds, not {dt_s:g}")
+        raise InputError(
+            f"dt_s must be a positive number of seconds, not {dt_s:g}", fields=("dt_s",)
+        )
 
 
 def _read_whole(
@@ -128,8 +130,9 @@ def _read_whole(
             raise MotionFileError(
                 file,
                 f"the file ends within the number {word!r}: it is truncated; export the record "
-                "again, or read what there is with --allow-partial",
+                "again, or read what there is with allow_partial",
                 line=text.count("\n") + 1,
+                fields=("allow_partial",),
             )
         motions = _read(file, text, units, dt_s)
     except UnknownFormatError:
@@ -213,7 +216,9 @@ def _unit_in_g(file: RecordFile, field: Field | None) -> float:
         raise file.error(str(error), field.line) from None
     if file.units is not None and unit_in_g(file.units) != in_g:
         raise file.error(
-            f"the header says {field.text}, not {file.units}: leave --units out", field.line
+            f"the header says {field.text}, not {file.units}: leave units out",
+            field.line,
+            fields=("units",),
         )
     return in_g
 

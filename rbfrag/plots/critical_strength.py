@@ -197,8 +197,8 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     canvas.plot_path(path)
     if not pairs.ln_ratio.size:
         raise InputError(
-            "no critical value is known both with and without vertical motion: run  "
-            "rbfrag simulate --vertical both"
+            "no critical value is known both with and without vertical motion: simulate "
+            "both, by rbfrag simulate"
         )
     figure = canvas.new_figure(9.2, 4.6)
     axes, beside = figure.subplots(1, 2, width_ratios=[1.15, 1.0])

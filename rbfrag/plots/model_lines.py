@@ -106,17 +106,18 @@ def held_measures(
             f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
         )
     more, of_size = name in MORE_TERMS, depends_on_size(model)
-    read = {"p2": True, "pga": more, "tm": name == "pgv_pga_tm"}
-    for option, value in (("p2", p2), ("pga", pga_g), ("tm", tm_s)):
+    read = {"p2": True, "pga_g": more, "tm_s": name == "pgv_pga_tm"}
+    for held, value in (("p2", p2), ("pga_g", pga_g), ("tm_s", tm_s)):
         if value is None:
             continue
-        if not read[option]:
+        if not read[held]:
             raise InputError(
-                f"--{option} = {value:g} changes nothing: the lines of model {model.name!r} do "
-                "not depend on it; leave it out"
+                f"{held} = {value:g} changes nothing: the lines of model {model.name!r} do not "
+                "depend on it; leave it out",
+                fields=(held,),
             )
         if not 0.0 < value < math.inf:
-            raise InputError(f"--{option} = {value:g} is not above zero")
+            raise InputError(f"{held} = {value:g} is not above zero", fields=(held,))
     if not of_size:
         return HeldMeasures() if p2 is None else HeldMeasures(p2, size_is_given=True)
     size = _middle(model, "p2") if p2 is None else p2

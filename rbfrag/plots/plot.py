@@ -106,7 +106,7 @@ def fit(
         if today.fingerprint == row.data_fingerprint
         else (
             f"the data have changed since {fitted.name} was fitted: the points are those of "
-            "today; rbfrag fit --replace  fits them anew",
+            "today; fitting it again takes them",
         )
     )
     return _drawn(

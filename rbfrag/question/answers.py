@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.lookup import block_of
+from rbfrag.fragility.lookup import block_of, unused_measures
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
@@ -17,6 +17,7 @@ from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reaso
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import OF_ALL, many_blocks
+from rbfrag.question.question import with_remarks
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -83,7 +84,7 @@ def ask_many(
             refused.append(Refused(places, str(error), {}))
             continue
         assert isinstance(answer, PredictionArray)
-        parts.append((places, answer))
+        parts.append((places, with_remarks(answer, unused_measures(chosen, own))))
     if nan == "raise":
         _refuse(refused, parts, blocks, shape)
     return _together(parts, refused, blocks, shape, level, index_of(numbers))
@@ -178,7 +179,9 @@ def _of_draws(
         )
     (group,) = whole
     own = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
-    return answer_given(find(own, group.kind), own, level, weights=weights)
+    chosen = find(own, group.kind)
+    answer = answer_given(chosen, own, level, weights=weights)
+    return with_remarks(answer, unused_measures(chosen, own))
 
 
 def _together(

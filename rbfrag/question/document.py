@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.fragility.lookup import find_model, suited_models
+from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.prediction import Prediction, answer_given
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def prediction_document(
         DatabaseError: the database cannot be read.
     """
     others: list[Prediction] = []
+    unused: tuple[str, ...] = ()
     if motion is not None:
         # Kept apart: a motion needs numpy.
         from rbfrag.fragility.prediction_motion import predict_motion
@@ -78,9 +79,10 @@ def prediction_document(
             answer = answer_given(each, given, level, weights=weights)
             assert isinstance(answer, Prediction)
             others.append(answer)
+        unused = unused_measures(models[0], given)
     recommended = others[0]
     document = recommended.as_dict()
-    document["warnings"] = [*remarks, *recommended.warnings]
+    document["warnings"] = [*remarks, *unused, *recommended.warnings]
     document["answers"] = [
         {name: getattr(each, name) for name in OF_EACH_MODEL} | {"recommended": each is recommended}
         for each in others

@@ -10,7 +10,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack, overload
 
 from rbfrag.errors import InputError, UnknownFieldError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.prediction import Prediction, answer_given, is_single
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
@@ -208,7 +208,8 @@ def ask(
         if not has_shape(given):
             given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-            return with_remarks(answer_given(chosen, given, level, **how), unread)
+            remarks = (*unread, *unused_measures(chosen, given))
+            return with_remarks(answer_given(chosen, given, level, **how), remarks)
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)
             (group,) = blocks.groups
@@ -216,7 +217,7 @@ def ask(
             chosen = find_model(model, own, db, kind=group.kind, rotation_deg=rotation_deg)
             answer = answer_given(chosen, own, level, **how)
             assert isinstance(answer, Prediction)
-            return with_remarks(answer, blocks.remarks)
+            return with_remarks(answer, (*blocks.remarks, *unused_measures(chosen, own)))
     if "block" in given:
         raise InputError("block is one block: give the fields of many as arrays")
     # Kept apart so that a single block does not load numpy.

@@ -255,7 +255,9 @@ def _other_modes(
     """Yield, for sliding and for slumping, which blocks a model answers for, and its answers."""
     distance = positive(displacement_m, "displacement_m", "m")
     if "pgv_m_s" not in measures:
-        raise InputError("models of sliding and slumping read PGV: give pgv_m_s (--pgv) too")
+        raise InputError(
+            "models of sliding and slumping read PGV: give pgv_m_s too", fields=("pgv_m_s",)
+        )
     motion: dict[str, Any] = {
         name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
     }
@@ -308,8 +310,8 @@ def _average(
 NO_MODEL = ", because there is no fragility model for this mode"
 
 UNANSWERED = {
-    "slide": ": --displacement (displacement_m), how far is too far [m], gives them one",
-    "slump": ": --displacement (displacement_m), how far is too far for slides [m], gives them one",
+    "slide": ": displacement_m, how far is too far [m], gives them one",
+    "slump": ": displacement_m, how far is too far for slides [m], gives them one",
 }
 """What gives an answer to blocks of a mode that has none."""
 

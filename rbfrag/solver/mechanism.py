@@ -86,8 +86,8 @@ class MechanismKind(Kind):
         if site.cohesive:
             raise InputError(
                 f"cohesion_pa does not go with {self.kind} in time: a bond is broken by the first "
-                "slip, which the model does not describe; its effect on the yield is told by  "
-                "rbfrag block --cohesion"
+                "slip, which the model does not describe; its effect on the yield is told by "
+                "rbfrag block"
             )
         return self.mechanism(site)
 

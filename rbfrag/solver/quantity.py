@@ -14,13 +14,15 @@ def number(value: object, name: str, what: str) -> float:
     if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, bool | str | bytes):
-        raise InputError(f"{name} = {value!r} is not a number: give {what}")
+        raise InputError(f"{name} = {value!r} is not a number: give {what}", fields=(name,))
     try:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} = {value!r} is not a number: give {what}") from None
+        raise InputError(
+            f"{name} = {value!r} is not a number: give {what}", fields=(name,)
+        ) from None
     if not math.isfinite(result):
-        raise InputError(f"{name} = {result:g} is not finite: give {what}")
+        raise InputError(f"{name} = {result:g} is not finite: give {what}", fields=(name,))
     return result
 
 
@@ -29,7 +31,7 @@ def positive(value: object, name: str, unit: str) -> float:
     what = f"a number above 0 [{unit}]" if unit else "a number above 0"
     result = number(value, name, what)
     if result <= 0.0:
-        raise InputError(f"{name} = {result:g} is not above zero: give {what}")
+        raise InputError(f"{name} = {result:g} is not above zero: give {what}", fields=(name,))
     return result
 
 
@@ -38,7 +40,7 @@ def not_negative(value: object, name: str, unit: str) -> float:
     what = f"0 or more [{unit}]"
     result = number(value, name, what)
     if result < 0.0:
-        raise InputError(f"{name} = {result:g} is negative: give {what}")
+        raise InputError(f"{name} = {result:g} is negative: give {what}", fields=(name,))
     return result
 
 
@@ -47,7 +49,9 @@ def angle(value: object, name: str, above: float, below: float) -> float:
     what = f"an angle between {above:g} and {below:g} degrees"
     result = number(value, name, what)
     if not above < result < below:
-        raise InputError(f"{name} = {result:.10g} is out of range: give {what}, both excluded")
+        raise InputError(
+            f"{name} = {result:.10g} is out of range: give {what}, both excluded", fields=(name,)
+        )
     return result
 
 
@@ -56,7 +60,7 @@ def friction_angle(value: object, name: str) -> float:
     what = "a friction angle from 0 to below 90 degrees"
     result = number(value, name, what)
     if not 0.0 <= result < 90.0:
-        raise InputError(f"{name} = {result:.10g} is out of range: give {what}")
+        raise InputError(f"{name} = {result:.10g} is out of range: give {what}", fields=(name,))
     return result
 
 

@@ -66,7 +66,7 @@ def test_units_are_for_the_files_that_state_none(tmp_path: Path, db: Path) -> No
     assert found["none.txt"] == pytest.approx(np.abs(shaking(12)).max(), rel=1e-5)
     assert found["metres.txt"] == pytest.approx(np.abs(shaking(13)).max() / 9.80665, rel=1e-5)
     # what was stated is checked against the others, each of which keeps its own
-    warned = [text for text in report.warnings if "--units is for the files" in text]
+    warned = [text for text in report.warnings if "which is for the files" in text]
     assert [Path(text.split(" is in ")[0]).name for text in warned] == ["metres.txt", "tenths.V1"]
     assert "in m/s², as is stated for it, not in g" in warned[0]
 
@@ -84,7 +84,7 @@ def test_units_of_the_metadata_are_a_statement_too(tmp_path: Path, db: Path) -> 
 
 def test_units_that_contradict_the_only_file(tmp_path: Path, db: Path) -> None:
     (bad,) = add_motions([mixed(tmp_path) / "metres.txt"], db=db, units="g").failed
-    assert "m/s² is stated for it, not g: leave --units out" in bad.reason
+    assert "m/s² is stated for it, not g: leave units out" in bad.reason
 
 
 def test_a_row_without_an_index_is_about_the_whole_file(tmp_path: Path, db: Path) -> None:

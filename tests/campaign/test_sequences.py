@@ -210,13 +210,13 @@ def test_damage_is_found(database: Path, values: dict[str, str], problem: str) -
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"kind": "toppling"}, f"--sequence does not go with --kind toppling: {STARTS_ANEW}"),
-        ({"kind": "rocking"}, f"--sequence does not go with --kind rocking: {STARTS_ANEW}"),
+        ({"kind": "toppling"}, f"sequence does not go with kind toppling: {STARTS_ANEW}"),
+        ({"kind": "rocking"}, f"sequence does not go with kind rocking: {STARTS_ANEW}"),
         ({"kind": "confined_toppling"}, "campaigns are of"),
-        ({"vertical": "both"}, "--vertical does not go with --sequence"),
-        ({"kind": "slumping", "full_map": True}, "--map does not go with --sequence"),
-        ({"p2": (3.0,)}, "--p2 goes with --kind rocking or toppling"),
-        ({"draws": 0}, "--draws must be at least 1, not 0"),
+        ({"vertical": "both"}, "vertical does not go with sequence"),
+        ({"kind": "slumping", "full_map": True}, "full_map does not go with sequence"),
+        ({"p2": (3.0,)}, "p2 goes with kind rocking or toppling"),
+        ({"draws": 0}, "draws must be at least 1, not 0"),
     ],
 )
 def test_what_does_not_go_with_a_sequence_is_refused(

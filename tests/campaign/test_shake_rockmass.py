@@ -43,5 +43,5 @@ def test_two_workers_find_what_one_finds() -> None:
 
 def test_no_worker_is_refused() -> None:
     made = read_rock_mass(EXAMPLE).realise(10, 1)
-    with pytest.raises(InputError, match="--jobs"):
+    with pytest.raises(InputError, match="jobs"):
         shake(made, record(), jobs=0)

@@ -52,7 +52,7 @@ def test_a_table_is_read_back(tmp_path: Path) -> None:
 def test_the_first_cell_is_named() -> None:
     (warning,) = formula_warnings({"kr": np.array([-1.0]), "block_id": ["a", "=1+1", "@b"]})
     assert "'=1+1' of the column block_id begins with =" in warning
-    assert "--excel-text" in warning
+    assert "excel_text" in warning
     assert formula_warnings({"x": ["-0.5", "a=b"], "y": np.array(["+1"], dtype=object)}) == []
 
 
@@ -68,7 +68,7 @@ def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
     assert second.replace('"', "").startswith("-2.5,3")
     warnings = summary["warnings"]
     assert isinstance(warnings, list)
-    assert any("--excel-text" in text for text in warnings) is not excel_text
+    assert any("excel_text" in text for text in warnings) is not excel_text
 
 
 def test_every_writer_of_csv_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -146,7 +146,7 @@ def broken(source: FitSource, kind: str) -> FitSource:
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("none", "no outcomes are stored: run  rbfrag simulate --kind toppling"),
+        ("none", "no outcomes are stored: simulate kind toppling"),
         ("all alike", "0 toppled.*all alike"),
         ("separated", "separated without error"),
         ("few", "7 outcomes on the grid toppled; a fit needs 20"),

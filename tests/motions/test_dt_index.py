@@ -46,7 +46,7 @@ def test_index_and_statement_agree(record: Path) -> None:
 def test_interval_is_never_guessed(record: Path, text: str | None) -> None:
     if text is not None:
         index(record, text)
-    with pytest.raises(MotionFileError, match=r"--dt 0\.005.*dt_index\.txt"):
+    with pytest.raises(MotionFileError, match=r"dt_s 0\.005.*dt_index\.txt"):
         read_motion(record, units="g")
 
 

@@ -67,11 +67,11 @@ def test_contradicting_options(tmp_path: Path, name: str) -> None:
     path = tmp_path / "record"
     path.write_text(text)
     assert read_motions(path, units=UNITS[name], dt_s=0.01)[0].dt_s == 0.01
-    assert "leave --dt out" in refusal(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
+    assert "leave dt_s out" in refusal(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
     if name in STATE_NO_UNIT:
-        assert "--units" in refusal(tmp_path, text).reason
+        assert "with units" in refusal(tmp_path, text).reason
     else:
-        assert "leave --units out" in refusal(tmp_path, text, units="mm/s2").reason
+        assert "leave units out" in refusal(tmp_path, text, units="mm/s2").reason
 
 
 def test_stated_unit_of_a_header_in_gal(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def test_another_number(tmp_path: Path, name: str) -> None:
         assert old in text
         text = text.replace(old, new, 1)
     path.write_text(text)
-    with pytest.raises(MotionFileError, match="--allow-partial"):
+    with pytest.raises(MotionFileError, match="allow_partial"):
         read_motions(path, units=units)
     motions = read_motions(path, units=units, allow_partial=True)
     # a count may be one channel's, or that of them all

@@ -93,10 +93,10 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
 @pytest.mark.parametrize(
     ("model", "given", "words"),
     [
-        (OF_SIZE, {"pga_g": 0.3}, "--pga = 0.3 changes nothing"),
-        (WITH_PGA, {"tm_s": 0.3}, "--tm = 0.3 changes nothing"),
-        (WITH_TM, {"tm_s": 0.0}, "--tm = 0 is not above zero"),
-        (WITH_TM, {"pga_g": float("nan")}, "--pga = nan is not above zero"),
+        (OF_SIZE, {"pga_g": 0.3}, "pga_g = 0.3 changes nothing"),
+        (WITH_PGA, {"tm_s": 0.3}, "tm_s = 0.3 changes nothing"),
+        (WITH_TM, {"tm_s": 0.0}, "tm_s = 0 is not above zero"),
+        (WITH_TM, {"pga_g": float("nan")}, "pga_g = nan is not above zero"),
         (replace(WITH_TM, row=replace(WITH_TM.row, domain={})), {}, "range of p2"),
         (
             model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record"),

@@ -44,8 +44,8 @@ def connected(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise InputError(
-            f"--scheduler: no Dask scheduler answers at {address}: {_first_line(error)}; start one "
-            "with  dask scheduler  and name the address that it prints (tcp://host:8786)"
+            f"no Dask scheduler answers at {address}: {_first_line(error)}; start one "
+            "with  dask scheduler  and name the address that it prints (tcp://host:8786)",
         ) from None
     try:
         try:

@@ -33,9 +33,12 @@ CLUSTER = "a cluster"
 def check_workers(jobs: int | None, scheduler: str | None) -> None:
     """Refuse an impossible number of workers, or two answers to who does the work."""
     if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs must be at least 1, not {jobs}")
+        raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
     if jobs is not None and scheduler is not None:
-        raise InputError("--jobs counts local workers, --scheduler names others: give one of them")
+        raise InputError(
+            "jobs counts local workers, scheduler names others: give one of them",
+            fields=("jobs", "scheduler"),
+        )
 
 
 @contextmanager
@@ -132,7 +135,8 @@ def run_locally(
     except BrokenProcessPool:
         raise WorkFailedError(
             f"a worker process died (killed, or out of memory); {after_a_death}, with fewer "
-            "--jobs if memory is short"
+            "jobs if memory is short",
+            fields=("jobs",),
         ) from None
     finally:
         for future in running:

@@ -9,7 +9,7 @@ COMPUTE_AGAIN = (
     "restore the database from a copy, or add the motions to a new database and run  "
     "rbfrag simulate  there"
 )
-FIT_AGAIN = "fit it again:  rbfrag fit --name NAME --replace"
+FIT_AGAIN = "fit it again in its place, by rbfrag fit"
 
 
 @dataclass(frozen=True)

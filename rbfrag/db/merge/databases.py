@@ -79,7 +79,7 @@ def merge_databases(
             first = findings[0]
             raise DatabaseError(
                 f"{label} is damaged in {len(findings)} places and was not merged, first "
-                f"{first.table} {first.row}: {first.problem}; see  rbfrag db check --db {label}"
+                f"{first.table} {first.row}: {first.problem}; rbfrag db check tells of it"
             )
         with opened_database(db, create=True) as ours, ours.begin() as target:
             _keep_writers_out(target)

@@ -313,7 +313,7 @@ def merge_shock_pairs(merge: Merge) -> None:
         if merge.other_bits.keys() & both:
             ledger.notes.append(
                 f"left out: pair of motions {theirs['natural_key'][:12]}… of samples whose last "
-                "bits are other here: rbfrag simulate --sequence  makes it again"
+                "bits are other here: a campaign of sequences makes it again"
             )
             continue
         values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}

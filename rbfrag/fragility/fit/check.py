@@ -80,7 +80,7 @@ def _check(
         return ModelCheck(row.name, "unchanged", "")
     then, now = row.diagnostics.get("n"), int(data.observed.sum())
     counts = f"fitted to {then} critical values, {now} today" if then != now else "other values"
-    return ModelCheck(row.name, "changed", f"{counts}: fit it again with  rbfrag fit --replace")
+    return ModelCheck(row.name, "changed", f"{counts}: fit it again in its place, by rbfrag fit")
 
 
 @dataclass(frozen=True, eq=False)

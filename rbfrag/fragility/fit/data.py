@@ -324,15 +324,15 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     table, named = source.table, kind or method.block.kind
     if table.p2.size == 0:
         raise FitError(
-            "no critical values to fit: add motions with  rbfrag motions add  and run  rbfrag "
-            f"simulate --kind {named}"
+            "no critical values to fit: add motions by rbfrag motions add, and simulate them by "
+            f"rbfrag simulate, of kind {named}"
         )
     of_outcomes = method.reads == "outcomes"
     if of_outcomes and not np.isfinite(source.failed).any():
         raise FitError(
-            f"method {method.name} fits what blocks did, and no outcomes are stored: run  rbfrag "
-            f"simulate --kind {named}  again, which adds those of the grid, or fit critical "
-            "values (--method wls or lognormal)"
+            f"method {method.name} fits what blocks did, and no outcomes are stored: simulate kind "
+            f"{named} again, which adds those of the grid, or fit critical values, by method wls "
+            "or lognormal"
         )
     points = _READERS[method.block.names](source, method, term)
     own = points.combination
@@ -400,14 +400,14 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
         raise FitError(
             f"{n} critical values were found among {data.n_total} combinations with the term "
             f"{term.name}; a fit needs {FEWEST_OBSERVED}: simulate more motions or more blocks "
-            f"(rbfrag simulate --kind {data.kind})"
+            f"(rbfrag simulate, of kind {data.kind})"
         )
     events = np.unique(data.event[tells]).size
     if events < FEWEST_EVENTS:
         raise FitError(
             f"the critical values come from {events} earthquake(s); a fit needs "
             f"{FEWEST_EVENTS}, because points of one earthquake are not independent: add "
-            "motions of other earthquakes, and name the events by  motions add --metadata"
+            "motions of other earthquakes, and name the events in a table of metadata"
         )
     if any(
         not np.all(np.isfinite(v[data.observed])) for n, v in data.values.items() if n == "y_m_s"
@@ -445,7 +445,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     if not defined.any() and "tm_s" in term.inputs:
         raise FitError(
             f"the term {term.name} needs the mean period Tm, which none of the {x.size} "
-            "combinations has: add the motions again with their samples, or fit --term pgv"
+            "combinations has: add the motions again with their samples, or fit the term pgv"
         )
     if not defined.any() and "xp_m_s" in term.inputs:
         raise FitError(

@@ -231,8 +231,8 @@ def _refuse_unfit(
         )
     if rotation_deg is not None and method.block.criterion is None:
         raise InputError(
-            f"a rotation is no failure of blocks of kind {kind}: leave rotation_deg (--rotation) "
-            "out"
+            f"a rotation is no failure of blocks of kind {kind}: leave rotation_deg out",
+            fields=("rotation_deg",),
         )
 
 
@@ -277,7 +277,7 @@ def _data_warnings(data: FitData) -> list[str]:
         result.append(
             f"{data.guessed_events} of {data.events} earthquakes are guessed from file "
             "headers: one earthquake may be counted as several, which makes standard errors too "
-            "small; name them by  motions add --metadata"
+            "small; name them in a table of metadata"
         )
     if data.n_excluded:
         result.append(

@@ -200,7 +200,8 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     if indexed is None and dt_s is None:
         raise file.error(
             "the file holds one column and states no sampling interval: give it in seconds, "
-            f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005"
+            f"as in  dt_s 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
+            fields=("dt_s",),
         )
     if indexed is None:
         assert dt_s is not None
@@ -208,7 +209,8 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     if dt_s is not None and dt_s != indexed[0]:
         raise file.error(
             f"{indexed[1]} beside the file says dt = {indexed[0]:g} s, not {dt_s:g}: "
-            "leave --dt out, or correct one of them"
+            "leave dt_s out, or correct one of them",
+            fields=("dt_s",),
         )
     return indexed[0], f"the file states no dt; {indexed[0]:g} s is from {indexed[1]}"
 

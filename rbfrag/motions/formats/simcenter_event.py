@@ -85,8 +85,9 @@ def _trace(
         raise file.error(
             f"numSteps says {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
             "truncated or numSteps is wrong; export the event again, or read what there is with "
-            "--allow-partial",
+            "allow_partial",
             line,
+            fields=("allow_partial",),
         )
     if not data:
         raise file.error(f"{what} has no values")

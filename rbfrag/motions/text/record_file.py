@@ -133,9 +133,11 @@ class RecordFile:
         """The lines of the file."""
         return self.text.split("\n")
 
-    def error(self, trouble: str, line: int | None = None) -> MotionFileError:
+    def error(
+        self, trouble: str, line: int | None = None, fields: tuple[str, ...] = ()
+    ) -> MotionFileError:
         """Return the error that names this file, and its line from 1 where one is to blame."""
-        return MotionFileError(self.path, trouble, line=line)
+        return MotionFileError(self.path, trouble, line=line, fields=fields)
 
     # fields of the header
 
@@ -201,8 +203,9 @@ class RecordFile:
         if self.units is None:
             raise UnitNotStatedError(
                 self.path,
-                f"{states} no unit of acceleration, and it is never guessed: give it with --units "
+                f"{states} no unit of acceleration, and it is never guessed: give it with units "
                 "g, m/s2, cm/s2 or mm/s2",
+                fields=("units",),
             )
 
     def dt(self, field: Field, what: str = "dt") -> float:
@@ -215,7 +218,9 @@ class RecordFile:
             raise self.error(f"the sampling interval of {dt:g} s must be positive and finite", line)
         if self.dt_s is not None and not math.isclose(dt, self.dt_s, rel_tol=SAME_DT, abs_tol=0.0):
             raise self.error(
-                f"the header says dt = {dt:g} s, not {self.dt_s:g}: leave --dt out", line
+                f"the header says dt = {dt:g} s, not {self.dt_s:g}: leave dt_s out",
+                line,
+                fields=("dt_s",),
             )
         return dt
 
@@ -261,8 +266,9 @@ class RecordFile:
             return f"{says} the record is partial, and which samples are missing is not told"
         raise self.error(
             f"{says} the file is truncated or its header is wrong; export the record again, or "
-            "read what there is with --allow-partial",
+            "read what there is with allow_partial",
             count.line,
+            fields=("allow_partial",),
         )
 
     # samples

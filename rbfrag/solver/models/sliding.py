@@ -260,8 +260,8 @@ class Sliding(MechanismKind):
         """Return the first motion and every stated displacement."""
         self.refuse_foreign(request, self.campaign_options)
         stated = request.get("displacements_m", THRESHOLDS_M)
-        stated = [positive(value, "--displacement", "m") for value in stated]
-        each_once(stated, "--displacement")
+        stated = [positive(value, "displacement_m", "m") for value in stated]
+        each_once(stated, "displacement_m")
         settings = {"search_limit": SEARCH_LIMIT, "tolerance": TOLERANCE}
         return tuple(
             Case(self.kind, None, LEVEL_PLANE, {**settings, "displacement_m": value})

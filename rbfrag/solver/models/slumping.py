@@ -239,16 +239,17 @@ class Slumping(ScaledKind):
         self.refuse_foreign(request, ("rotations_deg", "family"))
         family: Sequence[BlockClass] = request.get("family", FAMILY)
         rotations = [
-            None if value is None else positive(value, "--rotation", "degrees")
+            None if value is None else positive(value, "rotation_deg", "degrees")
             for value in request.get("rotations_deg", ROTATIONS_DEG)
         ]
-        each_once(rotations, "--rotation", for_none="recovery")
+        each_once(rotations, "rotation_deg", for_none="recovery")
         least = min(each.gamma_deg for each in family)
         for rotation in rotations:
             if rotation is not None and rotation >= least:
                 raise InputError(
-                    f"--rotation {rotation:g}: a block of the family lies on its back edge at "
-                    f"{least:g} degrees; give less, or the word recovery for failure past recovery"
+                    f"rotation_deg {rotation:g}: a block of the family lies on its back edge at "
+                    f"{least:g} degrees; give less, or the word recovery for failure past recovery",
+                    fields=("rotation_deg",),
                 )
         settings = {"search_limit": SEARCH_LIMIT, "scan_ratio": SCAN_RATIO, "bracket": BRACKET}
         return tuple(

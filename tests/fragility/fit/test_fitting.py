@@ -187,7 +187,7 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
     [
         (lambda t: rows_of(t, slice(0, 0)), "no critical values to fit.*rbfrag simulate"),
         (lambda t: rows_of(t, slice(0, 9)), "9 critical values.*simulate more"),
-        (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*--metadata"),
+        (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*a table of metadata"),
         (lambda t: replace(t, pgv_m_s=np.full(t.p2.size, 0.3)), "same peak ground velocity, 0.3"),
         (lambda t: replace(t, y_m_s=0.7 * t.pgv_m_s), "exactly on a line"),
         (lambda t: replace(t, y_m_s=2.0 - t.y_m_s), "does not rise"),
@@ -202,7 +202,7 @@ def test_data_that_cannot_carry_a_fit_are_refused(draw, change, words):
 
 def test_no_mean_period_at_all_is_refused(draw):
     table = draw(events=5)
-    with pytest.raises(FitError, match=r"needs the mean period.*--term pgv"):
+    with pytest.raises(FitError, match=r"needs the mean period.*fit the term pgv"):
         fit(replace(table, tm_s=np.full(table.p2.size, np.nan)), term="pga_tm")
 
 

@@ -91,7 +91,7 @@ def test_a_database_without_such_campaigns_is_refused(kind: str, tmp_path: Path)
     with (
         opened_database(place, create=True) as engine,
         engine.connect() as connection,
-        pytest.raises(FitError, match=f"rbfrag simulate --kind {kind}"),
+        pytest.raises(FitError, match=f"rbfrag simulate, of kind {kind}"),
     ):
         fit(connection, kind=kind, term="pgv")
 
