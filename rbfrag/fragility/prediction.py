@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
@@ -132,6 +132,18 @@ class MotionPrediction(Prediction):
             name: None if answer is None else answer.as_dict() for name, answer in both.items()
         }
         return result
+
+
+A = TypeVar("A", bound="Prediction | PredictionArray")
+
+
+def with_remarks(answer: A, remarks: tuple[str, ...]) -> A:
+    """Return an answer with what is to be said of its blocks, first."""
+    if not remarks:
+        return answer
+    field = "warnings" if isinstance(answer, Prediction) else "notes"
+    # dataclasses.replace takes as long as the answer
+    return type(answer)(**(vars(answer) | {field: (*remarks, *getattr(answer, field))}))
 
 
 def answer_given(

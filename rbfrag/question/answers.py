@@ -12,12 +12,11 @@ from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.lookup import block_of, unused_measures
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import Prediction, answer_given
+from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import OF_ALL, many_blocks
-from rbfrag.question.question import with_remarks
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",

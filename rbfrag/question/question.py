@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
-from rbfrag.fragility.prediction import Prediction, answer_given, is_single
+from rbfrag.fragility.prediction import Prediction, answer_given, is_single, with_remarks
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.fields import (
     ArrayFields,
@@ -158,18 +158,6 @@ def _answer_motion(
         {**group.numbers, **measures}, motion, kind=group.kind, polarity=polarity, **options
     )
     return with_remarks(answer, blocks.remarks)
-
-
-A = TypeVar("A", bound="Prediction | PredictionArray")
-
-
-def with_remarks(answer: A, remarks: tuple[str, ...]) -> A:
-    """Return an answer with what is to be said of its blocks, first."""
-    if not remarks:
-        return answer
-    field = "warnings" if isinstance(answer, Prediction) else "notes"
-    # dataclasses.replace takes as long as the answer
-    return type(answer)(**(vars(answer) | {field: (*remarks, *getattr(answer, field))}))
 
 
 def ask(

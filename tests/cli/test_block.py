@@ -115,7 +115,7 @@ def test_table_for_people(shell: Shell) -> None:
         ((*ANGLES, "--phi", "35"), "--beta is missing"),
         ((*ANGLES, "--beta", "5"), "--phi is missing"),
         ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi = 90"),
-        ((*ANGLES, "--beta", "nan", "--phi", "35"), "beta_deg = nan"),
+        ((*ANGLES, "--beta", "nan", "--phi", "35"), "--beta = nan"),
         ((*ANGLES, *PLANES, "--cohesion", "5000"), "density_kg_m3"),
         ((*ANGLES, *PLANES, "--kv", "-1"), "kv = -1"),
         (("--alpha1", "25", "--alpha3", "-10", "--r3", "1", *PLANES), "not below"),

@@ -49,7 +49,7 @@ def test_another_critical_value_is_noticed(shell: Shell, database: Path) -> None
         "WHERE status = 'found' AND kind = 'toppling' AND vertical_motion_id IS NULL)",
     )
     told = shell("models", "check", expect=1).stdout
-    assert "other values: fit it again with  rbfrag fit --replace" in told
+    assert "other values: fit it again in its place, by rbfrag fit" in told
     assert " changed " in told
 
 

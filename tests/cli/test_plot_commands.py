@@ -40,7 +40,9 @@ def test_every_figure_of_the_database(
         shell("plot", name, *options, "--out", path)
         assert path.stat().st_size > 5000, name
     # these motions have no vertical components
-    assert "--vertical both" in refuses("plot", "vertical", "--out", tmp_path / "v.png")
+    assert "simulate both, by rbfrag simulate" in refuses(
+        "plot", "vertical", "--out", tmp_path / "v.png"
+    )
     assert not (tmp_path / "v.png").exists()
 
 

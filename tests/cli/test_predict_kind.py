@@ -126,7 +126,7 @@ def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
     assert "campaigns are of" in refuses("simulate", "--kind", "falling")
     message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
     assert "method wls fits blocks known by p2 and kr, not those of kind sliding" in message
-    assert "(--rotation)" in refuses("fit", "--term", "pgv", "--rotation", "2")
+    assert "leave --rotation out" in refuses("fit", "--term", "pgv", "--rotation", "2")
 
 
 def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:

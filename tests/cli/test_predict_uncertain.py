@@ -50,4 +50,4 @@ def test_a_known_motion_is_simulated_instead(refuses: Refuses, tmp_path: Path) -
     record.write_text("0\n0.1\n-0.2\n0\n")
     asked = ("predict", "--p2", "3", "--kr", "0.1", "--motion", record, "--dt", "0.1")
     message = refuses(*asked, "--units", "g", "--kr-sigma", "0.1")
-    assert "rbfrag respond MOTION --draws" in message
+    assert "by rbfrag respond with draws" in message

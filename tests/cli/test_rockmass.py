@@ -105,7 +105,7 @@ def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     result = shell("rockmass", steep, "--pgv", "1.0")
     assert "covered blocks only" in result.stdout
     assert "slide: " in result.stderr
-    assert "--displacement (displacement_m), how far is too far [m], gives them" in result.stderr
+    assert "--displacement, how far is too far [m], gives them" in result.stderr
 
 
 @pytest.mark.usefixtures("stored_model")

@@ -255,7 +255,9 @@ class TestRefusals:
     def test_older_schema(self, sqlite_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(rbfrag.db.location, "REVISIONS", ("0000", "0001"))
         _mark(sqlite_file, "0000")
-        with pytest.raises(SchemaVersionError, match=r"rbfrag db upgrade --db .*test\.db"):
+        with pytest.raises(
+            SchemaVersionError, match=r"test\.db: .* upgrade it by rbfrag db upgrade"
+        ):
             open_database(sqlite_file)
 
     def test_damaged_pages(self, sqlite_file: Path) -> None:

@@ -180,7 +180,7 @@ def rockmass(
         print(sentence)
     print()
     _print(document, verbose=printing.verbose)
-    print_warnings(document["warnings"])
+    print_warnings(document["warnings"], ("displacement_m",))
 
 
 def _print(document: dict[str, Any], *, verbose: bool) -> None:
