@@ -111,7 +111,7 @@ def make_app(settings: Settings) -> FastAPI:
         responses=documented(401, 503),
     )
     async def models() -> Any:
-        """Return what `rbfrag models list --json` prints.
+        """Return what `rbfrag models list` prints as JSON.
 
         Where the service was given no database and there is none, these are the models that are
         shipped with rbfrag.

@@ -27,7 +27,7 @@ def add_routes(routes: APIRouter) -> None:
         responses=READ,
     )
     async def block(query: Annotated[BlockQuery, Query()]) -> Any:
-        """Return what `rbfrag block --json` prints.
+        """Return what `rbfrag block` prints as JSON.
 
         A block is described by height and width, by alpha1, alpha3 and r3, or by s1, s2 and gamma.
         """

@@ -100,7 +100,7 @@ class ModelAnswer(_Document):
 
 @keys_of(Prediction)
 class PredictAnswer(_Document):
-    """Probability that one block fails: what `rbfrag predict --json` prints.
+    """Probability that one block fails: what `rbfrag predict` prints as JSON.
 
     `probability` is the share of such blocks that fail over all earthquakes and sites with these
     measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
@@ -135,7 +135,7 @@ class CohesionAnswer(_Document):
 
 @keys_of(Stability, Block, names=KEYS)
 class BlockAnswer(_Document):
-    """How a block fails: what `rbfrag block --json` prints; null where it does not apply."""
+    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply."""
 
     ky: float | None
     yield_acceleration: float | None
@@ -163,7 +163,7 @@ class DrawingAnswer(_Document):
 
 @keys_of(ModelRow, names=("name", "kind", "term", "method", "is_default", "created"))
 class ModelListed(_Document):
-    """A stored model: what `rbfrag models list --json` prints.
+    """A stored model: what `rbfrag models list` prints as JSON.
 
     `log_loss` is that of outcomes of earthquakes left out, the smaller the better among models of a
     kind; `sensitive_share` is the share of the simulated outcomes behind it that a change of the
@@ -185,7 +185,7 @@ class Health(_Document):
 
 
 class SpectrumAnswer(_Document):
-    """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum --json` prints."""
+    """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum` prints as JSON."""
 
     motion: str
     name: str
@@ -206,13 +206,13 @@ class MapRow(_Document):
 
 @keys_of(CriticalResult, names=(*STRENGTH_VALUES, "polarity", "pga_g", "warnings"))
 class CriticalAnswer(_Document):
-    """The largest k_r/PGA that topples: what `rbfrag critical --json` prints."""
+    """The largest k_r/PGA that topples: what `rbfrag critical` prints as JSON."""
 
     map: list[MapRow] | None = None
 
 
 class RockmassAnswer(_Document):
-    """Blocks by mode: what `rbfrag rockmass --json` prints."""
+    """Blocks by mode: what `rbfrag rockmass` prints as JSON."""
 
     realisations: int
     blocks: int
@@ -248,7 +248,7 @@ class SiteRate(_Document):
 
 
 class HazardAnswer(_Document):
-    """Annual rates of toppling [1/a]: what `rbfrag hazard --json` prints."""
+    """Annual rates of toppling [1/a]: what `rbfrag hazard` prints as JSON."""
 
     model: str
     term: str

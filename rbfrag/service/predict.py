@@ -26,7 +26,7 @@ BYTES_BESIDE = 1 << 20
 
 
 def answer_one(query: PredictQuery, db: str | None) -> dict[str, Any]:
-    """Return what `rbfrag predict --json` prints."""
+    """Return what `rbfrag predict` prints as JSON."""
     given, how = query.question()
     blocks = described(given, how.pop("kind", None))
     (group,) = blocks.groups
@@ -78,7 +78,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         responses=READ,
     )
     async def predict_one(query: Annotated[PredictQuery, Query()]) -> Any:
-        """Return what `rbfrag predict --json` prints for the same values."""
+        """Return what `rbfrag predict` prints as JSON for the same values."""
         if models_in_memory(settings.db):
             return answer_one(query, settings.db)
         # a server, or a file that has changed and may be locked: nobody else waits for it

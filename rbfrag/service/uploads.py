@@ -70,7 +70,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         openapi_extra=_ACCELEROGRAM,
     )
     async def spectrum(request: Request, query: Annotated[SpectrumQuery, Query()]) -> bytes:
-        """Return what `rbfrag spectrum --json` prints: one object, or two in a list for both."""
+        """Return what `rbfrag spectrum` prints as JSON: one object, or two in a list for both."""
         query.sizes()
         body = await sent_file(request)
         return await pool.run(request, work.spectrum, body, query)
@@ -83,7 +83,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         openapi_extra=_ACCELEROGRAM,
     )
     async def critical(request: Request, query: Annotated[CriticalQuery, Query()]) -> bytes:
-        """Return what `rbfrag critical --json` prints.
+        """Return what `rbfrag critical` prints as JSON.
 
         The certified search of a long record may need more time than one request is given.
         """
@@ -104,7 +104,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         ),
     )
     async def hazard(request: Request, query: Annotated[HazardQuery, Query()]) -> bytes:
-        """Return what `rbfrag hazard --json` prints for one block and the curve that is sent.
+        """Return what `rbfrag hazard` prints as JSON for one block and the curve that is sent.
 
         A curve is OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header names their
         units.
@@ -127,7 +127,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         ),
     )
     async def rockmass(request: Request, query: Annotated[RockmassQuery, Query()]) -> bytes:
-        """Return what `rbfrag rockmass --json` prints for a rock mass file.
+        """Return what `rbfrag rockmass` prints as JSON for a rock mass file.
 
         It is TOML, its tables as JSON, or CSV. With a measure of the motion, the probability of
         failure by mode is in it.

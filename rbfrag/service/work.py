@@ -57,7 +57,7 @@ def warm_up() -> None:
 def rock_mass(
     body: bytes, form: str, query: RockmassQuery, row_limit: int, db: str | None
 ) -> bytes:
-    """Return what `rbfrag rockmass --json` prints, for toml, json or csv."""
+    """Return what `rbfrag rockmass` prints as JSON, for toml, json or csv."""
     from rbfrag.rockmasses.counts import crossings, mode_counts
     from rbfrag.rockmasses.file import rock_mass_of_csv, rock_mass_of_tables, rock_mass_of_toml
     from rbfrag.rockmasses.report import as_dict
@@ -90,7 +90,7 @@ def rock_mass(
 
 
 def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
-    """Return what `rbfrag spectrum --json` prints."""
+    """Return what `rbfrag spectrum` prints as JSON."""
     from rbfrag.motions.polarity import POLARITIES
     from rbfrag.motions.toppling_spectrum import spectrum_as_dict
 
@@ -104,7 +104,7 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 
 
 def critical(body: bytes, query: CriticalQuery) -> bytes:
-    """Return what `rbfrag critical --json` prints."""
+    """Return what `rbfrag critical` prints as JSON."""
     from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.question.blocks import has_shape, one_block
     from rbfrag.solver.reports import critical_as_dict
@@ -125,7 +125,7 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
 
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
-    """Return what `rbfrag hazard --json` prints."""
+    """Return what `rbfrag hazard` prints as JSON."""
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
