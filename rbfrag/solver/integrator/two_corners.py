@@ -26,8 +26,8 @@ from rbfrag.solver.integrator.events import (
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED, Corner, Offset, after_record
 from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
 from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
-from rbfrag.solver.integrator.single_run import step_errors
 from rbfrag.solver.integrator.state import Place, State, StepExcitation, time_of_jump
+from rbfrag.solver.integrator.step import step_errors
 from rbfrag.solver.integrator.taylor import even_parts, taylor_step, turn
 from rbfrag.solver.results import FloatArray
 

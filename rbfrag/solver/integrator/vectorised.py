@@ -23,12 +23,10 @@ from rbfrag.solver.integrator.single_run import (
     HANDED,
     PENDING,
     TOPPLED,
-    drift_of_step,
-    exponential_bound,
     run_toppling,
-    step_errors,
 )
 from rbfrag.solver.integrator.state import State, StepExcitation, excitation_over
+from rbfrag.solver.integrator.step import drift_of_step, exponential_bound, step_errors
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
 from rbfrag.solver.results import FloatArray
 
