@@ -38,6 +38,11 @@ STARTS_ANEW = (
     "no law here describes: each motion finds it at rest in its place"
 )
 
+STILL_ROCKS = (
+    "A block that still rocks when the next motion begins may fail where this says that it stays: "
+    "join such motions into one record"
+)
+
 Run = Callable[[GroundMotion, GroundMotion | None, BlockState | None], Response]
 """Answers one motion with its vertical one, from a state."""
 
@@ -84,28 +89,42 @@ def respond_in_sequence(
     """
     verticals = motions.vertical or [None] * len(motions.horizontal)
     parts: list[Part] = []
-    warnings = [] if carries_state else [STARTS_ANEW]
-    state, begins_s = start, 0.0
+    warnings = [] if carries_state else [f"{STARTS_ANEW}. {STILL_ROCKS}"]
+    state, begins_s, overlaps_s = start, 0.0, 0.0
     for number, (motion, vertical) in enumerate(
         zip(motions.horizontal, verticals, strict=True), start=1
     ):
         if parts and _is_over(parts[-1].response, carries_state):
             warnings.append(f"motion {number} and later ones are left out: {_why(parts[-1])}")
             break
+        if overlaps_s > 0.0:
+            warnings.append(_too_short(overlaps_s, number - 1))
         answer = run(motion, vertical, state)
         first_s, last_s = float(motion.time_s[0]), float(motion.time_s[-1])
         begins_s = begins_s if parts else first_s
         parts.append(Part(begins_s, first_s, motion.label, state, answer))
-        at_rest_s = max(last_s, answer.stopped_s or last_s) - first_s
-        ends_s = at_rest_s if motions.gap_s is None else last_s - first_s + motions.gap_s
-        if ends_s < at_rest_s:
-            warnings.append(
-                f"the block moves for {at_rest_s - (last_s - first_s):.3g} s after motion "
-                f"{number}, longer than the gap: the next one begins when it is at rest"
-            )
-        begins_s += max(ends_s, at_rest_s)
+        moves_on_s = max(last_s, answer.stopped_s or last_s) - last_s
+        gap_s = moves_on_s if motions.gap_s is None else motions.gap_s
+        overlaps_s = moves_on_s - gap_s
+        begins_s += last_s - first_s + max(gap_s, moves_on_s)
         state = answer.state if carries_state else None
     return _together(parts, warnings)
+
+
+def _too_short(overlaps_s: float, number: int) -> str:
+    """Say what it means that the next motion comes to a block that still moves.
+
+    The velocity of a slide grows with the velocity that it begins with, so both motions together
+    slide it no less than the first by itself to its last sample and the second from rest: the sum
+    is too great by no more than the slip after the first. It can be too small by any amount.
+    """
+    return (
+        f"the block moves on after motion {number} for {overlaps_s:.3g} s longer than the gap: "
+        f"motion {number + 1} is applied when it is at rest. Where motion {number + 1} pushes it "
+        "on, displacement and rotation are too small (a slide under two equal pulses: half); where "
+        f"it pushes back, a slide is too great by no more than the slip after motion {number}. "
+        "Join the two into one record to have both at once"
+    )
 
 
 def _is_over(response: Response, carries_state: bool) -> bool:

@@ -10,6 +10,7 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.reports import response_as_dict
 from rbfrag.solver.respond import respond
@@ -108,6 +109,8 @@ def test_toppling_and_rocking_start_again_from_rest() -> None:
         ]
         assert any("carries no state" in text for text in answer.warnings)
         assert answer.displacement_m is None
+        # the block may still rock when the next motion begins: that is the unsafe side
+        assert any("may fail where this says that it stays" in text for text in answer.warnings)
     fallen = respond([motion(1, 20.0), motion(2)], p2=3.0, kr=0.05)
     assert fallen.outcome is Outcome.TOPPLED
     assert len(fallen.parts) == 1
@@ -123,7 +126,81 @@ def test_a_block_still_in_motion_is_waited_for() -> None:
     assert first.response.stopped_s is not None
     assert first.response.stopped_s > 0.6
     assert second.begins_s == pytest.approx(first.response.stopped_s)
-    assert any("longer than the gap" in text for text in answer.warnings)
+    (said,) = [text for text in answer.warnings if "longer than the gap" in text]
+    longer_s = first.response.stopped_s - 0.5
+    assert f"moves on after motion 1 for {longer_s:.3g} s longer than the gap" in said
+    assert "motion 2 is applied when it is at rest" in said
+    assert len(said) < 500
+    # after the last motion nothing begins
+    assert not any("longer than the gap" in text for text in respond([cut], **SLIDE).warnings)
+
+
+SLIDE: dict[str, Any] = {"ky": 0.05, "gap_s": 0.0}
+
+
+def pulse(level_g: float, length_s: float = 0.5) -> GroundMotion:
+    """A rectangle that the end of the record cuts off."""
+    return GroundMotion.from_nodes([0.0, length_s], [level_g, level_g])
+
+
+def joined(*levels_g: float) -> GroundMotion:
+    """The rectangles one after the other in one record."""
+    ends_s = 0.5 * np.arange(len(levels_g) + 1)
+    return GroundMotion.from_nodes(np.repeat(ends_s, 2)[1:-1], np.repeat(levels_g, 2))
+
+
+def slip(answer: Response) -> float:
+    assert answer.displacement_m is not None
+    return answer.displacement_m
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_too_short_a_gap_before_a_push_on_errs_on_the_unsafe_side(count: int) -> None:
+    # v = (a - k_y) g t and v²/(2 k_y g) after it: the slip grows with the square of the length
+    pushed = respond([pulse(0.2)] * count, **SLIDE)
+    together = respond(joined(*[0.2] * count), ky=0.05)
+    alone = 0.5 * (0.2 - 0.05) * 0.2 / 0.05 * STANDARD_GRAVITY_M_S2 * 0.5**2
+    assert slip(pushed) == pytest.approx(count * alone, rel=1e-12)
+    assert slip(together) == pytest.approx(count**2 * alone, rel=1e-12)
+    shorter = [text for text in pushed.warnings if "are too small" in text]
+    assert len(shorter) == count - 1
+    # the advice of the sentence: one record has both at once
+    assert "Join the two into one record" in shorter[0]
+
+
+def test_too_short_a_gap_before_a_push_back_is_too_great_by_no_more_than_the_slip_after() -> None:
+    pushed = respond([pulse(0.2), pulse(-0.4)], **SLIDE)
+    together = respond(joined(0.2, -0.4), ky=0.05)
+    speed = (0.2 - 0.05) * STANDARD_GRAVITY_M_S2 * 0.5
+    slip_after = speed**2 / (2.0 * 0.05 * STANDARD_GRAVITY_M_S2)
+    # the second stops the block at k_y + .4 g, in less than its length
+    too_great = slip_after - speed**2 / (2.0 * (0.05 + 0.4) * STANDARD_GRAVITY_M_S2)
+    assert slip(pushed) - slip(together) == pytest.approx(too_great, rel=1e-12)
+    assert too_great < slip_after
+    assert any("by no more than the slip after motion 1" in text for text in pushed.warnings)
+
+
+def test_sums_of_slides_with_too_short_a_gap_keep_within_what_the_warning_says() -> None:
+    rng = np.random.default_rng(3)
+    moved_on = 0
+    for seed in range(40):
+        first = rng.uniform(1.5, 5.0) * shaking(seed)[: rng.integers(250, 400)]
+        second = rng.uniform(1.5, 5.0) * shaking(seed + 100)[rng.integers(150, 300) :]
+        one = DT_S * np.arange(first.size)
+        other = one[-1] + DT_S * np.arange(second.size)
+        whole = GroundMotion.from_nodes(np.r_[one, other], np.r_[first, second])
+        motions = [GroundMotion(first, DT_S), GroundMotion(second, DT_S)]
+        apart = respond(motions, **SLIDE, history=True)
+        if not any("longer than the gap" in text for text in apart.warnings):
+            continue
+        moved_on += 1
+        history = apart.parts[0].response.history
+        assert history is not None
+        assert history.displacement_m is not None
+        at_end = np.interp(one[-1], history.time_s, history.displacement_m)
+        slip_after = slip(apart.parts[0].response) - at_end
+        assert slip(apart) - slip(respond(whole, ky=0.05)) <= slip_after + 1e-12
+    assert moved_on > 15
 
 
 def test_a_run_from_a_state() -> None:
