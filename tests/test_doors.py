@@ -45,6 +45,7 @@ from tests.service.page.conftest import chromium as chromium
 from tests.service.page.conftest import open_page as open_page
 from tests.service.page.conftest import service as service
 from tests.service.page.reading import agrees, probability_shown
+from tests.synthetic import shaking, write_at2
 
 NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
@@ -498,3 +499,54 @@ def test_what_the_table_once_got_wrong() -> None:
     )
     assert math.isnan(slides.probability[0])
     assert slides.reason[0].startswith("slides (yield 0.21 g): state displacement_m")
+
+
+UNSTABLE = {"height_m": 2.0, "width_m": 0.2, "beta_deg": 10.0}
+"""A rectangle whose base dips by more than atan(w/h)."""
+
+
+@pytest.mark.parametrize("planes", [{}, {"phi_deg": 30.0}, {"phi_deg": 5.0}])
+@pytest.mark.parametrize("kind", ["toppling", "sliding", "slumping", "confined_toppling", None])
+def test_no_critical_value_of_a_block_that_is_unstable_at_rest(
+    tmp_path: Path, shell: Shell, planes: dict[str, float], kind: str | None
+) -> None:
+    """`critical` refuses it in the words of `respond`, in the shell, in Python and over HTTP."""
+    record = write_at2(tmp_path / "record.AT2", shaking(3))
+    (motion,) = rbfrag.read_motions(record)
+    words = [
+        text
+        for name, value in {**UNSTABLE, **planes}.items()
+        for text in (option_of(name), f"{value:g}")
+    ]
+    asked = ("--kind", kind) if kind else ()
+    needs_friction = not planes and kind not in (None, "toppling")
+    if not needs_friction:
+        refusals = [
+            shell(command, record, *words, *asked, expect=2).stderr.strip().splitlines()[-1]
+            for command in ("respond", "critical")
+        ]
+        assert refusals[0] == refusals[1]
+        assert "unstable at rest" in refusals[0]
+    # Python, of a block object
+    block = Block.rectangle(2.0, 0.2)
+    if planes:
+        question: dict[str, Any] = {"block": block, "beta_deg": 10.0, "kind": kind, **planes}
+        with pytest.raises(InputError, match="unstable at rest") as of_respond:
+            rbfrag.respond(motion, **question)
+        if kind == "sliding":
+            question["displacement_m"] = 0.1
+        with pytest.raises(InputError) as of_critical:
+            rbfrag.critical(motion, **question)
+        assert str(of_critical.value) == str(of_respond.value)
+    backed: dict[str, Any] = {"kind": kind or "toppling", "beta_deg": 10.0, **planes}
+    with pytest.raises(InputError, match="unstable at rest"):
+        rbfrag.critical(motion, block=block, **backed)
+    if kind is None:
+        with TestClient(make_app(Settings(db=str(REFERENCE)))) as client:
+            answer = client.post(
+                "/v1/critical",
+                params=parameters({**UNSTABLE, **planes}),
+                content=record.read_bytes(),
+            )
+        assert answer.status_code == 422
+        assert "unstable at rest" in answer.text

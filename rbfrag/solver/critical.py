@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kind import Kind, model_of_kind, model_of_mode
 from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, Polarity
-from rbfrag.solver.stability.single import stability
+from rbfrag.solver.stability.single import Stability, refuse_undecided, rough_deg, stability
 
 
 def critical(
@@ -87,6 +86,8 @@ def critical(
     }
     given = {name: value for name, value in question.items() if value is not None}
     model = kind_of(kind, given)
+    if model.searchable and "block" in given and "beta_deg" in given:
+        judged_at_rest(given)
     return model.critical(
         as_motion(motion),
         vertical=None if vertical is None else as_motion(vertical, "vertical"),
@@ -109,12 +110,21 @@ def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:
     for name in ("beta_deg", "phi_deg"):
         if name not in given:
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+    judged = judged_at_rest(given)
+    return model_of_mode(judged.mode)
+
+
+def judged_at_rest(given: Mapping[str, Any]) -> Stability:
+    """Return the stability of a block with its dip, or refuse one that no earthquake decides about.
+
+    Without a friction angle it is one that topples.
+    """
+    block = given["block"]
     judged = stability(
-        given["block"],
+        block,
         beta_deg=given["beta_deg"],
-        phi_deg=given["phi_deg"],
+        phi_deg=given.get("phi_deg", rough_deg(block)),
         phi_back_deg=given.get("phi_back_deg"),
     )
-    if judged.state != "stable" or not 0.0 < judged.yield_acceleration < math.inf:
-        raise InputError(f"the block is {judged.state} in its mode: no earthquake decides about it")
-    return model_of_mode(judged.mode)
+    refuse_undecided(judged)
+    return judged

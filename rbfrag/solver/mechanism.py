@@ -33,7 +33,7 @@ from rbfrag.solver.results import (
     ResponseHistory,
 )
 from rbfrag.solver.stability.modes import words_of_mode
-from rbfrag.solver.stability.single import stability
+from rbfrag.solver.stability.single import refuse_undecided, stability
 
 
 class MechanismKind(Kind):
@@ -449,15 +449,11 @@ def shaken_mechanism(
     if not isinstance(model, MechanismKind):
         raise InputError(f"kind {kind!r} is not one whose records are scaled")
     judged = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
+    refuse_undecided(judged)
     if judged.mode != model.mode:
         raise InputError(
             f"the block is not of kind {kind}: its mode is {words_of_mode(judged.mode)} (yield "
             f"{judged.yield_acceleration:.4g} g, {judged.state})"
-        )
-    if judged.state != "stable" or not 0.0 < judged.yield_acceleration < math.inf:
-        raise InputError(
-            f"the block is {judged.state} in its mode, {words_of_mode(judged.mode)} (yield "
-            f"{judged.yield_acceleration:.4g} g): no earthquake decides about it"
         )
     site = BlockOnPlanes.of(block, judged, judged.mode, {})
     mechanism = model.mechanism(site)

@@ -17,7 +17,7 @@ from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
-from rbfrag.solver.stability.single import Stability, stability
+from rbfrag.solver.stability.single import Stability, refuse_undecided, stability
 
 
 def respond(
@@ -238,7 +238,7 @@ def _site(
 ) -> BlockOnPlanes:
     """Return the block on its planes as the model that its mode calls for, or another, sees it."""
     if not model.free_standing:
-        _refuse_what_no_motion_decides(judged)
+        refuse_undecided(judged)
     return BlockOnPlanes.of(block, judged, model.mode, settings)
 
 
@@ -295,18 +295,3 @@ def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
             fields=(unknown[0],),
         )
     return given
-
-
-def _refuse_what_no_motion_decides(judged: Stability) -> None:
-    k = judged.yield_acceleration
-    if judged.state == "locked":
-        raise InputError(
-            f"the block is locked in its mode, {words_of_mode(judged.mode)}: no horizontal "
-            "acceleration moves it"
-        )
-    if judged.state == "unstable" or k <= 0.0:
-        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(judged.mode, "k_ct")
-        raise InputError(
-            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, "
-            f"{name} = {k:.4g} g): no earthquake decides about it"
-        )

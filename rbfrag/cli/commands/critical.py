@@ -14,6 +14,7 @@ from rbfrag.cli.output import (
     say_when_compiling,
 )
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import critical_in_words, slides_in_words
@@ -106,7 +107,10 @@ def critical(
         distances = (
             None if displacement is None else options.number_list(displacement, "--displacement")
         )
-        document = _slides(model.kind, ground, upward, direction.polarity, distances, remarks)
+        with given.named():
+            document = _slides(
+                model.kind, block, ground, upward, direction.polarity, distances, remarks
+            )
         print_json(document) if printing.json else _show_slides(document, verbose=printing.verbose)
         return
     settings: dict[str, Any] = {"rotation_deg": rotation, **block}
@@ -186,8 +190,7 @@ def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> 
 def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the keywords of a search that say which block, and what is to be said of it."""
     from rbfrag.question.blocks import shape_of, without_kv
-    from rbfrag.question.shapes import TAKEN_TO_TOPPLE
-    from rbfrag.solver.kinds import facts_of
+    from rbfrag.solver.kinds import facts_of, kind_of_mode
 
     with given.named():
         shape = shape_of(without_kv(given))
@@ -198,8 +201,11 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
                 "p2 does not go with the shape of a block: a block is described once",
                 fields=("p2",),
             )
-        if "phi_deg" not in shape.planes and (kind is None or facts_of(kind).search_needs == "p2"):
-            return {"p2": shape.block.p2}, (TAKEN_TO_TOPPLE,)
+    topples = kind_of_mode("topple") if kind is None else facts_of(kind)
+    if "phi_deg" not in shape.planes and topples.search_needs == "p2":
+        _, numbers, remarks = numbers_of(given, topples.kind)
+        return {"p2": numbers["p2"]}, remarks
+    with given.named():
         planes = {**shape.known().planes}
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if planes.pop(name, nothing) != nothing:
@@ -212,6 +218,7 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
 
 def _slides(
     kind: str,
+    block: dict[str, Any],
     ground: GroundMotion,
     upward: GroundMotion | None,
     polarity: Polarity,
@@ -225,7 +232,7 @@ def _slides(
 
     results = [
         critical_as_dict(
-            search(ground, kind=kind, displacement_m=d, vertical=upward, polarity=polarity)
+            search(ground, kind=kind, displacement_m=d, vertical=upward, polarity=polarity, **block)
         )
         for d in distances or THRESHOLDS_M
     ]

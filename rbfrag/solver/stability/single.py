@@ -34,6 +34,7 @@ from rbfrag.solver.stability.modes import (
     Planes,
     StateName,
     state_code,
+    words_of_mode,
     yield_coefficient,
 )
 
@@ -253,6 +254,26 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     block = Block.from_angles(-slender_deg, slender_deg, rectangle_r3_m(p2))
     rough = rough_deg(block)
     return block, stability(block, beta_deg=0.0, phi_deg=rough, back_fracture=False)
+
+
+def refuse_undecided(judged: Stability) -> None:
+    """Refuse a block whose fate at rest leaves nothing to a ground motion.
+
+    Raises:
+        InputError: it fails at rest, or no horizontal acceleration moves it.
+    """
+    k = judged.yield_acceleration
+    if judged.state == "locked":
+        raise InputError(
+            f"the block is locked in its mode, {words_of_mode(judged.mode)}: no horizontal "
+            "acceleration moves it"
+        )
+    if judged.state == "unstable" or k <= 0.0:
+        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(judged.mode, "k_ct")
+        raise InputError(
+            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, "
+            f"{name} = {k:.4g} g): no earthquake decides about it"
+        )
 
 
 def rough_deg(block: Block) -> float:
