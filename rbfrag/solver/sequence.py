@@ -38,7 +38,7 @@ STARTS_ANEW = (
     "no law here describes: each motion finds it at rest in its place"
 )
 
-MAY_STILL_ROCK = (
+NOT_YET_AT_REST = (
     "A block that still rocks when the next motion begins may fail where this says that it stays: "
     "join such motions into one record"
 )
@@ -89,7 +89,7 @@ def respond_in_sequence(
     """
     verticals = motions.vertical or [None] * len(motions.horizontal)
     parts: list[Part] = []
-    warnings = [] if carries_state else [f"{STARTS_ANEW}. {MAY_STILL_ROCK}"]
+    warnings = [] if carries_state else [f"{STARTS_ANEW}. {NOT_YET_AT_REST}"]
     state, begins_s, overlaps_s = start, 0.0, 0.0
     for number, (motion, vertical) in enumerate(
         zip(motions.horizontal, verticals, strict=True), start=1
