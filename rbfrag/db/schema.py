@@ -439,7 +439,7 @@ response = _table(
 
 def _end(of: str, meaning: str, *, may_be_missing: bool = False) -> tuple[Column[Any], ...]:
     """Return the columns that say how one motion of two leaves a block."""
-    outcome = f"how the block ends {meaning}: as of simulation, and seated_with_gap"
+    outcome = f"how the block ends {meaning}: as of simulation"
     return (
         _column(f"{of}_outcome", Text, outcome, nullable=may_be_missing),
         _optional(

@@ -25,16 +25,16 @@ from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP, 
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
-    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump", "bond_breaks",
+    "undetermined", "contact_lost", "indeterminate", "jump", "bond_breaks",
 )  # fmt: skip
 """What may become of a block, by its code:
 
 ``at_rest``: never moves; ``stays``: moves, and does not fail; ``fails``; ``unstable``: fails at
 rest, whatever the motion; ``locked``: no horizontal acceleration moves it in its mode;
-``undetermined``: closer to failure than the error of its run; ``seated_with_gap``: back on its base
-with a gap at its heel, rocked and slid on from there; ``contact_lost``, ``indeterminate`` and
-``jump``: the model ended before the block did, for the reason of that outcome; ``bond_breaks``: the
-motion exceeds the yield of a base with cohesion, whose bond the first slip breaks.
+``undetermined``: closer to failure than the error of its run; ``contact_lost``,
+``indeterminate`` and ``jump``: the model ended before the block did, for the reason of that
+outcome; ``bond_breaks``: the motion exceeds the yield of a base with cohesion, whose bond the
+first slip breaks.
 """
 
 AT_REST, STAYS, FAILS, UNSTABLE, LOCKED, UNDETERMINED = range(6)
@@ -42,9 +42,7 @@ BOND_BREAKS = OUTCOMES.index("bond_breaks")
 NO_BLOCK = -1
 """Code of a realisation that is no block."""
 
-OPEN = (
-    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump", "bond_breaks",
-)  # fmt: skip
+OPEN = ("undetermined", "contact_lost", "indeterminate", "jump", "bond_breaks")
 """Outcomes that leave open whether the block fails."""
 
 DISPLACEMENT_M = 0.05

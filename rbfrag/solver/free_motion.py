@@ -21,7 +21,6 @@ from rbfrag.solver.integrator.free_body import (
     BACKWARD,
     FORWARD,
     HEEL,
-    LANDED,
     ON_BACK,
     ON_BASE,
     ROWS,
@@ -134,21 +133,19 @@ def free_motion(
     release: Release,
     *,
     at_toe: bool = False,
-    stop_at_landing: bool = False,
 ) -> FreeMotion:
     """Return what a block does from where its mechanism has left it.
 
     Args:
         release: where and how fast it is.
         at_toe: whether displacements along the base are those of the toe, else of the heel.
-        stop_at_landing: whether an impact of the whole base ends the run.
     """
     block = site.block
     assert block is not None
     contact = block.toe if at_toe else block.heel
     # the method is of first order: the difference of both is the error of the finer one
-    coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S, stop_at_landing)
-    fine, rows = _run(site, excited, release, STEP_S, stop_at_landing)
+    coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S)
+    fine, rows = _run(site, excited, release, STEP_S)
     slips, slips_coarse = (
         _extremes(release.pose.displacement_m, _slips(block, each, contact))
         for each in (rows, coarse_rows)
@@ -199,7 +196,7 @@ def _corner(
 
 
 def _run(
-    site: BlockOnPlanes, excited: Excitation, release: Release, step_s: float, at_landing: bool
+    site: BlockOnPlanes, excited: Excitation, release: Release, step_s: float
 ) -> tuple[FreeRun, FloatArray]:
     block = site.block
     assert block is not None
@@ -219,9 +216,8 @@ def _run(
         # what is kept at one time lies together: a run touches little of the memory
         rows = np.empty((size, ROWS)).T
         run = run_free(
-            record, corners, frame, release.time_s, start, step_s, at_landing, work_of(corners),
-            rows,
-        )  # fmt: skip
+            record, corners, frame, release.time_s, start, step_s, work_of(corners), rows
+        )
         if run.filled < size:
             return run, rows[:, : run.filled]
         size *= 4
@@ -296,8 +292,6 @@ def _ending(run: FreeRun) -> tuple[Outcome, str]:
         return Outcome.TOPPLED, ON_ITS_FACE.format(run.time_s)
     if run.stop == THROWN:
         return Outcome.JUMP, f"at {run.time_s:.3f} s: {Outcome.JUMP.advice}"
-    if run.stop == LANDED:
-        return Outcome.SEATED_WITH_GAP, f"at {run.time_s:.3f} s the block falls back on its base"
     return Outcome.UNDETERMINED, "a minute after the record the block neither stops nor falls"
 
 

@@ -121,9 +121,9 @@ class WholeRun:
         return last
 
     @property
-    def pose(self) -> Pose | None:
-        """Where the block is at the end; None where that is not known."""
-        return self._last.pose if self.outcome is not Outcome.SEATED_WITH_GAP else None
+    def pose(self) -> Pose:
+        """Where the block is at the end."""
+        return self._last.pose
 
     @property
     def started_s(self) -> float | None:
@@ -183,9 +183,9 @@ class WholeRun:
 
     @property
     def state(self) -> BlockState | None:
-        """Where the block is left at rest; None where it is not, or not known."""
+        """Where the block is left at rest; None where it is not."""
         pose, block = self.pose, self.site.block
-        if pose is None or self.outcome is not Outcome.STABLE:
+        if self.outcome is not Outcome.STABLE:
             return None
         position, error = None, self.error
         # only the first phase can be entered at rest: what comes after it goes on step by step
@@ -236,9 +236,7 @@ def whole_run(
     else:
         pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
         release = Release(float(excited.time_s[0]), pose)
-    free = free_motion(
-        site, excited, release, at_toe=mechanism.at_toe, stop_at_landing=mechanism.until_landing
-    )
+    free = free_motion(site, excited, release, at_toe=mechanism.at_toe)
     return WholeRun(mechanism, site, start, run, free)
 
 

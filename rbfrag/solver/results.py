@@ -58,12 +58,6 @@ class Outcome(StrEnum):
         "a block in contact does not apply; use the horizontal motion alone or another method.",
     )
     CONTACT_LOST = "contact_lost", "A contact opened: the motion after it is outside the model."
-    SEATED_WITH_GAP = (
-        "seated_with_gap",
-        "The block fell back on its base with its toe displaced and a gap at its heel, and the "
-        "rest of the record rocks and slides it on from there: how far depends on impacts that "
-        "rigid contact does not decide.",
-    )
     INDETERMINATE = "indeterminate", "The rigid-body problem has no unique answer here."
 
 

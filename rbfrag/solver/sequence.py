@@ -25,7 +25,6 @@ from rbfrag.solver.results import (
 WORST_LAST = (
     Outcome.STABLE,
     Outcome.UNDETERMINED,
-    Outcome.SEATED_WITH_GAP,
     Outcome.CONTACT_LOST,
     Outcome.INDETERMINATE,
     Outcome.JUMP,

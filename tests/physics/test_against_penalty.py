@@ -133,16 +133,22 @@ def test_confined(name: str) -> None:
     assert answer.peak_theta_rad is not None
     assert -free.turned_rad.min() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
     assert free.toe_m.max() == pytest.approx(answer.peak_displacement_m, rel=1e-3)
-    # it rocks back about the toe; where the toe ends after the impact is not known
-    assert answer.displacement_m is None
-    (change,) = answer.mode_changes
+    # it rocks back about the toe; what it does from its fall on the base is in test_followed_on.py
+    change = answer.mode_changes[0]
     assert change.motion.startswith("rocks back")
-    assert answer.stopped_s is not None
-    back_s = answer.stopped_s
+    assert answer.history is not None
+    back_s = landing(answer.history.time_s, answer.history.turned_rad, change.time_s)
     assert deviation(answer, free, back_s, sign=-1.0) < 5e-3 * answer.peak_theta_rad
-    still = free.time_s > change.time_s
-    landed = free.time_s[still][np.argmax(-free.turned_rad[still] < 0.0)]
+    landed = landing(free.time_s, free.turned_rad, change.time_s)
     assert landed == pytest.approx(back_s, abs=2e-3)
+
+
+def landing(
+    time_s: NDArray[np.float64], turned_rad: NDArray[np.float64] | None, after_s: float
+) -> float:
+    """First time after another at which a block that had turned forward is on its base again."""
+    assert turned_rad is not None
+    return float(time_s[(time_s > after_s) & (turned_rad >= 0.0)][0])
 
 
 def test_motion_that_goes_on_after_the_record() -> None:
@@ -159,10 +165,11 @@ def test_motion_that_goes_on_after_the_record() -> None:
         )
         for more in ((), (0.3, 0.5, 3.0))
     )
-    assert len(short.mode_changes) == len(long.mode_changes) == 1
     assert short.mode_changes[0].time_s == pytest.approx(long.mode_changes[0].time_s, rel=1e-11)
     assert short.mode_changes[0].time_s > 0.2
-    assert short.stopped_s == pytest.approx(long.stopped_s, rel=1e-11)
+    # steps after the fall on the base begin at other times
+    assert short.stopped_s == pytest.approx(long.stopped_s, abs=5e-3)
+    assert short.displacement_m == pytest.approx(long.displacement_m, rel=1e-3)
     assert short.peak_theta_rad == pytest.approx(long.peak_theta_rad, rel=1e-11)
     assert short.history is not None
     at = short.history.time_s
@@ -239,6 +246,3 @@ def test_confined_under_a_record(record: str, records_dir: Path) -> None:
     peak = float(answer.history.theta_rad[answer.history.time_s <= until_s].max())
     assert peak > 0.02
     assert deviation(answer, free, until_s, sign=-1.0) < 1e-3 * peak
-    # it comes back on its base, and what it does there with a gap at the heel is not known
-    assert answer.outcome is Outcome.SEATED_WITH_GAP
-    assert answer.displacement_m is None

@@ -129,19 +129,6 @@ def site_of(case: Case) -> BlockOnPlanes:
     return on_planes(case.block, case.beta, case.phi, case.back)
 
 
-def test_a_confined_block_that_is_back_on_its_base_says_what_is_next() -> None:
-    case = CONFINED["pulse"]
-    lobes = (*case.lobes, (1.2, 0.2, 0.9))
-    answer = respond(
-        GroundMotion(half_sines(lobes), DT_S), block=case.block, beta_deg=case.beta,
-        phi_deg=case.phi, phi_back_deg=case.back, history=True,
-    )  # fmt: skip
-    assert answer.outcome is Outcome.SEATED_WITH_GAP
-    assert answer.displacement_m is None
-    assert answer.state is None
-    assert any("rocks and slides it on" in text for text in answer.warnings)
-
-
 def test_free_flight_and_fall() -> None:
     # above both planes, under no shaking: it falls as bodies do, and comes to rest on its base
     block = Block.rectangle(1.0, 1.0)

@@ -22,9 +22,9 @@ from rbfrag.solver.results import FloatArray
 GOES_ON = -1
 """A run that has not ended."""
 
-AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS, LANDED = range(6)
+AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS = range(5)
 """How a run ends: at rest to the end; on its back edge; on its front face; by a jump of the ground;
-not within `FREE_MOST_S` of rest after the record; by an impact of its whole base."""
+not within `FREE_MOST_S` of rest after the record."""
 
 HEEL, TOE, ON_BASE, ON_BACK, LANDS = 1, 2, 4, 8, 16
 """Bits of what touches in a step: heel and toe on the base, another corner there, any corner on the
@@ -222,10 +222,8 @@ def kept(history: FloatArray, filled: int, now: float, at: Motion, touch: int) -
 
 
 @within
-def stop_of(frame: Frame, at: Motion, landed: bool) -> int:
+def stop_of(frame: Frame, at: Motion) -> int:
     """Return how a run ends after a step, or that it goes on."""
-    if landed:
-        return LANDED
     if at.turned >= frame.backward_rad:
         return BACKWARD
     return FORWARD if at.turned <= -frame.forward_rad else GOES_ON
@@ -239,7 +237,6 @@ def run_free(
     start_s: float,
     at: Motion,
     h: float,
-    stop_at_landing: bool,
     work: Work,
     history: FloatArray,
 ) -> FreeRun:
@@ -251,7 +248,6 @@ def run_free(
         frame: the block on its slope.
         start_s: where in the record the run begins [s].
         h: greatest step [s].
-        stop_at_landing: whether an impact of the whole base ends the run.
         work: what the steps write to.
         history: shape (8, k) for what is kept; (8, 0) for nothing.
     """
@@ -320,7 +316,7 @@ def run_free(
             if since_kept >= KEEP or resting != was or n == parts - 1:
                 filled = kept(history, filled, now, at, touch)
                 since_kept = 0
-            stop = stop_of(frame, at, stop_at_landing and not math.isnan(landed_s))
+            stop = stop_of(frame, at)
             if stop != GOES_ON:
                 return FreeRun(stop, now, at, steps, filled, moved_s, landed_s)
         if not free:

@@ -7,8 +7,8 @@ toe stops and free toppling follows. At a standstill the back plane holds the bl
     k_h > (1 + k_v) tan(α3 - θ - β);
 
 below that the heel leaves the plane and the block rocks back about its toe, which stays
-displaced. What a block does that is back on its base with a gap at the heel, or whose heel meets
-the plane again, is not verified: there the run ends.
+displaced. From where it lands on its base, with a gap at the heel, or its heel meets the plane
+again, it is followed step by step (docs/theory/slide-to-slump.md).
 """
 
 from __future__ import annotations
@@ -88,14 +88,14 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
 
     def rocks_back(exit: Exit) -> Phase:
-        standstill = exit.x
-
         def after_rocking(exit: Exit) -> Ending:
             if exit.reason == "upper":
                 return Ending(
                     Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the heel meets its plane again"
                 )
-            return _seated_with_a_gap(site, block, exit, standstill)
+            return Ending(
+                Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block falls back on its base"
+            )
 
         return Phase(
             name="rocks back about its toe, the heel off its plane",
@@ -124,7 +124,6 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         rotates=True,
         critical=critical_rad if critical_rad > 0.0 else None,
         goes_on=True,
-        until_landing=True,
         at_toe=True,
     )
 
@@ -178,31 +177,6 @@ def _base_off_plane(block: Block) -> Harmonics:
 
 def _fallen(exit: Exit) -> Ending:
     return Ending(Outcome.TOPPLED, f"at {exit.time_s:.3f} s the block lies on its front face")
-
-
-def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit, slipped_at: float) -> Ending:
-    """Return what is known of a block that is back on its base with a gap at the heel."""
-    beta, phi = site.beta_rad, site.phi_rad
-    # on its base with a gap behind it the block next rocks forward about its toe at k_r, ...
-    forward = math.tan(math.radians(block.alpha3_deg) - beta)
-    # ... or backward about its heel, or slides up the base, whichever takes less
-    backward = max(
-        math.tan(max(math.radians(block.alpha1_deg) - beta, -1.57)),
-        -math.tan(phi + beta) if phi + beta < 0.5 * math.pi else -math.inf,
-    )
-    seated = (
-        f"at {exit.time_s:.3f} s the block falls back on its base, its toe displaced by "
-        f"{toe_slip(block)(slipped_at):.3g} m; how far the impact pushes it back is not known"
-    )
-    if exit.rest_max_q <= forward and exit.rest_min_q >= backward:
-        return Ending(
-            Outcome.STABLE, f"{seated}; the rest of the record does not move it", in_place=False
-        )
-    return Ending(
-        Outcome.SEATED_WITH_GAP,
-        f"{seated}; the rest of the record rocks and slides it on from there",
-        in_place=False,
-    )
 
 
 class ConfinedToppling(ScaledKind):

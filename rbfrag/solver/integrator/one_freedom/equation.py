@@ -133,13 +133,10 @@ class Ending:
 
     Args:
         sentence: what happened and what was not followed; empty where there is nothing to say.
-        in_place: whether it is known where the block is; False where it ends in an impact
-            that the model does not describe.
     """
 
     outcome: Outcome
     sentence: str = ""
-    in_place: bool = True
 
 
 ExitReason = Literal["upper", "lower", "reverse"]
@@ -154,16 +151,13 @@ class Exit:
         reason: why.
         time_s: when [s].
         x: position.
-        rest_max_q: greatest k_h/(1 + k_v) from here to the end of the record, rest included.
-        rest_min_q: least of it.
+        rate: its rate.
     """
 
     reason: ExitReason
     time_s: float
     x: float
     rate: float
-    rest_max_q: float
-    rest_min_q: float
 
 
 Impact = Literal["comes to rest", "leaves"]
@@ -213,7 +207,6 @@ class Mechanism:
         least_q: least k_h/(1 + k_v) that the model covers.
         if_below: what the reader should know where the record goes below it.
         goes_on: whether the block is followed step by step where a contact is lost.
-        until_landing: whether that ends where its whole base falls on the base plane.
         at_toe: whether its displacement is that of the toe.
     """
 
@@ -225,5 +218,4 @@ class Mechanism:
     least_q: float = -np.inf
     if_below: str = ""
     goes_on: bool = False
-    until_landing: bool = False
     at_toe: bool = False

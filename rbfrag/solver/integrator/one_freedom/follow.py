@@ -98,7 +98,7 @@ class MechanismRun:
         x: position at the end.
         rate: rate at the end; not zero where the model ended in motion.
         peak_displacement_m: greatest displacement along the base [m].
-        pose: where the block is at the end; None where that is not known.
+        pose: where the block is at the end.
         started_s: first motion [s], or None.
         ended_s: time of the last standstill, or at which the model ended [s]; None if the
             block never moved.
@@ -119,7 +119,7 @@ class MechanismRun:
     x: float
     rate: float
     peak_displacement_m: float
-    pose: Pose | None
+    pose: Pose
     started_s: float | None
     ended_s: float | None
     certain_s: float | None
@@ -182,8 +182,9 @@ def follow(
         if history:
             histories.append(_history(phase, rows[:, : run.history_length], run))
         # the model says what follows a limit; every other stop ends the run
-        if run.stop in (UPPER, LOWER, REVERSE):
-            following = phase.after(_exit(run, excitation))
+        if run.stop in _REASONS:
+            end = run.end
+            following = phase.after(Exit(_REASONS[run.stop], run.time_s, end.x, end.rate))
             ended = run.time_s
         else:
             following = _ending(phase, run)
@@ -211,7 +212,7 @@ def follow(
         x=entry.x,
         rate=entry.rate,
         peak_displacement_m=slipped,
-        pose=phase.pose(entry.x) if following.in_place else None,
+        pose=phase.pose(entry.x),
         started_s=finite_or_none(started),
         ended_s=finite_or_none(ended) if not math.isnan(started) or run.stop == JUMPED else None,
         certain_s=finite_or_none(run.certain_s),
@@ -296,32 +297,7 @@ def _ending(phase: Phase, run: PhaseRun) -> Ending:
     return Ending(broken.outcome, at + broken.sentence)
 
 
-def _exit(run: PhaseRun, excitation: Excitation) -> Exit:
-    reason: ExitReason = "upper"
-    if run.stop == LOWER:
-        reason = "lower"
-    elif run.stop == REVERSE:
-        reason = "reverse"
-    node, fraction = run.end.place
-    # q is monotone between nodes: its extremes are at nodes, here, or 0 after the record
-    rest = np.append(excitation.q[min(node + 1, excitation.q.size) :], 0.0)
-    if node < excitation.q.size - 1:
-        (k_h, k_h_after), (w, w_after) = (
-            values[node : node + 2] for values in (excitation.k_h, excitation.w)
-        )
-        rest = np.append(
-            rest, (k_h + fraction * (k_h_after - k_h)) / (w + fraction * (w_after - w))
-        )
-    # nothing is known of the time after a jump: any motion may come
-    thrown = excitation.jump_node < excitation.q.size
-    return Exit(
-        reason=reason,
-        time_s=run.time_s,
-        x=run.end.x,
-        rate=run.end.rate,
-        rest_max_q=math.inf if thrown else float(rest.max()),
-        rest_min_q=-math.inf if thrown else float(rest.min()),
-    )
+_REASONS: dict[int, ExitReason] = {UPPER: "upper", LOWER: "lower", REVERSE: "reverse"}
 
 
 def _empty_rows(excitation: Excitation) -> FloatArray:
