@@ -43,7 +43,9 @@ FREE_STEP_S = 0.05
 """Time after the record that is integrated between two looks at whether the block rests [s]."""
 
 NEAR_M = 1e-9
-"""Gap up to which a corner counts as on its plane: rounding leaves as much [m]."""
+"""Distance from its plane, above or below, within which a corner counts as on it: rounding leaves
+as much, and to ask for its removal would keep a block moving that stands on corners of both planes
+[m]."""
 
 LET_OUT = 0.2
 """Part of the depth of a corner below its plane by which a step lets it out: all of it at once
@@ -151,7 +153,10 @@ def one_step(
         work.moment_t[k] = -rx * nx - ry * ny
         work.approach[k] = -((at.vx - at.spin * ry) * nx + (at.vy + at.spin * rx) * ny)
         # a corner above its plane may come down to it; one that rounding put below it is let out
-        work.least[k] = -gap / h if gap > 0.0 else -LET_OUT * gap / h
+        if gap > NEAR_M:
+            work.least[k] = -gap / h
+        else:
+            work.least[k] = LET_OUT * max(-gap - NEAR_M, 0.0) / h
     vx, vy, spin = after_impulses(
         corners, work, active, 1.0 / frame.inertia_m2, Velocity(vx, vy, spin), CONVERGED * g * h
     )

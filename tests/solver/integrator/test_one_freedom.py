@@ -181,7 +181,7 @@ def test_limits_and_contacts_are_met_in_the_same_place_by_long_and_short_steps()
             forward=equation,
             reverse=None,
             pose=lambda x: Pose(0.0, (x, 0.0), x),
-            after=lambda exit: Ending(Outcome.TOPPLED, in_place=False),
+            after=lambda exit: Ending(Outcome.TOPPLED),
             highest=highest,
         )
         return follow(Mechanism(first=phase, rotates=False, critical=None), drive)
