@@ -18,7 +18,7 @@ from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
 from tests.on_planes import on_planes
 from tests.physics.penalty import Simulated, simulate
-from tests.physics.test_against_penalty import CONFINED, DT_S, SLUMPS, Case, half_sines
+from tests.physics.test_against_penalty import DT_S, SLUMPS, Case, half_sines
 
 # after a slide the block tips back, and a later pulse makes it slump
 SLIDES = {
