@@ -27,7 +27,7 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.plots.canvas import BLUE, ROCK, light_grid, new_figure, save_figure
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import model_of_mode
+from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Response
 from rbfrag.solver.stability.modes import ModeName

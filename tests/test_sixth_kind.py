@@ -11,6 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 import rbfrag
+import rbfrag.campaign.kinds
 import rbfrag.solver.models
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
@@ -25,14 +26,8 @@ from tests.synthetic import shaking
 FALLS = '''
 """A block that falls when |a| exceeds k_r."""
 
-import math
-
-import numpy as np
-
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.kind import Case, CaseResult, Kind
-from rbfrag.solver.models.toppling import Y_OVER_PGV
-from rbfrag.solver.results import Outcome, Response, SearchPoints
+from rbfrag.solver.kind import Kind
+from rbfrag.solver.results import Outcome, Response
 
 
 class Falls(Kind):
@@ -52,8 +47,25 @@ class Falls(Kind):
             samples_total=0,
         )
 
-    def cases(self, **asked):
-        self.refuse_foreign(asked, self.campaign_options)
+
+MODEL = Falls.named("falls")
+'''
+
+CAMPAIGN = '''
+"""Campaigns of blocks that fall."""
+
+import math
+
+import numpy as np
+
+from rbfrag.campaign.kind import CampaignKind, Case, CaseResult
+from rbfrag.campaign.kinds.toppling import Y_OVER_PGV
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.results import SearchPoints
+
+
+class FallsCampaign(CampaignKind):
+    def cases(self):
         return tuple(Case(self.kind, p2) for p2 in (10.0, 1.0))
 
     def grid(self, case, measures):
@@ -69,18 +81,18 @@ class Falls(Kind):
         return results
 
 
-MODEL = Falls.named("falls")
+CAMPAIGN = FallsCampaign("falls")
 '''
 
 
 @pytest.fixture
 def falls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "kinds"
-    folder.mkdir()
-    (folder / "falls.py").write_text(FALLS)
-    path = [*rbfrag.solver.models.__path__, str(folder)]
-    monkeypatch.setattr(rbfrag.solver.models, "__path__", path)
-    facts = KindFacts("falls", parameters=("p2", "kr"), campaign=True)
+    for package, text in ((rbfrag.solver.models, FALLS), (rbfrag.campaign.kinds, CAMPAIGN)):
+        folder = tmp_path / package.__name__
+        folder.mkdir()
+        (folder / "falls.py").write_text(text)
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+    facts = KindFacts("falls", parameters=("p2", "kr"))
     monkeypatch.setitem(KINDS, "falls", facts)
 
 

@@ -9,6 +9,8 @@ from itertools import pairwise
 import numpy as np
 from sqlalchemy import Connection
 
+from rbfrag.campaign.kind import Case
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.worker import PlannedCase, Task
 from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
 from rbfrag.db.keys import combination_key
@@ -18,7 +20,7 @@ from rbfrag.db.rows import MotionRow, Vertical
 from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
-from rbfrag.solver.kind import Case, model_of_kind
+from rbfrag.solver.kinds import facts_of
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
 
@@ -162,7 +164,7 @@ def plan_campaign(
             cases=tuple(
                 _planned(row, up, polarity, case)
                 for up in _verticals(vertical, fitting.get(row.id))
-                for polarity in model_of_kind(kind).polarities
+                for polarity in campaign_of_kind(kind).polarities
                 for case in cases
             ),
         )
@@ -192,8 +194,8 @@ def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -
         ),
     )
     # X(p) is a measure of blocks that are described by p² and backed by a slope
-    model = model_of_kind(plan.kind)
-    described = "p2" in model.parameters and not model.free_standing
+    facts = facts_of(plan.kind)
+    described = "p2" in facts.parameters and not facts.free_standing
     sizes = list(dict.fromkeys(c.case.p2 for c in plan.cases if c.case.p2 and described))
     spectra = spectrum_values(connection, p2=sizes) if sizes else {}
     motions = []
@@ -293,7 +295,7 @@ def _task(
     lacks_grid = there is None or (
         not there.gridded
         and there.status != "outside_model"
-        and len(model_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
+        and len(campaign_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
     )
     task = Task(
         planned=planned,

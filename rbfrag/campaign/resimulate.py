@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from sqlalchemy import Connection
 
+from rbfrag.campaign.kind import Case, CaseRequest, SingleBlocks
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.sequences import PairWork, SequenceTask, run_pair
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
@@ -25,7 +27,7 @@ from rbfrag.db.shock_pairs import (
 )
 from rbfrag.db.stored_combination import StoredCombination, keys_with_samples, stored_combination
 from rbfrag.errors import RbfragError
-from rbfrag.solver.kind import Case, CaseRequest, Shaking, model_of_kind
+from rbfrag.solver.kind import Shaking
 from rbfrag.solver.results import (
     MAP_DEPTH,
     NUMERICS_VERSION,
@@ -169,7 +171,7 @@ def _finding(stored: StoredCombination, problem: str) -> Finding:
 
 def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain:
     values = stored.values
-    kind = model_of_kind(str(values["kind"]))
+    kind = campaign_of_kind(str(values["kind"]))
     case = Case(kind.kind, values["p2"], stored.block, stored.settings)
     motion = load_motion(connection, stored.motion_id)
     vertical = None
@@ -187,11 +189,11 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
     if answer.critical is not None:
         ends = {**ends_of(answer.critical.points), **ends}
     others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
-    if others:
+    if others and isinstance(kind, SingleBlocks):
         ends |= ends_of(kind.run_blocks(shaking, case, others))
 
     def error(k_over_pga: float) -> float:
-        if "store_responses" not in kind.campaign_options:
+        if not isinstance(kind, SingleBlocks):
             return 0.0
         alone = kind.history(shaking, case, k_over_pga)
         if not alone.peak_theta_rad or alone.peak_theta_n is None:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from sqlalchemy import Engine
 
 from rbfrag.campaign.carry_out import Workforce
+from rbfrag.campaign.kind import Case, Sequences
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.motion_pairs import MotionPair, motion_pairs
 from rbfrag.campaign.summary import CampaignSummary, SequenceReport
 from rbfrag.db.engine import opened_database
@@ -28,7 +30,8 @@ from rbfrag.db.shock_pairs import (
 from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, Shaking, model_of_kind
+from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.results import NUMERICS_VERSION, BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW
 
@@ -72,20 +75,22 @@ class PairResults:
     numerics_version: str
 
 
-def refuse_kind(name: str) -> None:
-    """Refuse a kind that carries no state from one motion to the next.
+def sequences_of_kind(name: str) -> Sequences:
+    """Return what campaigns of sequences of a kind store.
 
     Raises:
         InputError: there is no such kind, or a motion leaves its blocks where they were.
     """
-    if not model_of_kind(name).carries_state:
+    campaign = campaign_of_kind(name)
+    if not isinstance(campaign, Sequences):
         raise InputError(
             f"sequence does not go with kind {name}: {STARTS_ANEW}", fields=("sequence", "kind")
         )
+    return campaign
 
 
 def simulate_sequences(
-    kind: Kind,
+    kind: Sequences,
     cases: Sequence[Case],
     *,
     db: str | os.PathLike[str] | None,
@@ -103,7 +108,7 @@ def simulate_sequences(
     """
     if draws < 1:
         raise InputError(f"draws must be at least 1, not {draws}", fields=("draws",))
-    blocks, limits = kind.sequence_blocks(cases), kind.sequence_limits(cases)
+    blocks, limits = kind.blocks(cases), kind.limits(cases)
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
@@ -141,7 +146,7 @@ def simulate_sequences(
             seed=seed,
             station_pairs=of_station,
             drawn_pairs=len(pairs) - of_station,
-            conditional=conditional_shares(rows, kind.sequence_measure, limits),
+            conditional=conditional_shares(rows, kind.measure, limits),
         ),
     )
 
@@ -157,7 +162,7 @@ def _warnings(pairs: int, of_station: int, seed: int) -> tuple[str, ...]:
 
 
 def _tasks(
-    pair: MotionPair, kind: Kind, blocks: Sequence[Mapping[str, object]]
+    pair: MotionPair, kind: Sequences, blocks: Sequence[Mapping[str, object]]
 ) -> tuple[SequenceTask, ...]:
     return tuple(
         SequenceTask(
@@ -187,7 +192,7 @@ def _remaining(plan: Sequence[PairTasks], known: set[str]) -> list[PairTasks]:
     return [each for each in left if each.tasks]
 
 
-def _work(engine: Engine, kind: Kind, todo: Sequence[PairTasks]) -> Iterator[PairWork]:
+def _work(engine: Engine, kind: Sequences, todo: Sequence[PairTasks]) -> Iterator[PairWork]:
     for each in todo:
         pair = each.pair
         with engine.connect() as connection:
@@ -199,15 +204,24 @@ def _work(engine: Engine, kind: Kind, todo: Sequence[PairTasks]) -> Iterator[Pai
 
 def run_pair(work: PairWork) -> PairResults:
     """Run every block under both motions, and under the second alone."""
-    kind = model_of_kind(work.kind)
+    sites, model = sequences_of_kind(work.kind), model_of_kind(work.kind)
     records, runs = [], 0
     for task in work.tasks:
-        site = kind.sequence_site(task.block)
-        run = _Block(kind, site, task.polarity)
-        first, intact = run.under(work.first, None), run.under(work.second, None)
+        site = sites.site(task.block)
+
+        def under(
+            motion: GroundMotion,
+            start: BlockState | None = None,
+            site: BlockOnPlanes = site,
+            polarity: Polarity = task.polarity,
+        ) -> Response:
+            """Return what the block does under a motion that finds it in a state."""
+            return model.respond(site, Shaking(motion, None, polarity, start=start))
+
+        first, intact = under(work.first), under(work.second)
         second, runs = None, runs + 2
         if first.state is not None:
-            second, runs = run.under(work.second, first.state), runs + 1
+            second, runs = under(work.second, first.state), runs + 1
         critical = first.critical_angle_deg
         assert site.yield_g is not None
         records.append(
@@ -228,18 +242,6 @@ def run_pair(work: PairWork) -> PairResults:
             )
         )
     return PairResults(tuple(records), runs, NUMERICS_VERSION)
-
-
-@dataclass(frozen=True)
-class _Block:
-    kind: Kind
-    site: BlockOnPlanes
-    polarity: Polarity
-
-    def under(self, motion: GroundMotion, start: BlockState | None) -> Response:
-        """Return what the block does under a motion that finds it in a state."""
-        shaking = Shaking(motion, None, self.polarity, history=False, start=start)
-        return self.kind.respond(self.site, shaking)
 
 
 def _end(response: Response, start: BlockState | None) -> ShockEnd:

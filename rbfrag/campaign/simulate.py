@@ -13,6 +13,8 @@ from sqlalchemy import Engine
 from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.executors.local import check_workers
 from rbfrag.campaign.interrupt import Stopped, never
+from rbfrag.campaign.kind import Case
+from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
 from rbfrag.campaign.plan import (
     CampaignPlan,
     MotionTasks,
@@ -23,7 +25,7 @@ from rbfrag.campaign.plan import (
     remaining_work,
     strengths_of,
 )
-from rbfrag.campaign.sequences import refuse_kind, simulate_sequences
+from rbfrag.campaign.sequences import sequences_of_kind, simulate_sequences
 from rbfrag.campaign.summary import CampaignProgress as CampaignProgress
 from rbfrag.campaign.summary import CampaignSummary as CampaignSummary
 from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_work
@@ -41,8 +43,6 @@ from rbfrag.db.responses import insert_responses
 from rbfrag.db.rows import Vertical
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, UnknownFieldError, WorkFailedError
-from rbfrag.solver.kind import Case, model_of_kind
-from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import MAP_DEPTH, CriticalResult
 
@@ -101,7 +101,7 @@ def simulate(
             failure past recovery; None for 2 and past recovery.
         displacements_m: sliding: displacements on a level plane [m]; None for 0.01, 0.05, 0.15
             and 0.3.
-        family: slumping: the blocks; None for `rbfrag.solver.models.slumping.FAMILY`.
+        family: slumping: the blocks; None for `rbfrag.campaign.kinds.slumping.FAMILY`.
         restitution_factors: rocking: factors on the restitution of the rectangle, 1 - 1.5 sin² α
             (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
         vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
@@ -139,7 +139,7 @@ def simulate(
     }
     described = {name: given[name] for name in DESCRIBED if name in given}
     if sequence:
-        refuse_kind(kind)
+        sequences_of_kind(kind)
     cases = _cases(kind, described, [name for name in OPTIONS if name in given])
     wanted = _wanted(request.get("grid"), histories, full_map)
     depth = positive(request.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
@@ -150,7 +150,7 @@ def simulate(
                 f"{one} does not go with sequence: leave one of them out", fields=(one, "sequence")
             )
         return simulate_sequences(
-            model_of_kind(kind),
+            sequences_of_kind(kind),
             cases,
             db=db,
             suite=suite,
@@ -183,21 +183,15 @@ def simulate(
 
 def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[Case, ...]:
     """Ask the kind for its combinations; it refuses the options of others."""
-    known = {name: model for name, model in KINDS.items() if model.campaign}
-    if kind not in known:
-        why = KINDS[kind].no_search if kind in KINDS else ""
-        raise InputError(
-            f"kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}",
-            fields=("kind",),
-        )
+    campaign = campaign_of_kind(kind)
     for name in given:
-        if name not in known[kind].campaign_options:
-            owners = [each for each, model in known.items() if name in model.campaign_options]
+        if name not in campaign.options:
+            owners = [each for each in campaign_kinds() if name in campaign_of_kind(each).options]
             raise InputError(
                 f"{name} goes with kind {' or '.join(owners)}, not with {kind}",
                 fields=(name, "kind"),
             )
-    return model_of_kind(kind).cases(**described)
+    return campaign.cases(**described)
 
 
 class _Run:

@@ -6,12 +6,14 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rbfrag.campaign.kind import Case, CaseRequest, SingleBlocks
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.db.keys import response_key
 from rbfrag.db.responses import ResponseRecord
 from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from rbfrag.solver.kind import Case, CaseRequest, Shaking, model_of_kind
+from rbfrag.solver.kind import Shaking
 from rbfrag.solver.results import (
     MAP_DEPTH,
     NUMERICS_VERSION,
@@ -36,14 +38,13 @@ class PlannedCase:
     ) -> str:
         """Return the natural key of the motion in time of one block."""
         assert motion.dt_s is not None  # the database holds no other motions
-        assert self.case.p2 is not None  # other kinds keep no histories
         return response_key(
             motion_sha256=motion.sha256,
             dt_s=motion.dt_s,
             vertical_sha256=vertical_sha256,
             polarity=self.polarity,
             kind=self.case.kind,
-            p2=self.case.p2,
+            p2=self.case.size,
             kr=k_over_pga * motion.pga_g,
             numerics_version=NUMERICS_VERSION,
         )
@@ -170,7 +171,7 @@ def run_work(work: MotionWork) -> MotionResults:
 def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     """Run tasks that ask for the same under the same excitation."""
     first = tasks[0]
-    kind = model_of_kind(first.planned.case.kind)
+    kind = campaign_of_kind(first.planned.case.kind)
     vertical = None if first.planned.vertical_id is None else work.vertical
     shaking = Shaking(work.motion, vertical, first.planned.polarity)
     search = first.search or first.full_map
@@ -184,8 +185,8 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     for task, (critical, grid) in zip(tasks, answers, strict=True):
         blocks = None
         if task.blocks:
-            case = task.planned.case
-            blocks = kind.run_blocks(shaking, case, task.blocks)
+            assert isinstance(kind, SingleBlocks)
+            blocks = kind.run_blocks(shaking, task.planned.case, task.blocks)
         ratios = list(task.histories)
         value = task.critical_k_over_pga if critical is None else critical.kr_over_pga
         if task.critical_history and value is not None:
@@ -199,8 +200,9 @@ def _history(
     work: MotionWork, planned: PlannedCase, shaking: Shaking, k_over_pga: float
 ) -> ResponseRecord:
     motion, vertical, case = work.motion, shaking.vertical, planned.case
-    assert case.p2 is not None
-    response = model_of_kind(case.kind).history(shaking, case, k_over_pga)
+    kind = campaign_of_kind(case.kind)
+    assert isinstance(kind, SingleBlocks)
+    response = kind.history(shaking, case, k_over_pga)
     return ResponseRecord(
         natural_key=planned.history_key(
             motion, None if vertical is None else vertical.sha256, k_over_pga
@@ -208,7 +210,7 @@ def _history(
         motion_id=work.motion_id,
         vertical_motion_id=planned.vertical_id,
         polarity=planned.polarity,
-        p2=case.p2,
+        p2=case.size,
         kr=k_over_pga * motion.pga_g,
         response=response,
         numerics_version=NUMERICS_VERSION,

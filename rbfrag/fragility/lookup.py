@@ -233,7 +233,7 @@ def _suited_in(
 def _how_to_make(kind: str) -> str:
     from rbfrag.solver.kinds import KINDS
 
-    stored = [name for name, model in sorted(KINDS.items()) if model.campaign]
+    stored = [name for name, model in sorted(KINDS.items()) if model.parameters]
     if kind in stored:
         return f"make one by rbfrag simulate and rbfrag fit, both of kind {kind}"
     return f"there are models of {', '.join(stored)}"

@@ -302,12 +302,12 @@ def _of_slumps(judged: Judged, functions: Elementwise[Any]) -> dict[str, Any]:
             "the heel of this outline is missing"
         )
     elif not body.is_parallelogram:  # its centroid does not lie between heel and toe
-        from rbfrag.solver.kinds import kind_of_mode
         from rbfrag.solver.mechanism import shaken_mechanism
+        from rbfrag.solver.models import model_of_mode
 
         shaken = shaken_mechanism(
-            body, kind=kind_of_mode(judged.mode).kind, beta_deg=judged.beta_deg,
-            phi_deg=judged.phi_deg, phi_back_deg=judged.phi_back_deg,
+            model_of_mode(judged.mode), body, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
+            phi_back_deg=judged.phi_back_deg,
         )  # fmt: skip
         return _leaving(shaken.p2, shaken.leaves_g, functions)
     ps2, leaves_g = slump_at_rest(

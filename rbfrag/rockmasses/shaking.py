@@ -17,7 +17,8 @@ from rbfrag.motions.quality import quality_flags
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner, model_of_mode
+from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner
+from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome
 from rbfrag.solver.stability import modes as mechanism

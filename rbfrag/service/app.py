@@ -25,8 +25,8 @@ from rbfrag.service.reading import Bodies, QueryRoute
 from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool
-from rbfrag.solver.kind import model_of_kind
 from rbfrag.solver.kinds import KINDS
+from rbfrag.solver.models import model_of_kind
 from rbfrag.version import __version__
 
 FOLDER = Path(__file__).parent / "page"

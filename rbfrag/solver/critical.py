@@ -8,7 +8,8 @@ from typing import Any
 from rbfrag.errors import InputError
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import Kind, model_of_kind, model_of_mode
+from rbfrag.solver.kind import Kind
+from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, Polarity
 from rbfrag.solver.stability.single import Stability, refuse_undecided, rough_deg, stability
 

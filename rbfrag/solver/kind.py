@@ -1,7 +1,7 @@
-"""What a kind of failure is: how a block of it answers, what describes it, what is stored of it.
+"""What a kind of failure is: how a block of it answers.
 
 A kind is a line of facts in `rbfrag.solver.kinds` and one object, ``MODEL``, in the file of its
-name in `rbfrag/solver/models`. Campaigns, the database and fits ask these, never for the name.
+name in `rbfrag/solver/models`. Who computes asks these, never for the name.
 """
 
 from __future__ import annotations
@@ -9,28 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
-from importlib import import_module
-from typing import Any, ClassVar, Literal, Protocol, Self
-
-import numpy as np
+from functools import cached_property
+from typing import Any, Self
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.solver.results import (
-    MAP_DEPTH,
-    POLARITIES,
     BlockState,
     CriticalResult,
-    FloatArray,
     Outcome,
     Polarity,
     Response,
-    SearchPoints,
 )
 from rbfrag.solver.stability.modes import ModeName
 from rbfrag.solver.stability.single import Stability
@@ -143,79 +135,14 @@ Runner = Callable[[Excitation], RunEnd]
 """One block, made ready: says how it ends under an excitation."""
 
 
-@dataclass(frozen=True)
-class Case:
-    """One combination of a campaign, whatever the motion.
-
-    Args:
-        p2: frequency parameter of the block [1/s²]; None where it has none.
-        block: what else describes the block, as it is stored; None where p² is all.
-        settings: what else decides the answer, as it goes into the natural key.
-    """
-
-    kind: str
-    p2: float | None
-    block: Mapping[str, object] | None = None
-    settings: Mapping[str, object] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CaseRequest:
-    """What of a case is to be computed.
-
-    Args:
-        search: look for the critical value; False where it is known.
-        grid: run the outcome grid; False where it is known.
-        full_map: map what fails and what does not, too.
-        map_depth: width of k/PGA that a map may leave undecided at a border.
-    """
-
-    search: bool = True
-    grid: bool = True
-    full_map: bool = False
-    map_depth: float = MAP_DEPTH
-
-
-@dataclass(frozen=True, eq=False)
-class CaseResult:
-    """What one motion does to the blocks of a case.
-
-    Args:
-        critical: the critical value; None of a kind without a search.
-        grid: the blocks of the outcome grid, entry i that of strength i of :meth:`Kind.grid`.
-            ``toppled`` says that a block fails by the measure of its case. Without entries where
-            the motion has no acceleration.
-    """
-
-    critical: CriticalResult | None
-    grid: SearchPoints | None
-
-
-class Measures(Protocol):
-    """What an outcome grid reads of a motion."""
-
-    @property
-    def pga_g(self) -> float:
-        """PGA [g]."""
-
-    @property
-    def pgv_m_s(self) -> float:
-        """PGV [m/s]."""
-
-
 class Kind(KindFacts):
-    """Base of the kinds: the facts of one, and what it answers without search and campaign.
+    """Base of the kinds: the facts of one, and what it answers without a search.
 
     Attributes:
         carries_state: whether a motion leaves a block somewhere else than it found it.
-        polarities: those that campaigns run; one alone where the other is its mirror image.
-        sequence_measure: what counts as failure in campaigns of sequences: where the block is left
-            [m], or its greatest rotation [rad]; empty of kinds that have none.
     """
 
     carries_state = False
-    polarities: ClassVar[tuple[Polarity, ...]] = POLARITIES
-    sequence_measure: ClassVar[Literal["", "displacement_m", "peak_rad"]] = ""
 
     @classmethod
     def named(cls, kind: str) -> Self:
@@ -230,18 +157,6 @@ class Kind(KindFacts):
         """Return a function that says how the block ends under an excitation."""
         raise NotImplementedError
 
-    def numbers_of(self, block: Block, beta_rad: float) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return what predictions read of a free-standing block, by name, and warnings.
-
-        Args:
-            block: shape and size.
-            beta_rad: dip of its base [rad].
-
-        Raises:
-            InputError: the block does not stand of itself.
-        """
-        raise NotImplementedError
-
     def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
         """Return the critical value of one motion.
 
@@ -251,58 +166,6 @@ class Kind(KindFacts):
         why = f": {self.no_search}" if self.no_search else ""
         raise InputError(f"there is no search for the critical value of kind {self.kind}{why}")
 
-    def cases(self, **request: Any) -> tuple[Case, ...]:
-        """Return the combinations of a campaign, whatever the motion.
-
-        Raises:
-            InputError: campaigns do not store this kind, or an option is that of another one.
-        """
-        why = f": {self.no_search}" if self.no_search else ""
-        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag{why}")
-
-    def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return the strengths k/PGA of the outcome grid, which depend on no outcome.
-
-        Empty where the motion has no acceleration.
-        """
-        return np.empty(0)
-
-    def run_cases(
-        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
-    ) -> list[CaseResult]:
-        """Return critical value and outcome grid of every case under one motion."""
-        raise NotImplementedError
-
-    def run_blocks(self, shaking: Shaking, case: Case, k_over_pga: Sequence[float]) -> SearchPoints:
-        """Run blocks of stated strengths k/PGA, falling: those of the campaign option `grid`."""
-        raise InputError(
-            f"no block of k/PGA {k_over_pga[0]!r} belongs to a campaign of {self.kind}"
-        )
-
-    def history(self, shaking: Shaking, case: Case, k_over_pga: float) -> Response:
-        """Return the motion in time of one block: the campaign option `store_responses`."""
-        raise InputError(f"campaigns of {self.kind} keep no histories")
-
-    def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
-        """Return the blocks that campaigns of sequences shake, as they are stored.
-
-        Args:
-            cases: what the campaign is asked for.
-        """
-        raise InputError(f"campaigns of sequences are not known of {self.kind}")
-
-    def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return what counts as failure, in the unit of the measure; None for past recovery.
-
-        Args:
-            cases: what the campaign is asked for.
-        """
-        raise InputError(f"campaigns of sequences are not known of {self.kind}")
-
-    def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
-        """Return a block of :meth:`sequence_blocks` on its planes."""
-        raise InputError(f"campaigns of sequences are not known of {self.kind}")
-
     def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
         """Refuse an option that is not among the kind's own."""
         foreign = sorted(set(given) - set(own))
@@ -310,51 +173,4 @@ class Kind(KindFacts):
             raise InputError(
                 f"{foreign[0]} does not go with {self.kind}, which knows "
                 f"{' and '.join(own) or 'no such option'}"
-            )
-
-
-@cache
-def model_of_kind(kind: str) -> Kind:
-    """Return the model of the kind of that name, which is loaded with all that it needs."""
-    model: Kind = import_module(f"rbfrag.solver.models.{facts_of(kind).kind}").MODEL
-    return model
-
-
-def model_of_mode(mode: ModeName, *, back_fracture: bool = True) -> Kind:
-    """Return the model of blocks that fail in this mode; arguments as of `kind_of_mode`."""
-    return model_of_kind(kind_of_mode(mode, back_fracture=back_fracture).kind)
-
-
-def strengths_at(p2: float, measures: Measures, y_over_pgv: FloatArray) -> FloatArray:
-    """Return k_r/PGA of the blocks of a size whose toppling velocities are given ratios of PGV.
-
-    Args:
-        p2: frequency parameter p² of the blocks [1/s²].
-        measures: PGA and PGV of the motion.
-        y_over_pgv: k_r g/(p PGV), shape (n,).
-
-    Returns:
-        Shape (n,); empty where the motion has no acceleration.
-    """
-    ground = measures.pga_g * STANDARD_GRAVITY_M_S2
-    if not (ground > 0.0 and measures.pgv_m_s > 0.0):
-        return np.empty(0)
-    strengths: FloatArray = math.sqrt(p2) * measures.pgv_m_s / ground * y_over_pgv
-    return strengths
-
-
-def each_once(values: Sequence[float | None], option: str, for_none: str = "None") -> None:
-    """Refuse an empty list, and one that names a value twice.
-
-    Args:
-        option: their name, for the message.
-        for_none: what None is called there.
-    """
-    if not values:
-        raise InputError(f"{option}: the list is empty: name at least one value", fields=(option,))
-    for value in values:
-        if values.count(value) > 1:
-            word = for_none if value is None else f"{value:g}"
-            raise InputError(
-                f"{option}: {word} is in the list twice: name each value once", fields=(option,)
             )

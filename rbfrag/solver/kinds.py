@@ -1,7 +1,7 @@
 """The kinds that there are: a line of facts each, for which no model is loaded.
 
 What a kind does is in its model, `rbfrag/solver/models/<kind>.py`; see
-:func:`rbfrag.solver.kind.model_of_kind`.
+:func:`rbfrag.solver.models.model_of_kind`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,6 @@ class KindFacts:
             kinds that have none.
         search_options: options of `rbfrag.critical` that it understands.
         no_search: why it has no critical value; empty where there is none yet.
-        campaign_options: what campaigns of it may be asked.
-        campaign: whether campaigns store it.
     """
 
     kind: str
@@ -44,8 +42,6 @@ class KindFacts:
     search_needs: str = ""
     search_options: tuple[str, ...] = ()
     no_search: str = ""
-    campaign_options: tuple[str, ...] = ()
-    campaign: bool = False
 
     @property
     def searchable(self) -> bool:
@@ -63,21 +59,15 @@ KINDS = {
             "rocking", "topple", ("p2", "kr"), True, ("restitution",),
             no_search="what overturns a free-standing block is no interval of k_r (up to 122 "
             "islands for one record), so that no value is certain to be the last",
-            campaign_options=("p2", "restitution_factors"), campaign=True,
         ),
         KindFacts(
             "sliding", "slide", ("ky", "displacement_m"), False, ("two_way", "horizontal"),
-            "displacement_m", ("displacement_m", "tolerance", "block", *PLANES), "",
-            ("displacements_m",), campaign=True,
+            "displacement_m", ("displacement_m", "tolerance", "block", *PLANES),
         ),
-        KindFacts(
-            "slumping", "slump", ("ks", "ps2"), False, (), "block", _SCALED, "",
-            ("rotations_deg", "family", "full_map"), campaign=True,
-        ),
+        KindFacts("slumping", "slump", ("ks", "ps2"), False, (), "block", _SCALED),
         KindFacts(
             "toppling", "topple", ("p2", "kr"), False, (),
-            "p2", ("p2", "full_map", "map_depth", "block", *PLANES), "",
-            ("p2", "grid", "store_responses", "full_map"), campaign=True,
+            "p2", ("p2", "full_map", "map_depth", "block", *PLANES),
         ),
     )
 }  # fmt: skip

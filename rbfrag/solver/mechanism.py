@@ -23,7 +23,7 @@ from rbfrag.solver.free_motion import (
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
-from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking, model_of_kind
+from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.results import (
     BlockState,
     FloatArray,
@@ -429,13 +429,18 @@ class ShakenMechanism:
 
 
 def shaken_mechanism(
-    block: Block, *, kind: str, beta_deg: float, phi_deg: float, phi_back_deg: float | None = None
+    model: Kind,
+    block: Block,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
 ) -> ShakenMechanism:
     """Return the mechanism of a block whose failure mode is that of the kind.
 
     Args:
+        model: that of a kind that rotates, whose records are scaled.
         block: shape and size.
-        kind: a kind that rotates, whose records are scaled.
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
@@ -443,21 +448,20 @@ def shaken_mechanism(
     Raises:
         InputError: another kind; a block of another mode, or one that no earthquake decides about.
     """
-    model = model_of_kind(kind)
     if not isinstance(model, MechanismKind):
-        raise InputError(f"kind {kind!r} is not one whose records are scaled")
+        raise InputError(f"kind {model.kind!r} is not one whose records are scaled")
     judged = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
     refuse_undecided(judged)
     if judged.mode != model.mode:
         raise InputError(
-            f"the block is not of kind {kind}: its mode is {words_of_mode(judged.mode)} (yield "
-            f"{judged.yield_acceleration:.4g} g, {judged.state})"
+            f"the block is not of kind {model.kind}: its mode is {words_of_mode(judged.mode)} "
+            f"(yield {judged.yield_acceleration:.4g} g, {judged.state})"
         )
     site = BlockOnPlanes.of(block, judged, judged.mode, {})
     mechanism = model.mechanism(site)
     equation = mechanism.first.forward
     return ShakenMechanism(
-        kind=kind,
+        kind=model.kind,
         mechanism=mechanism,
         yield_name=model.yield_name,
         yield_g=equation.threshold(0.0),

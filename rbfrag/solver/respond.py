@@ -11,8 +11,9 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking, model_of_kind, model_of_mode
+from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
 from rbfrag.solver.kinds import NOT_BACKED, stands_free_of
+from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence

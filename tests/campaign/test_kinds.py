@@ -12,6 +12,7 @@ import pytest
 from sqlalchemy import Engine, select, update
 
 from benchmarks.database_content import table_rows_by_natural_key
+from rbfrag.campaign.kinds.slumping import FAMILY, BlockClass
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
@@ -31,8 +32,8 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.question.question import predict
 from rbfrag.solver.critical import critical
 from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
-from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from tests.synthetic import shaking
 
 TWO = (FAMILY[0], FAMILY[2])
@@ -72,7 +73,7 @@ def test_every_block_of_the_family_slumps_and_is_stable_at_rest() -> None:
     assert len(FAMILY) == len(set(FAMILY)) == 18
     for each in FAMILY:
         shaken = shaken_mechanism(
-            each.block, kind="slumping", beta_deg=each.beta_deg, phi_deg=each.phi_deg
+            model_of_kind("slumping"), each.block, beta_deg=each.beta_deg, phi_deg=each.phi_deg
         )
         assert 0.05 < shaken.yield_g < 1.0
         assert shaken.p2 > 0.0

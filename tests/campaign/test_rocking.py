@@ -13,6 +13,7 @@ import pytest
 from sqlalchemy import select, update
 
 import rbfrag.campaign.resimulate
+from rbfrag.campaign.kinds.rocking import Y_OVER_PGV
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
@@ -27,7 +28,7 @@ from rbfrag.errors import FitError, InputError, MergeConflictError
 from rbfrag.exchange.database_tables import read_table
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.models.rocking import Y_OVER_PGV, restitution_of_rectangle
+from rbfrag.solver.models.rocking import restitution_of_rectangle
 from rbfrag.solver.respond import respond
 from tests.synthetic import shaking
 

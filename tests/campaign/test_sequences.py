@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, select, update
 
+from rbfrag.campaign.kinds.slumping import FAMILY, BlockClass
 from rbfrag.campaign.motion_pairs import MotionPair, drawn_pairs, shocks_of_stations
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
@@ -24,7 +25,6 @@ from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
 from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from rbfrag.solver.respond import respond
 from rbfrag.solver.sequence import STARTS_ANEW
 from tests.synthetic import shaking

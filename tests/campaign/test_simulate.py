@@ -15,6 +15,8 @@ from sqlalchemy import delete, func, select, update
 
 from benchmarks.database_content import content_digest
 from rbfrag.campaign.add_motions import add_motions
+from rbfrag.campaign.kind import Case
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
@@ -23,7 +25,6 @@ from rbfrag.db.queries import combination_table, database_info, outcome_grid
 from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.db.spectra import spectrum_values
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.solver.kind import Case, model_of_kind
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
 
@@ -89,7 +90,7 @@ def test_every_block_of_the_grid_is_simulated(database: Path) -> None:
         motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
         stored = outcome_grid(connection, table.combination_id)
         assert connection.scalar(select(func.count()).select_from(outcome_interval)) == 0
-    model = model_of_kind("toppling")
+    model = campaign_of_kind("toppling")
     assert stored.outcome.shape == (table.p2.size, 35)
     assert (stored.k_over_pga < 0.01).any()
     for i in range(0, table.p2.size, 3):

@@ -9,6 +9,7 @@ import pytest
 from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models import model_of_kind
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import write_suite
 
@@ -45,7 +46,7 @@ def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
 def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     block.write_text(SLUMP)
     shaken = shaken_mechanism(
-        Block.from_angles(56, 76, 0.7), kind="slumping", beta_deg=22, phi_deg=30
+        model_of_kind("slumping"), Block.from_angles(56, 76, 0.7), beta_deg=22, phi_deg=30
     )
     for rotation_deg, option in ((None, ()), (2.0, ("--rotation", "2"))):
         asked = ("predict", "--kind", "slumping", *MOTION, *option)

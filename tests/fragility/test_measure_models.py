@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rbfrag.campaign.kinds.toppling import Y_OVER_PGV
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
 from rbfrag.db.rows import CombinationTable
@@ -17,7 +18,6 @@ from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.question.question import predict
-from rbfrag.solver.models.toppling import Y_OVER_PGV
 from tests.fragility.conftest import model_row
 from tests.fragility.outcome_draws import G, drawn_outcomes
 

@@ -13,6 +13,7 @@ from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.scenario import Scenario, scenario
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE
 
 TABLE_3_4 = {
@@ -59,10 +60,10 @@ def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
     assert slumps.size == 6
     for i in slumps.tolist():
         shaken = shaken_mechanism(
+            model_of_kind("slumping"),
             Block.from_fractures(
                 float(MADE.s1_m[i]), float(MADE.s2_m[i]), float(MADE.gamma_deg[i])
             ),
-            kind="slumping",
             beta_deg=float(MADE.beta_deg[i]),
             phi_deg=float(MADE.phi_deg[i]),
         )

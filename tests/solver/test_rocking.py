@@ -20,7 +20,7 @@ from rbfrag.question.blocks import one_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
-from rbfrag.solver.kind import model_of_kind
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.rocking import SENSITIVITY, changes_with_the_motion, free_block
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import Outcome, Response, ResponseHistory

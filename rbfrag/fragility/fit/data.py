@@ -178,6 +178,7 @@ def _yield_g(kind: str, block: str) -> float:
     """Return k of a stored block at rest [g]; NaN where it stands for blocks of any strength."""
     from rbfrag.solver.block.geometry import Block
     from rbfrag.solver.mechanism import shaken_mechanism
+    from rbfrag.solver.models import model_of_kind
 
     try:
         parameters = json.loads(block)
@@ -187,7 +188,10 @@ def _yield_g(kind: str, block: str) -> float:
             parameters["s1_m"], parameters["s2_m"], parameters["gamma_deg"]
         )
         return shaken_mechanism(
-            shape, kind=kind, beta_deg=parameters["beta_deg"], phi_deg=parameters["phi_deg"]
+            model_of_kind(kind),
+            shape,
+            beta_deg=parameters["beta_deg"],
+            phi_deg=parameters["phi_deg"],
         ).yield_g
     except (ValueError, KeyError, InputError) as error:
         raise FitError(

@@ -11,9 +11,7 @@ there is no search (docs/theory/rocking.md).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,30 +19,21 @@ from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.integrator.free_rocking import Corner
 from rbfrag.solver.integrator.two_corners import RockingRun
 from rbfrag.solver.kind import (
     BlockOnPlanes,
-    Case,
-    CaseRequest,
-    CaseResult,
     Kind,
-    Measures,
     RunEnd,
     Runner,
     Shaking,
-    each_once,
-    strengths_at,
 )
 from rbfrag.solver.quantity import finite_or_none, number, positive
 from rbfrag.solver.results import (
-    DEFAULT_P2,
     FloatArray,
     Outcome,
     Response,
     ResponseHistory,
-    SearchPoints,
 )
 from rbfrag.solver.rocking_run import (
     MOST_IMPACTS,
@@ -60,16 +49,6 @@ from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
 
 SENSITIVITY = 1e-6
 """Change of the motion whose effect on the outcome makes it a sensitive one."""
-
-FACTOR = "restitution_factor"
-"""Name of the factor on the restitution in what is stored of a block."""
-
-RESTITUTION_FACTORS = (1.0, 0.95, 0.9, 0.8)
-"""Factors of the outcome grid on the restitution of the rectangle."""
-
-Y_OVER_PGV = np.geomspace(0.1, 8.0, 25)
-"""Toppling velocity of the blocks of the outcome grid over PGV: all but the largest overturn at the
-first of them, none does from 5.5 on."""
 
 CHAOTIC = 1e-3
 """Error over the critical angle from which on the size of a peak means nothing."""
@@ -94,12 +73,18 @@ def free_block(site: BlockOnPlanes) -> FreeBlock:
             )
     if site.block is None:
         assert site.p2 is not None
-        return _symmetric(positive(site.p2, "p2", "1/s²"), positive(site.yield_g, "kr", "g"), given)
+        return rectangle(positive(site.p2, "p2", "1/s²"), positive(site.yield_g, "kr", "g"), given)
     return _of_shape(site.block, site.beta_rad, given)
 
 
-def _symmetric(p2: float, kr: float, given: float | None) -> FreeBlock:
-    """Return the rectangle on level ground that has these numbers."""
+def rectangle(p2: float, kr: float, given: float | None) -> FreeBlock:
+    """Return the rectangle on level ground that has these numbers.
+
+    Args:
+        p2: frequency parameter p² [1/s²].
+        kr: tangent of the critical angle.
+        given: restitution; None for that of the rectangle (Housner 1963).
+    """
     both = corner(kr, p2, restitution_of_rectangle(kr) if given is None else given)
     # half of the sides: the base is level, and the centroid above its middle
     half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
@@ -157,9 +142,7 @@ def _corner(
 
 
 class Rocking(Kind):
-    """The model of free-standing blocks; campaigns run symmetric ones on level ground."""
-
-    polarities = ("forward",)
+    """The model of free-standing blocks."""
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does.
@@ -222,83 +205,12 @@ class Rocking(Kind):
 
         return run
 
-    def cases(self, **request: Any) -> tuple[Case, ...]:
-        """Return every size with every factor on the restitution of the rectangle.
-
-        Raises:
-            InputError: an empty list, a value that repeats or cannot be meant.
-        """
-        self.refuse_foreign(request, self.campaign_options)
-        sizes = [positive(value, "p2", "1/s²") for value in request.get("p2", DEFAULT_P2)]
-        each_once(sizes, "p2")
-        factors = [
-            positive(value, FACTOR, "a factor on the restitution")
-            for value in request.get("restitution_factors", RESTITUTION_FACTORS)
-        ]
-        each_once(factors, FACTOR)
-        for factor in factors:
-            if factor > 1.0:
-                raise InputError(
-                    f"{FACTOR} = {factor:g}: slender blocks would gain speed at their impacts; "
-                    "give factors above 0 and up to 1"
-                )
-        return tuple(Case(self.kind, p2, {FACTOR: factor}) for p2 in sizes for factor in factors)
-
-    def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
-        assert case.p2 is not None
-        return strengths_at(case.p2, measures, Y_OVER_PGV)
-
-    def run_cases(
-        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
-    ) -> list[CaseResult]:
-        """Return the outcome grid of every case under one motion, all blocks in one call."""
-        strengths = [self.grid(case, shaking.motion) for case in cases]
-        if not request.grid or not any(map(len, strengths)):
-            return [CaseResult(None, None)] * len(cases)
-        excited = shaking.excitation
-        blocks = [
-            _symmetric(_size_of(case), kr, _factor_of(case) * restitution_of_rectangle(kr))
-            for case, ratios in zip(cases, strengths, strict=True)
-            for kr in (ratios * excited.pga_g).tolist()
-        ]
-        refuse_endless(excited, max(_size_of(case) for case in cases))
-        runs = simulate_free(
-            excited,
-            np.array([(block.toe, block.heel) for block in blocks]),
-            np.array([block.rest_speed for block in blocks]),
-            most_impacts=MOST_IMPACTS,
-            change=SENSITIVITY,
-        )
-        words = [OUTCOMES[code].value for code in runs.outcome.tolist()]
-        results, start = [], 0
-        for ratios in strengths:
-            own = slice(start, start + len(ratios))
-            start += len(ratios)
-            sensitive = runs.sensitive[own] > 0
-            points = SearchPoints(ratios, runs.theta_n[own], tuple(words[own]), sensitive=sensitive)
-            results.append(CaseResult(None, points))
-        return results
-
     def _block(self, site: BlockOnPlanes) -> FreeBlock:
         if site.cohesive:
             raise InputError(
                 f"cohesion_pa does not go with {self.kind}: the block lifts off its base"
             )
         return free_block(site)
-
-
-def _size_of(case: Case) -> float:
-    assert case.p2 is not None
-    return case.p2
-
-
-def _factor_of(case: Case) -> float:
-    """Return the factor on the restitution of the blocks of a case."""
-    factor = (case.block or {}).get(FACTOR)
-    if not isinstance(factor, int | float):
-        raise InputError(f"its block {case.block} is not described as free-standing ones are")
-    return float(factor)
 
 
 def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:

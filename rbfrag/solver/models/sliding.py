@@ -20,10 +20,8 @@ it tips back; from there it is followed step by step (docs/theory/slide-to-slump
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -43,12 +41,6 @@ from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant
 from rbfrag.solver.kind import (
     BlockOnPlanes,
-    Case,
-    CaseRequest,
-    CaseResult,
-    Measures,
-    Shaking,
-    each_once,
 )
 from rbfrag.solver.mechanism import MechanismKind
 from rbfrag.solver.quantity import positive
@@ -63,12 +55,6 @@ KY_OVER_PGA = (
     0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
 )  # fmt: skip
 """Strengths of the outcome grid, whose displacements are stored."""
-
-SEQUENCE_KY_G = (0.02, 0.05, 0.1, 0.2)
-"""Yield accelerations of the blocks of sequences, whose motions are as recorded [g]."""
-
-LEVEL_PLANE = {"plane": "level"}
-"""The block of a campaign: on a base that dips, a displacement is a factor times its."""
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
@@ -222,7 +208,6 @@ class Sliding(MechanismKind):
     """The sliding model; its critical strength slides a stated distance."""
 
     yield_name = "ky"
-    sequence_measure = "displacement_m"
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
         """Return the sliding block."""
@@ -255,61 +240,6 @@ class Sliding(MechanismKind):
             tolerance=options.get("tolerance", TOLERANCE),
             warnings=motion_remarks(motion, vertical, excited),
         )
-
-    def cases(self, **request: Any) -> tuple[Case, ...]:
-        """Return the first motion and every stated displacement."""
-        self.refuse_foreign(request, self.campaign_options)
-        stated = request.get("displacements_m", THRESHOLDS_M)
-        stated = [positive(value, "displacement_m", "m") for value in stated]
-        each_once(stated, "displacement_m")
-        settings = {"search_limit": SEARCH_LIMIT, "tolerance": TOLERANCE}
-        return tuple(
-            Case(self.kind, None, LEVEL_PLANE, {**settings, "displacement_m": value})
-            for value in (0.0, *stated)
-        )
-
-    def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return the stored strengths k_y/PGA."""
-        return np.array(KY_OVER_PGA if measures.pga_g > 0.0 else (), dtype=np.float64)
-
-    def run_cases(
-        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
-    ) -> list[CaseResult]:
-        """Return critical strength and displacements of every case under one motion."""
-        excited = shaking.excitation
-        thrown = excited.jump_node < excited.w.size
-        strengths = () if thrown else tuple(self.grid(cases[0], shaking.motion).tolist())
-        blocks = SlidingBlocks(excited, slide_m).points(strengths) if request.grid else None
-        if not request.search:
-            return [CaseResult(None, blocks) for _ in cases]
-        results = []
-        for case in cases:
-            settings: dict[str, Any] = dict(case.settings)
-            # each for itself, so that an answer does not depend on what else was asked for
-            searched = critical_of(
-                self.kind,
-                SlidingBlocks(excited, slide_m),
-                settings["displacement_m"],
-                polarity=shaking.polarity,
-                search_limit=settings["search_limit"],
-                tolerance=settings["tolerance"],
-                warnings=excited.warnings,
-            )
-            results.append(CaseResult(searched, blocks))
-        return results
-
-    def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
-        """Return blocks of stated yield accelerations on a level plane."""
-        return tuple({**LEVEL_PLANE, "ky": ky} for ky in SEQUENCE_KY_G)
-
-    def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return the stated displacements [m]."""
-        limits: list[Any] = [case.settings["displacement_m"] for case in cases]
-        return tuple(limit for limit in limits if limit > 0.0)
-
-    def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
-        """Return the block on its level plane."""
-        return level_plane(block["ky"])
 
 
 MODEL = Sliding.named("sliding")

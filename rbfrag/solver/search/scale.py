@@ -185,7 +185,7 @@ class ScaledKind(MechanismKind):
         rules = scan_rules(
             search_limit, options.pop("scan_ratio", SCAN_RATIO), options.pop("bracket", BRACKET)
         )
-        shaken = shaken_mechanism(options.pop("block"), kind=self.kind, **options)
+        shaken = shaken_mechanism(self, options.pop("block"), **options)
         shaking = Shaking(motion, vertical, polarity)
         (result,) = critical_scales(shaking, shaken, [rotation_deg], rules)
         return result

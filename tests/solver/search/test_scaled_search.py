@@ -17,6 +17,7 @@ from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.reports import critical_as_dict
 from rbfrag.solver.respond import respond
@@ -54,7 +55,7 @@ def search(motion: GroundMotion, block: Block, **more: object) -> CriticalResult
 def test_the_block_moves_just_above_the_scale_of_first_motion(with_vertical: bool) -> None:
     motion = shaking()
     up = vertical_of(motion) if with_vertical else None
-    shaken = shaken_mechanism(slump(), kind="slumping", **PLANES)
+    shaken = shaken_mechanism(model_of_kind("slumping"), slump(), **PLANES)
     drive = excitation(motion, up)
     starts = first_motion(drive, shaken.yield_g)
     assert starts is not None

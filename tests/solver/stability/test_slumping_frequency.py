@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rbfrag.campaign.kinds.slumping import FAMILY
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
-from rbfrag.solver.models.slumping import FAMILY
+from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.stability.at_rest import slump_at_rest
 
 
@@ -28,8 +29,8 @@ def test_it_is_that_of_the_mechanism() -> None:
     )
     for value, leaves, each in zip(p2, leaves_g, FAMILY, strict=True):
         one = shaken_mechanism(
+            model_of_kind("slumping"),
             each.block,
-            kind="slumping",
             beta_deg=each.beta_deg,
             phi_deg=each.phi_deg,
             phi_back_deg=each.phi_deg - 4.0,
