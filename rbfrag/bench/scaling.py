@@ -14,10 +14,10 @@ from rbfrag.bench.cases import Case
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.timing import timed
 from rbfrag.campaign.executors.local import prepare
+from rbfrag.campaign.kinds.toppling import CAMPAIGN
 from rbfrag.campaign.worker import MotionWork, PlannedCase, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.models.toppling import MODEL
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.toppling_run import simulate
 
@@ -111,7 +111,7 @@ def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
         PlannedCase(
             natural_key=f"{polarity} {case.p2}", polarity=polarity, vertical_id=None, case=case
         )
-        for case in MODEL.cases()
+        for case in CAMPAIGN.cases()
         for polarity in POLARITIES
     ]
     tasks = tuple(Task(case) for case in planned[:cases])
