@@ -53,10 +53,6 @@ PAIRS = (
     ("pga", "sa10"),
     ("pga_tm", "pgv"),
     ("logistic pgv", "pgv"),
-    ("weibull pgv", "pgv"),
-    ("weibull pgv_pga", "pgv_pga"),
-    ("weibull pgv_pga_tm", "pgv_pga_tm"),
-    ("power xp", "record"),
 )
 """Models that are compared with one another, the worse one first."""
 

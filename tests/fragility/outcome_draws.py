@@ -94,11 +94,7 @@ def drawn_outcomes(
 
 TRUTH = {
     ("logistic", "pgv"): (-2.0, 4.8),
-    ("weibull", "pgv"): (-1.0, 2.4),
-    ("weibull", "pgv_pga"): (0.7, 3.3, 3.8),
-    ("weibull", "pgv_pga_tm"): (0.96, 3.4, 2.8, 1.06),
     ("bounded", "pgv_pga"): (3.1, 1.9, 4.7, 2.7, 2.5),
     ("record", "xp"): (4.1, 3.2, 1.3),
-    ("power", "xp"): (1.0, 2.5),
 }
 """Parameters near those of the recorded motions."""

@@ -9,7 +9,6 @@ from scipy.special import ndtr
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import (
-    COMPLEMENT,
     LOGIT,
     LOGLOG,
     NORMAL,
@@ -70,14 +69,13 @@ def test_arrays_follow_the_same_formula(name, term):
             assert np.broadcast_to(array, 2)[i] == pytest.approx(number, rel=1e-13)
 
 
-@pytest.mark.parametrize("link", [NORMAL, LOGIT, LOGLOG, COMPLEMENT])
+@pytest.mark.parametrize("link", [NORMAL, LOGIT, LOGLOG])
 def test_links_are_distribution_functions_for_numbers_and_arrays(link):
     eta = np.linspace(-30.0, 30.0, 241)
     expected = {
         "normal": ndtr(eta),
         "logit": 1.0 / (1.0 + np.exp(-eta)),
         "loglog": np.exp(-np.exp(-eta)),
-        "complement": np.where(eta > 0.0, 1.0 - np.exp(-np.maximum(eta, 0.0)), 0.0),
     }[link.name]
     many = link.probability(eta, arrays())
     assert many == pytest.approx(expected, rel=1e-12, abs=1e-300)
@@ -94,5 +92,6 @@ def test_every_file_is_a_method_and_fits_by_a_function_that_is_there():
         assert callable(method.fitter())
         ranks = [(f.rank, t) for t, f in method.forms.items()]
         assert ranks
-    with pytest.raises(InputError, match="unknown method 'oracle': use one of bounded"):
-        method_named("oracle")
+    for name in ("oracle", "weibull"):
+        with pytest.raises(InputError, match=f"unknown method '{name}': use one of bounded"):
+            method_named(name)

@@ -1,6 +1,5 @@
 """Fits of outcomes: known parameters come back, and bad data are refused."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -54,14 +53,10 @@ def test_the_intervals_cover_as_often_as_they_say():
 
 
 def test_the_report_holds_what_it_promises():
-    source = drawn_outcomes("weibull", "pgv_pga", TRUTH["weibull", "pgv_pga"], shared=0.1)
-    report = fit(source, term="pgv_pga", method="weibull")
-    assert list(report.coefficients) == ["b0", "b_logit_r", "b_ln_z"]
-    natural = report.details["natural"]
-    b0, k, bz = report.coefficients.values()
-    assert natural["median"][0] == pytest.approx(math.exp((b0 + math.log(math.log(2))) / k))
-    assert natural["z_exponent"][0] == pytest.approx(bz / k)
-    assert natural["shape"] == pytest.approx([k, report.standard_errors["b_logit_r"]])
+    source = drawn_outcomes("bounded", "pgv_pga", TRUTH["bounded", "pgv_pga"], shared=0.1)
+    report = fit(source, term="pgv_pga", method="bounded")
+    names = ["b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z"]
+    assert list(report.coefficients) == names
     assert report.details["judged_on"] == "simulated outcomes"
     assert report.details["n_bounded_toppled"] == 0
     assert report.scores["calibration_slope_held_out"] == pytest.approx(1.0, abs=0.15)
@@ -162,8 +157,8 @@ def test_what_does_not_go_together_is_refused():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=5)
     with pytest.raises(InputError, match=r"record does not go with the term pgv: it fits xp"):
         fit(source, term="pgv", method="record")
-    with pytest.raises(InputError, match=r"weibull keeps M = 1.*logistic, lognormal"):
-        fit(source, term="pgv", method="weibull", estimate_m=True)
+    with pytest.raises(InputError, match=r"bounded keeps M = 1.*logistic, lognormal"):
+        fit(source, term="pgv", method="bounded", estimate_m=True)
     no_spectrum = replace(source, xp_m_s=np.full(source.xp_m_s.size, np.nan))
     with pytest.raises(FitError, match=r"needs the toppling spectrum X\(p\).*rbfrag simulate"):
         fit(no_spectrum, term="xp", method="record")

@@ -102,16 +102,16 @@ def test_limits(name):
 @pytest.mark.parametrize(
     ("name", "kr", "words"),
     [
-        ("weibull-pgv_pga", 0.6, "not below PGA"),
+        ("bounded-pgv_pga", 0.6, "not below PGA"),
         ("logistic-pga_tm", 0.6, "not below PGA"),
-        ("weibull-pgv", 0.19, "not below 2 PGV"),
+        ("bounded-pgv", 0.19, "not below 2 PGV"),
         ("record-xp", 0.15, "not below the toppling spectrum"),
     ],
 )
 def test_mechanics_is_stated(name, kr, words):
     model = MODELS[name]
     known = measures(model, 0.5, 0.5, 0.5, 0.8)
-    answer = predict_known(model, 3.0, kr * (10 if name == "weibull-pgv" else 1), known)
+    answer = predict_known(model, 3.0, kr * (10 if name == "bounded-pgv" else 1), known)
     if name == "record-xp":
         answer = predict_known(model, 3.0, 0.2, known)
     assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
@@ -157,7 +157,7 @@ def test_arrays_agree_with_scalars(name):
 
 
 def test_many_chunks_are_one_answer(monkeypatch):
-    model = MODELS["weibull-pgv_pga"]
+    model = MODELS["bounded-pgv_pga"]
     random = np.random.default_rng(0)
     kr = np.exp(random.uniform(-4, 0, 1000))
     whole = predict(3.0, kr, pgv_m_s=0.5, pga_g=0.4, model=model)

@@ -15,7 +15,7 @@ G = 9.80665
 
 
 def test_each_motion_topples_its_block_with_the_probability() -> None:
-    source = drawn_outcomes("weibull", "pgv", (-1.0, 2.5), events=4, motions=1)
+    source = drawn_outcomes("logistic", "pgv", (-2.0, 4.8), events=4, motions=1)
     table = source.table
     y = predicted_strengths(WITH_TM, table, source.xp_m_s, 0.3)
     for i in range(table.p2.size):
@@ -31,7 +31,7 @@ def test_each_motion_topples_its_block_with_the_probability() -> None:
 
 
 def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
-    source = drawn_outcomes("weibull", "pgv", (-1.0, 2.5), events=4, motions=1)
+    source = drawn_outcomes("logistic", "pgv", (-2.0, 4.8), events=4, motions=1)
     record = model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record")
     names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
     free = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")

@@ -62,8 +62,8 @@ def fit(
     ),
     method: str | None = option(
         "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
-        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, weibull, "
-        "bounded; of outcomes on xp: record, power. Default: wls. Sliding: displacement; "
+        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, "
+        "bounded; of outcomes on xp: record. Default: wls. Sliding: displacement; "
         "slumping: capacity; rocking: overturning.",
         show_default=False,
     ),
@@ -154,8 +154,6 @@ def _print_all(report: FitReport) -> None:
     )
     for kind in dict.fromkeys(kinds.values()):
         print(f"standard error: {kind}")
-    for name, pair in (details.get("natural") or {}).items():
-        print(f"{name}: {cell(pair[0])} ± {cell(pair[1])}")
     print()
     counts: dict[str, object] = {
         "combinations": details.get("n_total"),

@@ -53,12 +53,10 @@ class FittedLink(NamedTuple):
     Args:
         slope: dF/deta.
         eta: the inverse of F.
-        sign: +1, or -1 where statsmodels counts eta the other way.
     """
 
     slope: Callable[[FloatArray], FloatArray]
     eta: Callable[[FloatArray], FloatArray]
-    sign: float = 1.0
 
 
 def _logistic_slope(eta: FloatArray) -> FloatArray:
@@ -73,9 +71,6 @@ def _loglog_slope(eta: FloatArray) -> FloatArray:
 LINKS: Mapping[str, FittedLink] = {
     "logit": FittedLink(_logistic_slope, lambda p: np.log(p / (1.0 - p))),
     "loglog": FittedLink(_loglog_slope, lambda p: -np.log(-np.log(p))),
-    "complement": FittedLink(
-        lambda eta: np.exp(-np.clip(eta, 0.0, 700.0)), lambda p: -np.log1p(-p), sign=-1.0
-    ),
 }
 """The links of outcomes by name."""
 
@@ -308,7 +303,7 @@ def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArr
     from statsmodels.genmod.families import links
     from statsmodels.tools.sm_exceptions import DomainWarning, SpecificationWarning
 
-    theirs: Any = {"logit": links.Logit, "loglog": links.LogLog, "complement": links.LogC}
+    theirs: Any = {"logit": links.Logit, "loglog": links.LogLog}
     start = most_likely(rows)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DomainWarning)
@@ -316,7 +311,7 @@ def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArr
         warnings.simplefilter("ignore", SpecificationWarning)
         model = sm.GLM(
             rows.outcome,
-            LINKS[rows.link.name].sign * rows.columns,
+            rows.columns,
             family=sm.families.Binomial(theirs[rows.link.name]()),
             var_weights=rows.weights,
         )

@@ -7,7 +7,6 @@ cannot fail are not fitted: P is 0.
 
 from __future__ import annotations
 
-import math
 import warnings
 from dataclasses import dataclass
 
@@ -20,7 +19,7 @@ from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import LOGLOG, Form, Method, arrays
+from rbfrag.fragility.methods import Form, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
@@ -116,7 +115,6 @@ def fit_outcomes(
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_failed,
             **sensitive_share(data, rows),
-            "natural": natural_parameters(names, method, b, estimates.covariance),
         },
         warnings=_warnings(data, rows, estimates),
     )
@@ -175,35 +173,6 @@ def median_y_m_s(form: Form, method: Method, b: FloatArray, data: FitData) -> Fl
 
     root = find_root(excess, (-30.0, 10.0), args=tuple(data.values.values()))
     return np.asarray(np.exp(root.x))
-
-
-def natural_parameters(
-    names: tuple[str, ...], method: Method, b: FloatArray, covariance: FloatArray
-) -> dict[str, list[float]] | None:
-    """Return median, exponents and shape of the Weibull forms as [value, standard error].
-
-    P = exp(-ln 2 [odds/(median z^e zT^f)]^shape), odds = r/(1-r) (or y/2PGV for r).
-    """
-    if method.link != LOGLOG or not names[1].startswith("b_logit"):
-        return None
-    k = b[1]
-    lift = b[0] + math.log(math.log(2.0))
-    values = {
-        "median": math.exp(lift / k),
-        "shape": float(k),
-        **dict(zip(("z_exponent", "zt_exponent"), (b[2:] / k).tolist(), strict=False)),
-    }
-    slopes = np.zeros((len(values), b.size))
-    slopes[0, 0], slopes[0, 1] = 1.0 / k, -lift / k**2  # of ln median
-    slopes[1, 1] = 1.0 / k  # of ln shape
-    for i in range(2, b.size):
-        slopes[i, i], slopes[i, 1] = 1.0 / k, -b[i] / k**2
-    errors = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
-    relative = ("median", "shape")
-    return {
-        name: [value, float(error * value if name in relative else error)]
-        for (name, value), error in zip(values.items(), errors, strict=True)
-    }
 
 
 def _warnings(data: FitData, rows: OutcomeRows, estimates: Estimates) -> list[str]:

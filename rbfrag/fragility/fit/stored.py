@@ -31,10 +31,10 @@ def fit(
         term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``; there is no default.
         method: method of fitting (docs/theory/fragility.md). Blocks known by p² and k_r: ``wls``
             and ``lognormal`` (of critical values, for a term that is one number), ``logistic`` (of
-            outcomes, the same terms), ``weibull`` and ``bounded`` (of outcomes, the terms with
-            PGV), ``record`` and ``power`` (``xp``). Sliding: ``displacement``; slumping:
-            ``capacity`` (``pgv`` and ``pgv_pga``); rocking: ``overturning`` (also ``sa10`` and
-            ``pga_sa10``). None: ``wls``, or the only one that there is for the kind.
+            outcomes, the same terms), ``bounded`` (of outcomes, the terms with PGV or PGA) and
+            ``record`` (``xp``). Sliding: ``displacement``; slumping: ``capacity`` (``pgv`` and
+            ``pgv_pga``); rocking: ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``,
+            or the only one that there is for the kind.
         suite: suite of motions to fit; None for all motions.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind

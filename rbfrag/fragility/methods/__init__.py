@@ -27,7 +27,6 @@ class Numbers(NamedTuple):
 
     Args:
         ndtr: standard normal distribution function.
-        expm1: exponential less one.
         maximum: the larger of two.
         minimum: the smaller of two.
         sin: sine of an angle [rad].
@@ -41,7 +40,6 @@ class Numbers(NamedTuple):
     exp: Callable[[Any], Any]
     sqrt: Callable[[Any], Any]
     ndtr: Callable[[Any], Any]
-    expm1: Callable[[Any], Any]
     maximum: Callable[[Any, Any], Any]
     minimum: Callable[[Any, Any], Any]
     sin: Callable[[Any], Any]
@@ -55,7 +53,7 @@ def _exp(x: float) -> float:
 
 
 SINGLE = Numbers(
-    math.log, _exp, math.sqrt, normal_share, math.expm1, max, min, math.sin, math.cos,
+    math.log, _exp, math.sqrt, normal_share, max, min, math.sin, math.cos,
     normal_quantile, lambda errors, x: errors.step_sums(*x),
 )  # fmt: skip
 """For single numbers."""
@@ -82,7 +80,7 @@ def arrays() -> Numbers:
         return total, fourths
 
     return Numbers(
-        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
+        np.log, np.exp, np.sqrt, ndtr, np.maximum, np.minimum, np.sin, np.cos,
         ndtri, step_sums,
     )  # fmt: skip
 
@@ -141,13 +139,6 @@ LOGLOG = Link(
     lambda eta, ns: ns.exp(-eta - ns.exp(-eta)),
     lambda p, ns: -ns.log(-ns.log(p)),
     r"\exp(-e^{-\eta})",
-)
-COMPLEMENT = Link(
-    "complement",
-    lambda eta, ns: -ns.expm1(-ns.maximum(eta, 0.0)),
-    lambda eta, ns: ns.exp(-ns.maximum(eta, 0.0)) * (eta > 0.0),
-    lambda p, ns: -ns.log(1.0 - p),
-    r"1 - e^{-\eta}",
 )
 
 

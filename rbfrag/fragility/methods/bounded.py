@@ -5,7 +5,7 @@
 
 r = k_r/PGA, v = y/2PGV, z = p PGV/(PGA g), z_T = p T_m/2π; with PGV alone
 eta = h(p) [b0 - b1 ln v + b2 ln(1 - v) + b3 l + b4 l²] with l = ln p.
-h(p) = exp(.18 l - .06 l²). (7) of docs/theory/fragility.md.
+h(p) = exp(.18 l - .06 l²). (5) of docs/theory/fragility.md.
 
 Of measures that the hazard is given in, with V_T = SA g T/2π, Q_T = ln(V_T/(PGA g)) and k' of
 :func:`rbfrag.fragility.methods.log_strength`, h(p) = p^A:

@@ -3,7 +3,7 @@
     eta = h(p) [b0 + b1 ln(X(p)/y) + b2 ln s],   s = p X(p)/(PGA g),   h(p) = p^.30
     P = 1/(1 + exp(-eta)), 0 where y >= X(p) or k_r >= PGA
 
-(8) of docs/theory/fragility.md.
+(6) of docs/theory/fragility.md.
 """
 
 from __future__ import annotations
