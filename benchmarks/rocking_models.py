@@ -30,7 +30,7 @@ from rbfrag.fragility.fit.clusters import jackknife_steps
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.likelihood import most_likely
 from rbfrag.fragility.fit.outcomes import outcome_rows, sensitive_share
-from rbfrag.fragility.fit.scores import Judged, brier, calibration, log_loss
+from rbfrag.fragility.fit.scores import ScoredBlocks, brier, calibration, log_loss
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named
 from rbfrag.fragility.methods.overturning import BLOCK
@@ -159,7 +159,7 @@ def measured(source: FitSource, study: Study) -> Scores:
     )
 
 
-def clustered_error(held_out: FloatArray, judged: Judged) -> float:
+def clustered_error(held_out: FloatArray, judged: ScoredBlocks) -> float:
     """Return the standard error of the mean log loss, clustered by earthquake."""
     p = np.clip(held_out, 1e-4, 1.0 - 1e-4)
     loss = np.where(judged.failed > 0.5, -np.log(p), -np.log1p(-p)) * judged.known

@@ -33,7 +33,7 @@ from rbfrag.question.fields import (
     parameter_of,
 )
 from rbfrag.service.app import make_app
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 from tests.cli.conftest import Shell
@@ -309,7 +309,7 @@ def test_a_mixed_table_answers_each_row_likewise(tmp_path: Path, form: str) -> N
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
-    app = make_app(Settings(db=str(REFERENCE)))
+    app = make_app(ServiceSettings(db=str(REFERENCE)))
     with TestClient(app, raise_server_exceptions=False) as found:
         yield found
 

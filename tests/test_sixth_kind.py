@@ -19,7 +19,7 @@ from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.service.app import make_app
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.kinds import KINDS, KindFacts
 from tests.synthetic import shaking
 
@@ -129,7 +129,7 @@ def test_what_is_simulated_is_fitted_and_predicts(database: Path) -> None:
     strong = rbfrag.predict(3.0, 2.0, kind="falls", pgv_m_s=0.6, db=database)
     assert (weak.kind, weak.model) == ("falls", model.name)
     assert weak.probability > 0.5 > strong.probability
-    with TestClient(make_app(Settings(db=str(database)))) as client:
+    with TestClient(make_app(ServiceSettings(db=str(database)))) as client:
         asked = {"kind": "falls", "p2": 3.0, "kr": 0.02, "pgv": 0.6}
         answer = client.get("/v1/predict", params=asked)
         assert answer.status_code == 200, answer.text

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.page import parser, report
 from benchmarks.proof import PAGE
 from benchmarks.proof.enclosed_run import STABLE, TOPPLED, enclose, least_later_q
-from rbfrag.bench.cases import Case, choose_cases, find_records
+from rbfrag.bench.cases import BenchCase, choose_cases, find_records
 from rbfrag.bench.tables import markdown
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.toppling_run import respond
@@ -132,7 +132,7 @@ class Oracle:
 class Difference:
     """Solver, heyoka and ball arithmetic on one block."""
 
-    case: Case
+    case: BenchCase
     outcomes: tuple[str, str, str]
     impacts: tuple[int, int, int]
     peak: float
@@ -147,7 +147,7 @@ def impacts(time_s: Sequence[float], theta: Sequence[float]) -> list[float]:
     ]
 
 
-def compare(oracle: Oracle, case: Case) -> Difference:
+def compare(oracle: Oracle, case: BenchCase) -> Difference:
     """Run one block by all three.
 
     Returns:

@@ -31,7 +31,7 @@ class Records:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class BenchCase:
     """One block under one motion; no vertical, equally spaced samples."""
 
     motion: GroundMotion
@@ -87,7 +87,7 @@ def _read(root: Path) -> tuple[GroundMotion, ...]:
     return tuple(by_samples.values())
 
 
-def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case, ...]:
+def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[BenchCase, ...]:
     """Draw blocks that lift off: motions in turn, polarity, p² and k_r/PGA at random.
 
     Args:
@@ -96,7 +96,7 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(records.motions))
-    cases: list[Case] = []
+    cases: list[BenchCase] = []
     for turn in range(50 * number):
         if len(cases) == number:
             break
@@ -107,7 +107,7 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
         excited = excitation(motion, None, polarity)
         kr = float(np.exp(rng.uniform(low, high))) * excited.pga_g
         if excited.max_q > kr:
-            cases.append(Case(motion, polarity, excited, p2, kr))
+            cases.append(BenchCase(motion, polarity, excited, p2, kr))
     if not cases:
         raise InputError("no drawn block lifts off under these records: name other records")
     return tuple(cases)

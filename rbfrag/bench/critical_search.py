@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
+from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.peers import cvode_is_installed, cvode_run
 from rbfrag.bench.timing import spread, timed_in_turns
@@ -74,7 +74,11 @@ def compare_searches(
     """
     rng = np.random.default_rng(seed)
     names = ["critical search", "23 runs, rbfrag, side by side", "23 runs, rbfrag, one by one"]
-    works: list[Callable[[tuple[Case, ...]], object]] = [_search, _runs_in_batch, _runs_by_kernel]
+    works: list[Callable[[tuple[BenchCase, ...]], object]] = [
+        _search,
+        _runs_in_batch,
+        _runs_by_kernel,
+    ]
     if cvode_is_installed():
         for rtol in tolerances:
             names.append(f"23 runs, CVODE in Python, rtol {rtol:.0e}")
@@ -116,12 +120,12 @@ def compare_searches(
     return tuple(rows)
 
 
-def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[Case, ...]:
+def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[BenchCase, ...]:
     """Return the 23 runs of one search: a descending scan, then a bisection."""
     excited = excitation(motion, None, polarity)
 
-    def case(ratio: float) -> Case:
-        return Case(motion, polarity, excited, p2, ratio * excited.pga_g)
+    def case(ratio: float) -> BenchCase:
+        return BenchCase(motion, polarity, excited, p2, ratio * excited.pga_g)
 
     ratios = np.geomspace(1.0, SEARCH_LIMIT, SCAN)
     runs = [case(float(ratio)) for ratio in ratios]
@@ -138,20 +142,20 @@ def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[Ca
     return tuple(runs)
 
 
-def _search(cases: tuple[Case, ...]) -> object:
+def _search(cases: tuple[BenchCase, ...]) -> object:
     return critical(cases[0].motion, p2=cases[0].p2, polarity=cases[0].polarity)
 
 
-def _runs_in_batch(cases: tuple[Case, ...]) -> tuple[str, ...]:
+def _runs_in_batch(cases: tuple[BenchCase, ...]) -> tuple[str, ...]:
     runs = simulate_many(
         cases[0].excitation, p2=cases[0].p2, kr=np.array([case.kr for case in cases])
     )
     return tuple(OUTCOMES[code].value for code in runs.outcome.tolist())
 
 
-def _runs_by_kernel(cases: tuple[Case, ...]) -> tuple[str, ...]:
+def _runs_by_kernel(cases: tuple[BenchCase, ...]) -> tuple[str, ...]:
     return tuple(taylor_run(case).outcome for case in cases)
 
 
-def _runs_by_cvode(rtol: float) -> Callable[[tuple[Case, ...]], object]:
+def _runs_by_cvode(rtol: float) -> Callable[[tuple[BenchCase, ...]], object]:
     return lambda cases: tuple(cvode_run(case, rtol).outcome for case in cases)

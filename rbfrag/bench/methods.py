@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rbfrag.bench.cases import Case
+from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.peers import (
     CVODE_INSTALL,
-    Answer,
+    PeerAnswer,
     Solver,
     cvode_is_installed,
     cvode_run,
@@ -32,7 +32,7 @@ error says nothing of the method."""
 
 
 @dataclass(frozen=True)
-class Method:
+class BenchMethod:
     """One method at one setting.
 
     Args:
@@ -43,7 +43,7 @@ class Method:
 
     family: str
     setting: str
-    run: Callable[[Case], Answer]
+    run: Callable[[BenchCase], PeerAnswer]
     of_use: bool = False
 
     @property
@@ -52,13 +52,13 @@ class Method:
         return f"{self.family}, {self.setting}"
 
 
-def taylor_run(case: Case, order: int = ORDER, ph_max: float = PH_MAX) -> Answer:
+def taylor_run(case: BenchCase, order: int = ORDER, ph_max: float = PH_MAX) -> PeerAnswer:
     """Run one case with rbfrag's kernel."""
     run = simulate(case.excitation, p2=case.p2, kr=case.kr, order=order, ph_max=ph_max)
-    return Answer(OUTCOMES[run.outcome].value, run.peak_rad)
+    return PeerAnswer(OUTCOMES[run.outcome].value, run.peak_rad)
 
 
-def methods(*, quick: bool = False) -> tuple[Method, ...]:
+def methods(*, quick: bool = False) -> tuple[BenchMethod, ...]:
     """Return every method that can be run here."""
     splits = dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
     orders = dict.fromkeys((4, 5, 6, ORDER))
@@ -72,14 +72,14 @@ def methods(*, quick: bool = False) -> tuple[Method, ...]:
     return tuple(result)
 
 
-def rocking_methods(*, quick: bool = False) -> tuple[Method, ...]:
+def rocking_methods(*, quick: bool = False) -> tuple[BenchMethod, ...]:
     """Return the methods for free-standing blocks."""
     result = [_rocking(order) for order in (4, 5, 6, ORDER)]
     result += [_runge_kutta(parts) for parts in ((1, 4) if quick else (1, 4, 16))]
     return tuple(result)
 
 
-def rocking_reference_run(case: Case) -> Answer:
+def rocking_reference_run(case: BenchCase) -> PeerAnswer:
     """Run one case with the reference that errors are judged by."""
     return rocking_reference(case, RESTITUTION)
 
@@ -89,9 +89,9 @@ def missing_peers() -> tuple[str, ...]:
     return () if cvode_is_installed() else (CVODE_INSTALL,)
 
 
-def _taylor(order: int, ph_max: float) -> Method:
+def _taylor(order: int, ph_max: float) -> BenchMethod:
     split = "unsplit" if ph_max == UNSPLIT else f"p·h ≤ {ph_max:g}"
-    return Method(
+    return BenchMethod(
         f"rbfrag, {split}",
         f"order {order}",
         lambda case: taylor_run(case, order, ph_max),
@@ -99,8 +99,8 @@ def _taylor(order: int, ph_max: float) -> Method:
     )
 
 
-def _rocking(order: int) -> Method:
-    return Method(
+def _rocking(order: int) -> BenchMethod:
+    return BenchMethod(
         "rbfrag, rocking",
         f"order {order}",
         lambda case: rocking_run(case, order),
@@ -108,31 +108,31 @@ def _rocking(order: int) -> Method:
     )
 
 
-def rocking_run(case: Case, order: int = ORDER) -> Answer:
+def rocking_run(case: BenchCase, order: int = ORDER) -> PeerAnswer:
     """Run one case with rbfrag's kernel of free-standing blocks."""
     block = free_block(block_of_numbers(case.p2, case.kr, {"restitution": RESTITUTION}))
     run = simulate_rocking(case.excitation, block, order=order)
-    return Answer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
+    return PeerAnswer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
 
 
-def _runge_kutta(parts: int) -> Method:
-    return Method(
+def _runge_kutta(parts: int) -> BenchMethod:
+    return BenchMethod(
         "RK4, rocking",
         "dt" if parts == 1 else f"dt/{parts}",
         lambda case: runge_kutta(case, RESTITUTION, parts),
     )
 
 
-def _euler(parts: int) -> Method:
+def _euler(parts: int) -> BenchMethod:
     setting = "dt" if parts == 1 else f"dt/{parts}"
-    return Method("forward Euler", setting, lambda case: euler(case, parts))
+    return BenchMethod("forward Euler", setting, lambda case: euler(case, parts))
 
 
-def _scipy(solver: Solver, rtol: float) -> Method:
-    return Method(
+def _scipy(solver: Solver, rtol: float) -> BenchMethod:
+    return BenchMethod(
         f"scipy {solver}", f"rtol {rtol:.0e}", lambda case: solve_ivp_run(case, solver, rtol)
     )
 
 
-def _cvode(rtol: float) -> Method:
-    return Method("CVODE in Python", f"rtol {rtol:.0e}", lambda case: cvode_run(case, rtol))
+def _cvode(rtol: float) -> BenchMethod:
+    return BenchMethod("CVODE in Python", f"rtol {rtol:.0e}", lambda case: cvode_run(case, rtol))

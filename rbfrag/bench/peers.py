@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
+from rbfrag.bench.cases import BenchCase
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
@@ -41,7 +41,7 @@ MOST_STEPS = 1_000_000
 """Of CVODE in one excursion."""
 
 
-class Answer(NamedTuple):
+class PeerAnswer(NamedTuple):
     """Outcome and peak rotation [rad]; the peak is NaN unless the block stays."""
 
     outcome: str
@@ -54,7 +54,7 @@ def free_motion(
     p: float | np.longdouble,
     theta_c: float | np.longdouble,
     peak: float | np.longdouble,
-) -> Answer:
+) -> PeerAnswer:
     """Decide by energy what becomes of a moving block once the ground is at rest.
 
     Args:
@@ -68,14 +68,14 @@ def free_motion(
     half = 2 * np.sin(np.abs(x) / 2)
     topples = v > half if x > 0 else v > -half
     if topples:
-        return Answer(TOPPLED, math.nan)
+        return PeerAnswer(TOPPLED, math.nan)
     if v > 0:
         top = theta_c - 2 * np.arcsin(np.sqrt((half - v) * (half + v)) / 2)
         peak = max(peak, top)
-    return Answer(STABLE, float(peak))
+    return PeerAnswer(STABLE, float(peak))
 
 
-def euler(case: Case, parts: int) -> Answer:
+def euler(case: BenchCase, parts: int) -> PeerAnswer:
     """Run one case with `parts` Euler steps per sample interval."""
     excited = case.excitation
     p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
@@ -84,9 +84,9 @@ def euler(case: Case, parts: int) -> Answer:
         excited.k_h, float(excited.interval_s[0]), case.kr, case.p2, theta_c, border, parts
     )
     if topples:
-        return Answer(TOPPLED, math.nan)
+        return PeerAnswer(TOPPLED, math.nan)
     if theta <= 0.0 and rate <= 0.0:
-        return Answer(STABLE, peak)
+        return PeerAnswer(STABLE, peak)
     return free_motion(theta, rate, p, theta_c, peak)
 
 
@@ -117,7 +117,7 @@ def _march(
     return False, theta, rate, peak
 
 
-class Excursion(NamedTuple):
+class PeerExcursion(NamedTuple):
     """How one excursion ended: at time [s], with (theta, theta'), peaks on the way."""
 
     ended: str
@@ -127,10 +127,10 @@ class Excursion(NamedTuple):
     peaks: tuple[float, ...]
 
 
-class Problem:
+class PeerProblem:
     """One case as scalar Python functions, made as cheap as Python allows."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: BenchCase) -> None:
         self.k: list[float] = case.excitation.k_h.tolist()
         self.dt = float(case.excitation.interval_s[0])
         self.end_s = self.dt * (len(self.k) - 1)
@@ -168,30 +168,32 @@ class Problem:
         return max(t, self.dt * (j - 1 + (self.kr - low) / (high - low)))
 
 
-def run_through(case: Case, excursion: Callable[[Problem, float], Excursion]) -> Answer:
+def run_through(
+    case: BenchCase, excursion: Callable[[PeerProblem, float], PeerExcursion]
+) -> PeerAnswer:
     """Run a case, one excursion after the other."""
-    problem = Problem(case)
+    problem = PeerProblem(case)
     t: float | None = problem.next_lift(0.0)
     peak = 0.0
     for _ in range(MOST_EXCURSIONS):
         if t is None or t >= problem.end_s:
-            return Answer(STABLE, peak)
+            return PeerAnswer(STABLE, peak)
         done = excursion(problem, t)
         peak = max(peak, *done.peaks, 0.0)
         if done.ended == "toppled":
-            return Answer(TOPPLED, math.nan)
+            return PeerAnswer(TOPPLED, math.nan)
         if done.ended == "record":
             if done.theta <= 0.0 and done.rate <= 0.0:
-                return Answer(STABLE, peak)
+                return PeerAnswer(STABLE, peak)
             return free_motion(done.theta, done.rate, problem.p, problem.theta_c, peak)
         if done.ended == "failed":
-            return Answer("failed", math.nan)
+            return PeerAnswer("failed", math.nan)
         # an impact found where it started would be found again for ever
         t = problem.next_lift(max(done.time_s, t + GRACE * problem.dt))
-    return Answer("failed", math.nan)
+    return PeerAnswer("failed", math.nan)
 
 
-def solve_ivp_run(case: Case, solver: Solver, rtol: float) -> Answer:
+def solve_ivp_run(case: BenchCase, solver: Solver, rtol: float) -> PeerAnswer:
     """Run one case by a method of scipy."""
     return run_through(case, lambda problem, t: _scipy_excursion(problem, t, solver, rtol))
 
@@ -199,7 +201,7 @@ def solve_ivp_run(case: Case, solver: Solver, rtol: float) -> Answer:
 class _Event:
     """An event function with the attributes that scipy reads."""
 
-    def __init__(self, problem: Problem, start: float, kind: str) -> None:
+    def __init__(self, problem: PeerProblem, start: float, kind: str) -> None:
         self.kind, self.border = kind, problem.border
         self.grace_s = start + GRACE * problem.dt
         self.terminal = kind != "peak"
@@ -213,7 +215,9 @@ class _Event:
         return float(y[0]) if t > self.grace_s else 1.0
 
 
-def _scipy_excursion(problem: Problem, start: float, solver: Solver, rtol: float) -> Excursion:
+def _scipy_excursion(
+    problem: PeerProblem, start: float, solver: Solver, rtol: float
+) -> PeerExcursion:
     from scipy.integrate import solve_ivp
 
     acceleration = problem.acceleration
@@ -230,13 +234,13 @@ def _scipy_excursion(problem: Problem, start: float, solver: Solver, rtol: float
             events=events,
         )
     except ValueError:  # its interpolant and its step disagree about the sign of an event
-        return Excursion("failed", start, 0.0, 0.0, ())
+        return PeerExcursion("failed", start, 0.0, 0.0, ())
     if solution.status < 0 or solution.t_events is None or solution.y_events is None:
-        return Excursion("failed", start, 0.0, 0.0, ())
+        return PeerExcursion("failed", start, 0.0, 0.0, ())
     ended = "record"
     if solution.status == 1:
         ended = "impact" if len(solution.t_events[0]) else "toppled"
-    return Excursion(
+    return PeerExcursion(
         ended,
         float(solution.t[-1]),
         float(solution.y[0, -1]),
@@ -250,13 +254,13 @@ def cvode_is_installed() -> bool:
     return find_spec(CVODE_PACKAGE) is not None
 
 
-def cvode_run(case: Case, rtol: float) -> Answer:
+def cvode_run(case: BenchCase, rtol: float) -> PeerAnswer:
     """Run one case."""
     cvode = importlib.import_module(f"{CVODE_PACKAGE}.cvode").CVODE
     return run_through(case, lambda problem, t: _cvode_excursion(cvode, problem, t, rtol))
 
 
-def _cvode_excursion(cvode: Any, problem: Problem, start: float, rtol: float) -> Excursion:
+def _cvode_excursion(cvode: Any, problem: PeerProblem, start: float, rtol: float) -> PeerExcursion:
     acceleration, border = problem.acceleration, problem.border
     grace_s = start + GRACE * problem.dt
 
@@ -282,7 +286,7 @@ def _cvode_excursion(cvode: Any, problem: Problem, start: float, rtol: float) ->
     end = problem.end_s
     solution = solver.solve([start, 0.5 * (start + end), end], [0.0, 0.0])
     if solution.status < 0:
-        return Excursion("failed", start, 0.0, 0.0, ())
+        return PeerExcursion("failed", start, 0.0, 0.0, ())
     ended, peaks = "record", []
     if solution.i_events is not None:
         for which, state in zip(solution.i_events, solution.y_events, strict=True):
@@ -292,7 +296,7 @@ def _cvode_excursion(cvode: Any, problem: Problem, start: float, rtol: float) ->
                 ended = "impact"
             elif which[1]:
                 ended = "toppled"
-    return Excursion(
+    return PeerExcursion(
         ended, float(solution.t[-1]), float(solution.y[-1, 0]), float(solution.y[-1, 1]),
         tuple(peaks),
     )  # fmt: skip

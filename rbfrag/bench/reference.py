@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
-from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
+from rbfrag.bench.cases import BenchCase
+from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
 from rbfrag.bench.rocking_peer import free_rocking
 from rbfrag.solver.rocking_run import REST_SPEED
 
@@ -27,7 +27,7 @@ EVEN = 1e-15
 """Part of an interval that is no step of its own: its end is reached but for rounding."""
 
 
-def reference(case: Case) -> Answer:
+def reference(case: BenchCase) -> PeerAnswer:
     """Return outcome and peak rotation [rad] of one case."""
     excited = case.excitation
     k = [Real(x) for x in excited.k_h]
@@ -74,7 +74,7 @@ def reference(case: Case) -> Answer:
                 theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
                 at = at + part if parts > 1 else Real(1)
                 if rate > 0 and theta_c - theta < border[i]:
-                    return Answer(TOPPLED, math.nan)
+                    return PeerAnswer(TOPPLED, math.nan)
                 continue
             at += part * landing
             now = g0 + slope * at
@@ -85,13 +85,13 @@ def reference(case: Case) -> Answer:
                 at = max(at, -g0 / slope) if from_rest else at
         i += 1
         if moving and rate > 0 and theta_c - theta < border[i]:
-            return Answer(TOPPLED, math.nan)
+            return PeerAnswer(TOPPLED, math.nan)
     if not moving:
-        return Answer(STABLE, float(peak))
+        return PeerAnswer(STABLE, float(peak))
     return free_motion(theta, rate, p, theta_c, peak)
 
 
-def rocking_reference(case: Case, restitution: float) -> Answer:
+def rocking_reference(case: BenchCase, restitution: float) -> PeerAnswer:
     """Return outcome and peak rotation [rad] of a free-standing rectangle on level ground.
 
     Args:
@@ -135,9 +135,9 @@ def rocking_reference(case: Case, restitution: float) -> Answer:
             theta = rest
             side, rate = (-side, speed) if speed >= slowest else (0, rest)
         if side and rate > 0 and theta_c - theta < border[side][len(k) - 2 - i]:
-            return Answer(TOPPLED, math.nan)
+            return PeerAnswer(TOPPLED, math.nan)
     if side == 0:
-        return Answer(STABLE, float(peak))
+        return PeerAnswer(STABLE, float(peak))
     return free_rocking(theta, rate, p, theta_c, e, peak)
 
 

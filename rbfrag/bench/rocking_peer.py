@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
-from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
+from rbfrag.bench.cases import BenchCase
+from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
 from rbfrag.solver.integrator.two_corners import PAST_BALANCE
@@ -26,7 +26,7 @@ Real = float | np.longdouble
 
 def free_rocking(
     theta: Real, rate: Real, p: Real, theta_c: Real, restitution: Real, peak: Real
-) -> Answer:
+) -> PeerAnswer:
     """Decide by energy, impact by impact, what becomes of a block once the ground is at rest.
 
     Args:
@@ -51,7 +51,7 @@ def free_rocking(
     return answer
 
 
-def runge_kutta(case: Case, restitution: float, parts: int) -> Answer:
+def runge_kutta(case: BenchCase, restitution: float, parts: int) -> PeerAnswer:
     """Run one case with `parts` steps of RK4 per sample interval; no vertical motion."""
     excited = case.excitation
     p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
@@ -60,9 +60,9 @@ def runge_kutta(case: Case, restitution: float, parts: int) -> Answer:
         REST_SPEED * p * theta_c, parts,
     )  # fmt: skip
     if topples:
-        return Answer(TOPPLED, math.nan)
+        return PeerAnswer(TOPPLED, math.nan)
     if side == 0:
-        return Answer(STABLE, peak)
+        return PeerAnswer(STABLE, peak)
     return free_rocking(theta, rate, p, theta_c, restitution, peak)
 
 

@@ -10,7 +10,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
+from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.timing import timed
 from rbfrag.campaign.executors.local import prepare
@@ -61,7 +61,7 @@ def record_length(
     """Time one run, of a block that stays, under a record with zeros before it, or repeated."""
     p2, kr = 3.0, 0.5 * motion.pga_g
     samples = motion.acceleration_g
-    taylor_run(Case(motion, "forward", excitation(motion), p2, kr))  # compiles
+    taylor_run(BenchCase(motion, "forward", excitation(motion), p2, kr))  # compiles
     rows = []
     for lengthened in ("rest", "shaking"):
         for n in times:
@@ -72,7 +72,7 @@ def record_length(
             )
             record = GroundMotion(longer, motion.dt_s)
             excited, excitation_s = timed(lambda record=record: excitation(record))  # type: ignore[misc]
-            case = Case(record, "forward", excited, p2, kr)
+            case = BenchCase(record, "forward", excited, p2, kr)
             _, run_s = timed(lambda case=case: taylor_run(case))  # type: ignore[misc]
             moved = simulate(case.excitation, p2=case.p2, kr=case.kr).samples_moved
             rows.append(LengthRow(lengthened, longer.size, moved, run_s, excitation_s))

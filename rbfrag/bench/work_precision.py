@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rbfrag.bench.cases import Case
-from rbfrag.bench.methods import Method
-from rbfrag.bench.peers import STABLE, Answer
+from rbfrag.bench.cases import BenchCase
+from rbfrag.bench.methods import BenchMethod
+from rbfrag.bench.peers import STABLE, PeerAnswer
 from rbfrag.bench.reference import reference
 from rbfrag.bench.timing import spread, timed_in_turns
 
@@ -46,10 +46,10 @@ class WorkPrecision:
 
 
 def measure(
-    cases: Sequence[Case],
-    methods: Sequence[Method],
+    cases: Sequence[BenchCase],
+    methods: Sequence[BenchMethod],
     *,
-    judge: Callable[[Case], Answer] = reference,
+    judge: Callable[[BenchCase], PeerAnswer] = reference,
     seed: int = 1,
     on_case: Callable[[int, int], None] | None = None,
 ) -> tuple[WorkPrecision, ...]:
@@ -64,8 +64,8 @@ def measure(
     rng = np.random.default_rng(seed)
     for method in methods:
         method.run(cases[0])  # compiles, imports
-    truth: list[Answer] = []
-    answers: list[list[Answer]] = [[] for _ in methods]
+    truth: list[PeerAnswer] = []
+    answers: list[list[PeerAnswer]] = [[] for _ in methods]
     seconds = np.empty((len(methods), len(cases)))
     for j, case in enumerate(cases):
         truth.append(judge(case))
@@ -82,9 +82,9 @@ def measure(
 
 
 def _row(
-    method: Method,
-    truth: Sequence[Answer],
-    answers: Sequence[Answer],
+    method: BenchMethod,
+    truth: Sequence[PeerAnswer],
+    answers: Sequence[PeerAnswer],
     seconds: np.ndarray,
     base: np.ndarray,
 ) -> WorkPrecision:

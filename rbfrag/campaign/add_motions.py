@@ -80,7 +80,7 @@ class AddReport(Tabular):
 
 
 @dataclass
-class _Run:
+class _Additions:
     """What has been found so far."""
 
     suite: str | None
@@ -153,7 +153,7 @@ def add_motions(
     checked_name(suite or "", "the suite")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
-    run = _Run(suite, None if raw else high_pass)
+    run = _Additions(suite, None if raw else high_pass)
     if stated is not None:
         run.failed += [
             FailedFile(
@@ -185,7 +185,7 @@ def add_motions(
     return AddReport(*(tuple(getattr(run, each.name)) for each in fields(AddReport)))
 
 
-def _take_note(run: _Run, stored: list[_Stored]) -> None:
+def _take_note(run: _Additions, stored: list[_Stored]) -> None:
     for one in stored:
         (run.added if one.new else run.known).append(one.motion_id)
         if one.new and one.processed:
@@ -201,7 +201,7 @@ def _take_note(run: _Run, stored: list[_Stored]) -> None:
 
 
 def _take_note_of_units(
-    run: _Run, file: Path, traces: list[Trace], units: str | None, *, alone: bool
+    run: _Additions, file: Path, traces: list[Trace], units: str | None, *, alone: bool
 ) -> None:
     other = next((trace.other_unit for trace in traces if trace.other_unit), "")
     if other and alone:
@@ -252,7 +252,7 @@ def _files(
         raise InputError(f"there is no file in {', '.join(map(str, paths))}")
 
 
-def _store(connection: Connection, file: Path, trace: Trace, run: _Run) -> _Stored:
+def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) -> _Stored:
     motion, stated = trace.motion, trace.stated
     flags: list[str] = []
     uncorrected = counts_as_uncorrected(motion, stated.processing)

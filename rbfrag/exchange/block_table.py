@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.excel_text import as_written
 from rbfrag.exchange.tables.files import open_table
-from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
+from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, names_of
@@ -55,7 +55,7 @@ class BlockTable:
         """Its rows, some thousand at a time."""
         return self.file.parts(self.numeric)
 
-    def numbers(self, part: Part) -> tuple[dict[str, NDArray[np.float64]], dict[int, str]]:
+    def numbers(self, part: TablePart) -> tuple[dict[str, NDArray[np.float64]], dict[int, str]]:
         """Return the numbers of some rows by field, and what is wrong with rows by their index."""
         numbers, faults = {}, dict(part.faults)
         for name, (header, factor) in self.stated.columns.items():
@@ -71,7 +71,7 @@ class BlockTable:
             numbers[name] = values if stands_for is None else np.where(empty, stands_for, values)
         return numbers, faults
 
-    def text(self, part: Part, name: str) -> list[str] | None:
+    def text(self, part: TablePart, name: str) -> list[str] | None:
         """Return the texts of some rows; None where the table has no column of that field."""
         column = self.stated.columns.get(name)
         if column is None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.tables.parts import Part
+from rbfrag.exchange.tables.parts import TablePart
 from rbfrag.files import is_number, json_document, source_text, written_whole
 
 SUFFIXES = (".geojson", ".json")
@@ -22,7 +22,7 @@ SUFFIXES = (".geojson", ".json")
 _ROWS = 1 << 13
 
 
-def read_points(path: str | os.PathLike[str]) -> Part:
+def read_points(path: str | os.PathLike[str]) -> TablePart:
     """Return the features of a FeatureCollection as rows of a table: lon, lat [deg], properties.
 
     A feature that is no point has no place: its lon and lat are NaN.
@@ -46,7 +46,7 @@ def read_points(path: str | os.PathLike[str]) -> Part:
         rows.append(_object(known.get("properties")))
     names = dict.fromkeys(name for row in rows for name in row)
     cells: dict[str, Any] = {name: [row.get(name) for row in rows] for name in names}
-    return Part(range(1, len(rows) + 1), {**cells, "lon": lon, "lat": lat})
+    return TablePart(range(1, len(rows) + 1), {**cells, "lon": lon, "lat": lat})
 
 
 def _object(value: object) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, TEXTS
 from rbfrag.exchange.block_table import BlockTable, opened_table
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import table_path, table_writer
-from rbfrag.exchange.tables.parts import Part, Write
+from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
@@ -127,7 +127,7 @@ def predict_table(
 
 def _answer(
     table: BlockTable,
-    part: Part,
+    part: TablePart,
     given: Mapping[str, float],
     kind: str | None,
     question: Mapping[str, Any],
@@ -186,7 +186,7 @@ def _written(
     )  # fmt: skip
     is_csv = partial.suffix.lower() == ".csv"
 
-    def write_part(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def write_part(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         cells = changed_texts({name: part.cells[name] for name in kept}, as_written)
         if is_csv and excel_text:
             cells = changed_texts(cells, as_text)
@@ -200,7 +200,7 @@ def _written(
 def _listed(table: BlockTable, answers: Sequence[str], rows: list[dict[str, Any]]) -> Write:
     """Return what enters the answers for parts into a list, up to :data:`MOST_LISTED`."""
 
-    def list_part(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def list_part(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         first, most = len(rows), MOST_LISTED - len(rows)
         if not most:
             return

@@ -66,7 +66,7 @@ _ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s":
 
 
 @dataclass(frozen=True)
-class Finding:
+class Remark:
     """One thing found about a question.
 
     Args:
@@ -93,7 +93,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Contradiction(Finding):
+class Contradiction(Remark):
     """Measures that do not go together in any fitted motion.
 
     Args:
@@ -127,21 +127,21 @@ NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
 
 def refusals(
     values: Mapping[str, Any], needed: Collection[str], signed: Collection[str] = ()
-) -> Iterator[Finding]:
+) -> Iterator[Remark]:
     """Yield what makes an answer impossible; `signed` names the values that may be negative."""
     for name in needed:
         value = values[name]
         wanted = _DESCRIPTIONS[name][1]
-        yield Finding(value != value, name, value, f"is not a number: give {wanted}")
+        yield Remark(value != value, name, value, f"is not a number: give {wanted}")
         if name in _ABOVE_ZERO:
-            yield Finding(value <= 0.0, name, value, f"is not above zero: give {wanted}")
+            yield Remark(value <= 0.0, name, value, f"is not above zero: give {wanted}")
             low = (value > 0.0) & (value < LOWEST)
             of = _ABOVE_ZERO[name]
-            yield Finding(low, name, value, f"is too small for any {of}: give {wanted}")
+            yield Remark(low, name, value, f"is too small for any {of}: give {wanted}")
         elif name not in signed:
-            yield Finding(value < 0.0, name, value, f"is negative: give {wanted}")
+            yield Remark(value < 0.0, name, value, f"is negative: give {wanted}")
         large = (value > HIGHEST) | (value == -math.inf)
-        yield Finding(large, name, value, f"is beyond any block or earthquake: give {wanted}")
+        yield Remark(large, name, value, f"is beyond any block or earthquake: give {wanted}")
 
 
 class Judgement(NamedTuple):
@@ -171,9 +171,9 @@ def answer_with_findings(
     quantiles: Quantiles | None,
     ns: Numbers,
     *,
-    say: Callable[[Any, Finding], None],
-    refuse: Callable[[Any, Finding], None],
-    unstable: Callable[[Any, Finding], None],
+    say: Callable[[Any, Remark], None],
+    refuse: Callable[[Any, Remark], None],
+    unstable: Callable[[Any, Remark], None],
     nothing: Any,
 ) -> Judgement:
     """Answer a question of which there may be something to say.
@@ -196,7 +196,7 @@ def answer_with_findings(
     wanted = _DESCRIPTIONS[block.strength][1]
     at_rest = (strength <= 0.0) & _not(missing)
     unstable(
-        at_rest, Finding(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
+        at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
     )
     floored = dict(given)
     for name in (block.strength, "pga_g", *SPECTRAL.values()):
@@ -205,7 +205,7 @@ def answer_with_findings(
     values = block.completed(floored, term, ns)
     for bound in block.refuses:
         holds = bound.holds(values) & _not(missing) & _not(at_rest)
-        refuse(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
+        refuse(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
         missing = missing | holds
     intensity = values["intensity_m_s"]
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
@@ -214,17 +214,17 @@ def answer_with_findings(
     above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
     model.with_ratios(values, above_zero)
     no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
-    say(no_shaking, Finding(no_shaking, "", 0.0, NO_SHAKING))
+    say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
     for bound in model.bounds(given):
         holds = bound.holds(values) & _not(ruled)
-        say(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
+        say(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
         ruled = ruled | holds
     answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
-        say(partly, Finding(partly, "", answer.outside, PARTLY_OUTSIDE))
+        say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE))
     in_domain = _not(missing)
     for finding in outside_domain(model, values):
         holds = finding.holds & _not(ruled)
@@ -232,7 +232,7 @@ def answer_with_findings(
         in_domain = in_domain & _not(holds)
     if model.spread is not None:
         together = _not(model.spread.holds(above_zero, ns)) & in_domain & _not(ruled)
-        say(together, Finding(together, "", 0.0, model.spread.sentence))
+        say(together, Remark(together, "", 0.0, model.spread.sentence))
         in_domain = in_domain & _not(together)
     for finding in doubts(model, values, ns):
         say(finding.holds & _not(unanswered), finding)
@@ -250,7 +250,7 @@ def _not(condition: Any) -> Any:
     return condition ^ True
 
 
-def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Finding]:
+def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Remark]:
     """Yield the variables that lie outside their fitted range, and measures that contradict."""
     for ratio in model.ratios_of(values):
         low, high = ratio.limits(model.row.domain)
@@ -266,7 +266,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         # A p² computed from a shape may miss the edge by rounding.
         below, above = value < low * (1.0 - 1e-9), value > high * (1.0 + 1e-9)
         for holds, edge in ((below, low), (above, high)):
-            yield Finding(
+            yield Remark(
                 holds,
                 name,
                 value,
@@ -275,14 +275,14 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
             )
 
 
-def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Iterator[Finding]:
+def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Iterator[Remark]:
     """Yield where the model stops making sense, and suspicious values."""
     if model.method.doubts is not None:
         for holds, name, text in model.method.doubts(model.parameters, values, ns):
-            yield Finding(holds, name, values[name], text)
+            yield Remark(holds, name, values[name], text)
     for bound in model.method.block.doubts:
-        yield Finding(bound.holds(values), bound.about, values.get(bound.about), bound.text)
+        yield Remark(bound.holds(values), bound.about, values.get(bound.about), bound.text)
     for name, (low, high, text) in CREDIBLE.items():
         if name in values:
             value = values[name]
-            yield Finding((value < low) | (value > high), name, value, f"is {text}")
+            yield Remark((value < low) | (value > high), name, value, f"is {text}")

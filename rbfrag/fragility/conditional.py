@@ -29,7 +29,7 @@ LEVEL = 0.95
 Measure = Literal["", "displacement_m", "peak_rad"]
 
 
-class Share(NamedTuple):
+class FailureShare(NamedTuple):
     """A share of blocks that fail, with what the finite number of earthquakes leaves open.
 
     Args:
@@ -162,7 +162,7 @@ def _fails(end: ShockEnd, measure: Measure, limit: float | None) -> bool | None:
     return False if end.outcome == Outcome.STABLE else None
 
 
-def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) -> Share:
+def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) -> FailureShare:
     """Return a share with its interval, clustered by earthquake.
 
     The interval is that of a logistic model of one constant: F(eta ± t(ν) se) with the covariance
@@ -177,9 +177,11 @@ def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) 
     share, events = count / n, int(event.max()) + 1
     if count in (0, n):
         open_end = (0.5 * (1.0 - level)) ** (1.0 / events)
-        return Share(count, share, *((0.0, 1.0 - open_end) if count == 0 else (open_end, 1.0)))
+        return FailureShare(
+            count, share, *((0.0, 1.0 - open_end) if count == 0 else (open_end, 1.0))
+        )
     if events == 1:
-        return Share(count, share, 0.0, 1.0)
+        return FailureShare(count, share, 0.0, 1.0)
     size = np.bincount(event)
     excess = np.bincount(event, fails - share)
     steps = (excess / ((n - size) * share * (1.0 - share)))[:, None]
@@ -187,4 +189,4 @@ def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) 
     half = errors.half_width((1.0,), quantiles_of(level), SINGLE)
     eta = math.log(share / (1.0 - share))
     low, high = (1.0 / (1.0 + math.exp(-(eta + side * half))) for side in (-1.0, 1.0))
-    return Share(count, share, low, high)
+    return FailureShare(count, share, low, high)

@@ -168,7 +168,7 @@ class _Line:
         for labels in group:
             starts[1:] |= labels[first][1:] != labels[first][:-1]
         self._ranks = _by_rank(starts)
-        self._steps = _Steps.of(np.diff(x[first], prepend=0.0), length)
+        self._steps = _Transitions.of(np.diff(x[first], prepend=0.0), length)
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return the values at x, shape (draws, n)."""
@@ -180,14 +180,14 @@ class _Line:
 
 
 @dataclass(frozen=True, eq=False)
-class _Steps:
+class _Transitions:
     """From node to node of an Ornstein-Uhlenbeck process: what is kept, and what is new."""
 
     kept: FloatArray
     new: FloatArray
 
     @classmethod
-    def of(cls, step: FloatArray, length: float) -> _Steps:
+    def of(cls, step: FloatArray, length: float) -> _Transitions:
         away = np.abs(step) / length
         return cls(np.exp(-away), np.sqrt(-np.expm1(-2.0 * away)))
 
@@ -263,7 +263,7 @@ def _portions(rows: Indices) -> Iterator[Indices]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Axis(_Steps):
+class _Axis(_Transitions):
     """Nodes of one variable of a grid, and at which each point stands."""
 
     node: Indices
@@ -276,7 +276,7 @@ class _Axis(_Steps):
         if nodes.size > enough:
             nodes = np.linspace(nodes[0], nodes[-1], enough)
             node = np.rint((x - nodes[0]) / max(span, 1e-300) * (enough - 1)).astype(np.intp)
-        steps = _Steps.of(np.diff(nodes, prepend=0.0), length)
+        steps = _Transitions.of(np.diff(nodes, prepend=0.0), length)
         return cls(steps.kept, steps.new, node)
 
     def run(self, noise: FloatArray) -> None:

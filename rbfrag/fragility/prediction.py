@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
-    from rbfrag.fragility.checks import Finding, Judgement
+    from rbfrag.fragility.checks import Judgement, Remark
     from rbfrag.fragility.prediction_array import PredictionArray
 
 _SINGLE_TYPES = (float, int, str, bytes)
@@ -300,11 +300,11 @@ def _answer_with_diagnostics(
 
     sentences: list[str] = []
 
-    def say(holds: bool, finding: Finding) -> None:
+    def say(holds: bool, finding: Remark) -> None:
         if holds:
             sentences.append(finding.about(finding.value))
 
-    def refuse(holds: bool, finding: Finding) -> None:
+    def refuse(holds: bool, finding: Remark) -> None:
         if holds:
             raise InputError(finding.about(finding.value), fields=(finding.name,))
 

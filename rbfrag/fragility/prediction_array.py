@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Finding, answer_with_findings
+from rbfrag.fragility.checks import Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
@@ -324,10 +324,10 @@ def _answer_with_diagnostics(
     sentences = _Sentences(places.size)
     at_rest = np.zeros(places.size, dtype=np.bool_)
 
-    def say(holds: NDArray[np.bool_], finding: Finding) -> None:
+    def say(holds: NDArray[np.bool_], finding: Remark) -> None:
         sentences.add(holds, finding.in_general())
 
-    def refuse(holds: NDArray[np.bool_], finding: Finding) -> None:
+    def refuse(holds: NDArray[np.bool_], finding: Remark) -> None:
         if refuse_nan and holds.any():
             first = int(np.flatnonzero(holds)[0])
             where = tuple(int(i) for i in np.unravel_index(places[first], shape))
@@ -335,7 +335,7 @@ def _answer_with_diagnostics(
             raise InputError(text, fields=(finding.name,))
         say(holds, finding)
 
-    def unstable(holds: NDArray[np.bool_], _: Finding) -> None:
+    def unstable(holds: NDArray[np.bool_], _: Remark) -> None:
         at_rest[:] = holds
         sentences.add(holds, "unstable")
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Finding, refusals
+from rbfrag.fragility.checks import Remark, refusals
 from rbfrag.fragility.methods import BlockParameters, arrays
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"
@@ -41,7 +41,7 @@ def block_reasons(
     """
     reasons = np.full(values[block.strength].shape, "", dtype=object)
 
-    def say(holds: Any, finding: Finding) -> None:
+    def say(holds: Any, finding: Remark) -> None:
         for i in np.flatnonzero(holds & (reasons == "")).tolist():
             value = float(finding.value[i])
             reasons[i] = finding.in_general() if value != value else finding.about(value)
@@ -51,7 +51,7 @@ def block_reasons(
         own = block.filled(values)
         for finding in refusals(own, (*block.names, *names), (block.strength, *block.options)):
             say(finding.holds, finding)
-        at_rest = Finding(
+        at_rest = Remark(
             own[block.strength] <= 0.0, block.strength, own[block.strength],
             "is not above zero: the block is unstable and fails without an earthquake",
         )  # fmt: skip
@@ -61,7 +61,7 @@ def block_reasons(
             block.adjust(adjusted, arrays())
         for bound in block.refuses:
             if bound.about in names:
-                finding = Finding(bound.holds(adjusted), bound.about, own[bound.about], bound.text)
+                finding = Remark(bound.holds(adjusted), bound.about, own[bound.about], bound.text)
                 say(finding.holds, finding)
     return reasons
 

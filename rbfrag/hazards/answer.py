@@ -31,13 +31,13 @@ from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import (
-    BlockTable,
     ModelBlocks,
     ModelPart,
+    ProbabilityTable,
     RateKeywords,
     parts_by_model,
 )
-from rbfrag.hazards.shaking import NOTABLE, Shaking, ends_in_words
+from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
 from rbfrag.question.blocks import taken_as_medians
 from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
@@ -227,7 +227,7 @@ def hazard(
     level = answering.get("level", LEVEL)
     curves, weight = branch_curves(curve, weights, meaning)
     checked_years(years)
-    reading = Shaking.of(curves[0], **meaning)
+    reading = LevelShaking.of(curves[0], **meaning)
     given, medians = taken_as_medians(given)
     own, remarks, reason = parts_by_model(given, reading.name, answering)
     refuse_elements(reason, fields=BlockFields.__optional_keys__)
@@ -249,7 +249,7 @@ def hazard(
     warnings.extend(one.term.advice for one in models if one.term.advice)
     for of_model in own:
         warnings.extend(reading.rise_in_words(curves[0], of_model.model, of_model.numbers))
-    blocks = _Site.of(own, reading, level, curves, counts, one_class=one_class)
+    blocks = _SiteBlocks.of(own, reading, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (
         each[:1]
@@ -343,7 +343,7 @@ class _Rates:
 
 
 @dataclass(frozen=True, eq=False)
-class _Site:
+class _SiteBlocks:
     """The blocks of a site, tabled for the curves of it.
 
     Args:
@@ -355,22 +355,22 @@ class _Site:
     """
 
     blocks: list[ModelBlocks]
-    tables: list[BlockTable]
+    tables: list[ProbabilityTable]
     order: NDArray[np.intp]
-    any_of: BlockTable | None
+    any_of: ProbabilityTable | None
     thresholds: JointThresholds | None
 
     @classmethod
     def of(
         cls,
         parts: Sequence[ModelPart],
-        reading: Shaking,
+        reading: LevelShaking,
         level: float,
         curves: list[HazardCurve],
         counts: Sequence[int],
         *,
         one_class: bool,
-    ) -> _Site:
+    ) -> _SiteBlocks:
         """Return the blocks of some models; the arguments are those of `hazard`."""
         blocks, places = [], []
         for part in parts:
@@ -387,7 +387,7 @@ class _Site:
         if one_class and len(tables) > 1:
             shares = np.array([some.count for some in blocks]) / order.size
             mean = sum(share * one.values for share, one in zip(shares, tables, strict=True))
-            tables = [BlockTable(tables[0].low, tables[0].step, np.asarray(mean))]
+            tables = [ProbabilityTable(tables[0].low, tables[0].step, np.asarray(mean))]
         if one_class or order.size < 2:
             return cls(blocks, tables, order, None, None)
         size = tables[0].values.shape[-1]
@@ -397,7 +397,7 @@ class _Site:
             greatest = np.maximum(greatest, p.max(axis=2))
             none = none * (1.0 - p).prod(axis=2)
         first = tables[0]
-        any_of = BlockTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
+        any_of = ProbabilityTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
         thresholds, law = None, parts[0].model.dependence
         placement = blocks[0].placement()
         one_model = len(parts) == 1 and order.size <= MOST_JOINT

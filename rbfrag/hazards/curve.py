@@ -32,7 +32,7 @@ class CurveKeywords(TypedDict, total=False):
     component: str | None
 
 
-class _Site(TypedDict, total=False):
+class _CurveSite(TypedDict, total=False):
     """Where a curve is of, and of what; see :class:`HazardCurve`."""
 
     period_s: float | None
@@ -151,7 +151,7 @@ def hazard_curve(
     annual_rate: ArrayLike,
     *,
     source: str = "hazard curve",
-    **of: Unpack[_Site],
+    **of: Unpack[_CurveSite],
 ) -> HazardCurve:
     """Return a checked hazard curve; levels that say nothing are left out with a warning.
 

@@ -39,7 +39,7 @@ _VALUES_AT_ONCE = 1 << 19
 _OF_EVENTS, _OF_BLOCKS = 0, 1
 
 
-class Part(NamedTuple):
+class EventYears(NamedTuple):
     """Events of whole years.
 
     Args:
@@ -131,7 +131,7 @@ def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
     return (DEPENDENT, INDEPENDENT) if portfolio.dependence is None else (COPULA,)
 
 
-def count_part(part: Part) -> PartCounts:
+def count_part(part: EventYears) -> PartCounts:
     """Return what fails in the events of a part; a function of a module, for worker processes."""
     events, portfolio = part.events, part.portfolio
     n, laws = events.event_id.size, laws_of(portfolio)
@@ -178,7 +178,7 @@ def count_part(part: Part) -> PartCounts:
     )  # fmt: skip
 
 
-def _shaken(part: Part) -> Iterator[tuple[int, Shaken]]:
+def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     """Yield each event that may fail a block, with those blocks."""
     events, portfolio = part.events, part.portfolio
     z, weight = portfolio.scatter_points()
@@ -238,7 +238,9 @@ def _closed_form(
     return np.array([count.probability_any]), np.array([variance])
 
 
-def _sampled(part: Part, event: int, shaken: Shaken, normals: Normals) -> tuple[FloatArray, float]:
+def _sampled(
+    part: EventYears, event: int, shaken: Shaken, normals: Normals
+) -> tuple[FloatArray, float]:
     """Return numbers of failures and losses of the samples of one event, and the share with any.
 
     The stream of random numbers is that of the event, whichever part it stands in.
@@ -266,7 +268,7 @@ def _sampled(part: Part, event: int, shaken: Shaken, normals: Normals) -> tuple[
 
 
 def _probabilities(
-    part: Part, shaken: Shaken, generator: np.random.Generator
+    part: EventYears, shaken: Shaken, generator: np.random.Generator
 ) -> Callable[[int], FloatArray]:
     """Return a function for P of the blocks in the next samples, of a shape that broadcasts.
 

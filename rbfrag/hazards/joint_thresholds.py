@@ -17,7 +17,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_points import REPLICATES, LatentPoints
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.model_blocks import BlockTable
+from rbfrag.hazards.model_blocks import ProbabilityTable
 from rbfrag.solver.results import FloatArray
 
 _VALUES, _OF_DRAWS = 2**19, 2**23
@@ -52,7 +52,7 @@ class JointThresholds:
     @classmethod
     def of(
         cls,
-        table: BlockTable,
+        table: ProbabilityTable,
         blocks: Placement,
         dependence: Dependence,
         counts: Sequence[int] = (1,),
@@ -139,7 +139,7 @@ class JointThresholds:
         return np.asarray(fails.mean(axis=(-1, -2)))
 
 
-def _inverse(table: BlockTable) -> FloatArray:
+def _inverse(table: ProbabilityTable) -> FloatArray:
     """Return ln x at which blocks fail, draws x bands x blocks x steps of Z."""
     values, nodes = table.values, table.nodes
     z = np.arange(-_REACH * _STEPS, _REACH * _STEPS + 1) / _STEPS

@@ -19,7 +19,7 @@ from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
     Curves,
-    Part,
+    EventYears,
     PartCounts,
     count_part,
     laws_of,
@@ -32,7 +32,7 @@ from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
-Run = Callable[[Iterator[Part], int], Iterator[PartCounts]]
+Run = Callable[[Iterator[EventYears], int], Iterator[PartCounts]]
 """Does the parts of the work, of which the number is given, and yields the results in any order."""
 
 EACH_COUNT_TO = 20
@@ -346,7 +346,7 @@ def event_losses(
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
     laws = laws_of(portfolio)
     parts = (
-        Part(number, portfolio, _only(events, group), *ends, samples, seed)
+        EventYears(number, portfolio, _only(events, group), *ends, samples, seed)
         for number, group in enumerate(groups)
     )
     do: Run = run or (lambda work, _: map(count_part, work))

@@ -19,7 +19,7 @@ from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
-from rbfrag.hazards.shaking import Shaking
+from rbfrag.hazards.shaking import LevelShaking
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import AnsweringFields, BlockFields, V
@@ -47,7 +47,7 @@ def _slices(size: int, most: int) -> Iterator[slice]:
 
 
 @dataclass(frozen=True, eq=False)
-class BlockTable:
+class ProbabilityTable:
     """Probabilities on equal steps of ln x, cubics through four nodes between them.
 
     Args:
@@ -157,7 +157,7 @@ class ModelBlocks:
     numbers: Mapping[str, FloatArray]
     weight: FloatArray
     medians: Mapping[str, FloatArray]
-    shaking: Shaking
+    shaking: LevelShaking
     model: FragilityModel
     level: float
     remarks: tuple[str, ...] = ()
@@ -166,7 +166,7 @@ class ModelBlocks:
     def of(
         cls,
         given: Mapping[str, Any],
-        shaking: Shaking,
+        shaking: LevelShaking,
         *,
         draws: int,
         seed: int,
@@ -213,7 +213,7 @@ class ModelBlocks:
     def certain(
         cls,
         numbers: Mapping[str, FloatArray],
-        shaking: Shaking,
+        shaking: LevelShaking,
         model: FragilityModel,
         level: float,
     ) -> ModelBlocks:
@@ -239,7 +239,7 @@ class ModelBlocks:
         """Return the blocks as those of one site with unknown azimuths; None without a size."""
         return Placement.of_numbers(self.model.method.block, self.medians, polarity=UNKNOWN)
 
-    def tabled(self, curves: Sequence[HazardCurve], *, mean: bool = False) -> BlockTable:
+    def tabled(self, curves: Sequence[HazardCurve], *, mean: bool = False) -> ProbabilityTable:
         """Return P and the ends of its interval over the levels of some curves.
 
         The model answers once at each node; scatter of the shaking about the curve's measure is a
@@ -270,7 +270,7 @@ class ModelBlocks:
                 part = table[draws] if mean else table[draws, :, some]
                 for i, weight in enumerate(self.shaking.weight):
                     part += weight * bands[..., i * each : i * each + size]
-        return BlockTable(low, step, table)
+        return ProbabilityTable(low, step, table)
 
     def outside(self, levels: FloatArray) -> NDArray[np.bool_]:
         """Return where median blocks and levels are outside the model's domain, (m, n)."""

@@ -30,7 +30,7 @@ NOTABLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Shaking:
+class LevelShaking:
     """How a model reads a level of a curve: as the measure at level · shift, with weights.
 
     Args:
@@ -48,7 +48,7 @@ class Shaking:
     warnings: tuple[str, ...]
 
     @classmethod
-    def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> Shaking:
+    def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> LevelShaking:
         """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
         warnings = list(curve.warnings)
         name, factor, spread = _measure(

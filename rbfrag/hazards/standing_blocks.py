@@ -17,7 +17,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards.annual_rate import FailureRate, Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_thresholds import JointThresholds
-from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
+from rbfrag.hazards.model_blocks import ModelBlocks, ProbabilityTable
 from rbfrag.hazards.shaking import ends_in_words
 from rbfrag.solver.results import FloatArray
 
@@ -70,7 +70,7 @@ class StandingBlocks:
     any_fails: Fragility
     coarse: Fragility | None = None
     thresholds: JointThresholds | None = None
-    each: BlockTable | None = None
+    each: ProbabilityTable | None = None
     of_model: ModelBlocks | None = None
 
     @classmethod
@@ -87,13 +87,13 @@ class StandingBlocks:
     def of_blocks(cls, blocks: ModelBlocks, curves: list[HazardCurve]) -> StandingBlocks:
         """Return blocks that a model answers for, over the levels of some curves."""
         table, count, law = blocks.tabled(curves), blocks.count, blocks.model.dependence
-        any_of = BlockTable(table.low, table.step, _rows(bounds(table.values)))
+        any_of = ProbabilityTable(table.low, table.step, _rows(bounds(table.values)))
         thresholds = each = None
         placement = blocks.placement()
         if count > 1 and law is not None and placement is not None:
             thresholds = JointThresholds.of(table, placement, law)
             if thresholds.every is not None:
-                each = BlockTable(table.low, table.step, table.values[0, 0])
+                each = ProbabilityTable(table.low, table.step, table.values[0, 0])
         laws = (*((COPULA,) if thresholds is not None else ()), *_laws(count))
         return cls(count, blocks.weight, laws, any_of.fine, any_of.coarse, thresholds, each, blocks)
 

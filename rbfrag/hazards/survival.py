@@ -16,7 +16,7 @@ from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.hazards.model_blocks import ModelBlocks, RateKeywords
-from rbfrag.hazards.shaking import NOTABLE, Shaking
+from rbfrag.hazards.shaking import NOTABLE, LevelShaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
 from rbfrag.question.fields import AnsweringFields
@@ -185,7 +185,7 @@ def survival(
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     if fragility is None:
-        shaking = Shaking.of(each[0], **meaning)
+        shaking = LevelShaking.of(each[0], **meaning)
         known = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
         blocks = StandingBlocks.of_blocks(known, each)
     elif not given:

@@ -32,7 +32,7 @@ from rbfrag.motions.formats import (
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import cut_number, decoded, read_text
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 from rbfrag.motions.text.times import first_sample_time
 from rbfrag.motions.units import acceleration_unit, unit_in_g
 
@@ -171,7 +171,7 @@ def _read(
         raise MotionFileError(file, f"{error}; export the record again") from None
 
 
-def _motion(file: RecordFile, trace: Trace, **place: Any) -> GroundMotion:
+def _motion(file: RecordFile, trace: ParsedTrace, **place: Any) -> GroundMotion:
     factor = trace.scale * _unit_in_g(file, trace.unit)
     missing = file.missing_samples(trace.count, trace.values.size) if trace.count else ""
     is_partial = trace.is_partial or bool(missing)
@@ -205,11 +205,11 @@ def _motion(file: RecordFile, trace: Trace, **place: Any) -> GroundMotion:
     )
 
 
-def _unit_in_g(file: RecordFile, field: Field | None) -> float:
+def _unit_in_g(file: RecordFile, field: HeaderField | None) -> float:
     """How many g the header's unit is, or else the caller's; both may not differ."""
     if field is None:
         file.require_units()
-        field = Field(file.units or "", 1)
+        field = HeaderField(file.units or "", 1)
     try:
         in_g = stated_in_g(field.text)
     except InputError as error:

@@ -129,7 +129,7 @@ def written_numbers(axis: Axis, *digits: float) -> None:
     """Write numbers of these leading digits beside a logarithmic axis, powers of ten if need be."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    class Numbers(LogLocator):
+    class LeadingDigits(LogLocator):
         """Of many decades the powers of ten alone: with other digits matplotlib shows nothing."""
 
         def tick_values(self, vmin: float, vmax: float) -> Any:
@@ -137,7 +137,7 @@ def written_numbers(axis: Axis, *digits: float) -> None:
             self.set_params(subs=digits if high < _MOST_DECADES * low else (1.0,))
             return super().tick_values(low, high)
 
-    axis.set_major_locator(Numbers())
+    axis.set_major_locator(LeadingDigits())
     axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value)))
     axis.set_minor_formatter(NullFormatter())
 

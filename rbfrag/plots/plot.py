@@ -158,7 +158,7 @@ class _OneCurve(TypedDict, total=False):
     sa_g: Mapping[float, float] | None
 
 
-class CurveKeywords(
+class FragilityCurveKeywords(
     BlockKeywords[float | None],
     ShakingFields[float | None],
     AnsweringFields,
@@ -176,7 +176,7 @@ def curve(
     *,
     over: str | None = None,
     beside: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
-    **question: Unpack[CurveKeywords],
+    **question: Unpack[FragilityCurveKeywords],
 ) -> Picture:
     """Draw the fragility curve of one block over a measure of the shaking, with two bands.
 
@@ -348,7 +348,7 @@ def response(
     )
 
 
-class Planes(TypedDict, total=False):
+class ModePlanes(TypedDict, total=False):
     """The planes that modes are drawn for, and blocks to show on them."""
 
     phi_deg: Required[float]
@@ -359,7 +359,7 @@ class Planes(TypedDict, total=False):
     alpha3_deg: ArrayLike | None
 
 
-def modes(out: Out = None, **planes: Unpack[Planes]) -> Picture:
+def modes(out: Out = None, **planes: Unpack[ModePlanes]) -> Picture:
     """Draw failure modes and yield accelerations over the block angles α1 and α3.
 
     Args:

@@ -13,7 +13,7 @@ import numpy as np
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.rockmasses.counts import (
-    Crossing,
+    EqualCounts,
     crossings,
     cumulative_counts,
     mode_counts,
@@ -91,7 +91,7 @@ def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path
     return canvas.save_figure(figure, path)
 
 
-def _with_error(crossing: Crossing) -> str:
+def _with_error(crossing: EqualCounts) -> str:
     error = crossing.standard_error_g
     return f"{crossing.pga_g:.3f}{f' ± {error:.3f}' if math.isfinite(error) else ''} g"
 

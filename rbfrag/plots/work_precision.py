@@ -17,7 +17,7 @@ PEERS = ("#7f7f7f", "#e08214", "#b35806", "#8c6d31", "#c44e52", "#7b3294")
 MARKERS = ("s", "D", "^", "v", "P", "X")
 
 
-class Point(Protocol):
+class WorkPoint(Protocol):
     """What the figure needs to know of one method at one setting."""
 
     @property
@@ -50,7 +50,7 @@ class Point(Protocol):
 
 
 @canvas.in_own_style
-def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -> None:
+def plot_work_precision(points: Sequence[WorkPoint], path: str | os.PathLike[str]) -> None:
     """Draw time against error, a marker per method and setting, and write it to `path`.
 
     The marker is at the median error, a thin bar reaches to the worst. Open markers had

@@ -37,7 +37,7 @@ from rbfrag.question.shapes import (
     SHAPES,
     SIDES_AND_PLANES,
     WAYS,
-    Judged,
+    ModeShapes,
     check_ranges,
     numbers_of_shape,
     shape_among,
@@ -356,7 +356,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     listener = _One(shape.remarks)
     numbers_read = numbers_of_shape(
         facts,
-        Judged(
+        ModeShapes(
             shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
             finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
         ),

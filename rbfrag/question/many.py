@@ -34,7 +34,7 @@ from rbfrag.question.shapes import (
     PLANES,
     RECTANGLE,
     SHAPES,
-    Judged,
+    ModeShapes,
     check_ranges,
     numbers_of_shape,
     shape_among,
@@ -357,7 +357,7 @@ class _Sorted:
                 else _FACTS[requested]
             )
             self.kinds[of_these] = _FACTS.index(facts)
-            judged = Judged(
+            judged = ModeShapes(
                 blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
                 _at(back, here), _at(taken, here), self.backed, bool(self.bond.get("cohesion_pa")),
             )  # fmt: skip

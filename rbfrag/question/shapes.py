@@ -123,7 +123,7 @@ class Listener(Protocol):
         """Say what is to be known of the answer where it holds."""
 
 
-class Judged(NamedTuple):
+class ModeShapes(NamedTuple):
     """Shapes of one mode: numbers, or arrays of shape (m,).
 
     Args:
@@ -226,7 +226,7 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
 
 def numbers_of_shape(
     facts: KindFacts,
-    judged: Judged,
+    judged: ModeShapes,
     displacement_m: Any,
     stated: Mapping[str, Any],
     listener: Listener,
@@ -289,7 +289,7 @@ def numbers_of_shape(
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
 
 
-def _of_slumps(judged: Judged, functions: Elementwise[Any]) -> dict[str, Any]:
+def _of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[str, Any]:
     body = judged.body
     trigonometry: Any = math
     if not isinstance(body, Block):

@@ -41,7 +41,7 @@ class ModeCount:
 
 
 @dataclass(frozen=True)
-class Crossing:
+class EqualCounts:
     """A PGA at which two modes have lost equally many blocks.
 
     Args:
@@ -103,7 +103,7 @@ def cumulative_counts(
     return np.searchsorted(sorted_yields(realisations, mode), pga_g, side="right").astype(np.int64)
 
 
-def crossings(realisations: Realisations) -> list[Crossing]:
+def crossings(realisations: Realisations) -> list[EqualCounts]:
     """Return where the cumulative counts of two modes cross, by rising PGA.
 
     A crossing lies between two ranges of PGA in which one mode and then the other leads by more
@@ -120,7 +120,7 @@ def crossings(realisations: Realisations) -> list[Crossing]:
     return sorted(all_crossings, key=lambda crossing: crossing.pga_g)
 
 
-def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) -> list[Crossing]:
+def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) -> list[EqualCounts]:
     k = np.unique(np.concatenate([a, b]))
     count_a = np.searchsorted(a, k, side="right")
     count_b = np.searchsorted(b, k, side="right")
@@ -136,7 +136,7 @@ def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) ->
         turned = steps[np.sign(lead[steps]) != np.sign(lead[steps - 1])]
         middle = int(turned[turned.size // 2])
         result.append(
-            Crossing(
+            EqualCounts(
                 below=first if before > 0 else second,
                 above=second if before > 0 else first,
                 pga_g=float(k[middle]),

@@ -37,7 +37,7 @@ QUANTILES = (0.5, 0.95)
 
 
 @dataclass(frozen=True)
-class Share:
+class CountedShare:
     """A counted share with the interval that the finite number of blocks leaves."""
 
     value: float
@@ -45,7 +45,7 @@ class Share:
     high: float
 
     @classmethod
-    def of(cls, count: int, total: int, level: float) -> Share:
+    def of(cls, count: int, total: int, level: float) -> CountedShare:
         """Return the share of a count in a total."""
         return cls(count / total, *exact_interval(count, total, level))
 
@@ -75,8 +75,8 @@ class ModeFailures:
     count: int
     outcomes: Mapping[str, int]
     moved: int
-    of_all: Share
-    of_mode: Share | None
+    of_all: CountedShare
+    of_mode: CountedShare | None
     open_of_all: float
     displacement_m: dict[str, float] | None
 
@@ -142,8 +142,8 @@ def _count(
         count=count,
         outcomes=outcomes,
         moved=int(np.count_nonzero(chosen & shaken.moves[i] & (code != AT_REST))),
-        of_all=Share.of(outcomes["fails"], n, level),
-        of_mode=Share.of(outcomes["fails"], count, level) if count else None,
+        of_all=CountedShare.of(outcomes["fails"], n, level),
+        of_mode=CountedShare.of(outcomes["fails"], count, level) if count else None,
         open_of_all=sum(outcomes[name] for name in OPEN) / n,
         displacement_m=_quantiles(slid) if slid.size else None,
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmasses.counts import Crossing, ModeCount
+from rbfrag.rockmasses.counts import EqualCounts, ModeCount
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.scenario import Average, Scenario
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName
@@ -28,7 +28,7 @@ NEAR_LIMIT = 0.01
 def as_dict(
     realisations: Realisations,
     counts: Mapping[ModeName, ModeCount],
-    crossings: list[Crossing],
+    crossings: list[EqualCounts],
     answer: Scenario | None = None,
     shaking: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:

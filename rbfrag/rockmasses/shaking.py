@@ -93,7 +93,7 @@ class FailureLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Shaking:
+class ScaledMotion:
     """One recorded motion at several scales.
 
     Args:
@@ -130,7 +130,7 @@ class BlocksToRun:
     numbers: Mapping[str, FloatArray]
     back_fracture: bool
     moves: NDArray[np.bool_]
-    shaking: Shaking
+    shaking: ScaledMotion
     limits: FailureLimits
 
 
@@ -231,7 +231,7 @@ class ShakingPlan:
     """
 
     realisations: Realisations
-    shaking: Shaking
+    shaking: ScaledMotion
     limits: FailureLimits
     code: NDArray[np.int8]
     moves: NDArray[np.bool_]
@@ -345,7 +345,7 @@ def plan_shaking(
     if wrong or not len(scales):
         complaint = f"scale {wrong[0]:g}" if wrong else "no scale"
         raise InputError(f"{complaint}: give factors on the motion above 0, such as 0.5,1,2")
-    shaking = Shaking(motion, tuple(sorted(set(map(float, scales)))), vertical, polarity)
+    shaking = ScaledMotion(motion, tuple(sorted(set(map(float, scales)))), vertical, polarity)
     if realisations.n * len(shaking.scales) > MOST_OUTCOMES:
         raise InputError(
             f"{realisations.n} realisations at {len(shaking.scales)} scales are more than "

@@ -23,7 +23,7 @@ from rbfrag.service.guard import Guard
 from rbfrag.service.problem import answer_error, documented
 from rbfrag.service.reading import Bodies, QueryRoute
 from rbfrag.service.request_records import CONTENT_TYPE, Metrics
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool
 from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.models import model_of_kind
@@ -65,7 +65,7 @@ class PageFiles(StaticFiles):
         return response
 
 
-def make_app(settings: Settings) -> FastAPI:
+def make_app(settings: ServiceSettings) -> FastAPI:
     """Return the application."""
     pool = WorkerPool(settings.jobs, settings.time_limit)
 

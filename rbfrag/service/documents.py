@@ -247,7 +247,7 @@ class SiteRate(_Document):
     probability: float
 
 
-class HazardAnswer(_Document):
+class HazardDocument(_Document):
     """Annual rates of toppling [1/a]: what `rbfrag hazard` prints as JSON."""
 
     model: str

@@ -9,7 +9,7 @@ from typing import Any
 
 from rbfrag.service.problem import problem
 from rbfrag.service.request_records import Metrics, log_request
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -29,7 +29,7 @@ _HEADERS = [
 class Guard:
     """An ASGI application around another that asks for the token, measures and logs."""
 
-    def __init__(self, app: Application, settings: Settings, metrics: Metrics) -> None:
+    def __init__(self, app: Application, settings: ServiceSettings, metrics: Metrics) -> None:
         self._app = app
         self._token = None if settings.token is None else settings.token.encode()
         self._origins = {origin.lower().encode() for origin in settings.allow_origin}

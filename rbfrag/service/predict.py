@@ -15,7 +15,7 @@ from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows
 from rbfrag.service.problem import READ, SENT
 from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool, in_thread
 
 ELEMENTS_BESIDE = 20_000
@@ -68,7 +68,7 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     return json_text({n: v.tolist() if hasattr(v, "tolist") else v for n, v in columns.items()})
 
 
-def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
+def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -> None:
     """Add the operations on `/v1/predict`, whose long work is done by a pool."""
 
     @routes.get(

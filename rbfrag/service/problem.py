@@ -20,7 +20,7 @@ from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
 from rbfrag.question.fields import parameter_of
 from rbfrag.service.documents import Problem
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -111,7 +111,7 @@ def problem(
     return Response(body, status, dict(headers or {}), MEDIA_TYPE)
 
 
-def answer_error(request: Request, error: Exception, settings: Settings) -> Response:
+def answer_error(request: Request, error: Exception, settings: ServiceSettings) -> Response:
     """Return the answer to a request that raised an error: the one handler of the service.
 
     Args:
@@ -235,7 +235,7 @@ _URL = re.compile(r"\b(sqlite|postgres(ql)?)(\+\w+)?://[^\s;,]*")
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
 
 
-def in_parameters(words: str, settings: Settings) -> str:
+def in_parameters(words: str, settings: ServiceSettings) -> str:
     """Return a message of the command line in the words of a request.
 
     Options lose their dashes, and the database is not named by its place.
@@ -246,7 +246,7 @@ def in_parameters(words: str, settings: Settings) -> str:
     return _OPTION.sub(lambda option: option[1].replace("-", "_"), words)
 
 
-def _places(settings: Settings) -> Sequence[str]:
+def _places(settings: ServiceSettings) -> Sequence[str]:
     place = os.fspath(locate(settings.db))
     places = [place, settings.db or place]
     if "://" not in place:

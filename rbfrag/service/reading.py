@@ -22,7 +22,7 @@ from rbfrag.service.problem import (
     RequestRefusedError,
     refusal,
 )
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 
 MULTIPART = "multipart/form-data"
 
@@ -59,7 +59,7 @@ class Bodies:
     the memory of many at once.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
         self._places = asyncio.Semaphore(settings.bodies_at_once)
 

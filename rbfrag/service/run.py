@@ -12,7 +12,7 @@ from fastapi import FastAPI
 from uvicorn.supervisors import Multiprocess
 
 from rbfrag.errors import InputError
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 
 
 class Workers(Multiprocess):
@@ -102,9 +102,9 @@ def app() -> FastAPI:
     return make_app(_settings())
 
 
-def _settings() -> Settings:
+def _settings() -> ServiceSettings:
     try:
-        chosen = Settings(**json.loads(os.environ.get(VARIABLE, "{}")))
+        chosen = ServiceSettings(**json.loads(os.environ.get(VARIABLE, "{}")))
     except (ValueError, TypeError) as error:
         raise InputError(f"{VARIABLE} cannot be read ({error}): start with  rbfrag serve") from None
     return chosen.checked()

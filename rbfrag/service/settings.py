@@ -12,7 +12,7 @@ from rbfrag.errors import InputError
 
 
 @dataclass(frozen=True)
-class Settings:
+class ServiceSettings:
     """Where a service reads, whom it answers and how much it takes on.
 
     Its fields are the options of `rbfrag serve`, which say what each means, and:
@@ -44,7 +44,7 @@ class Settings:
         """Longest body of a request that is taken."""
         return int(1e6 * self.body_limit_mb)
 
-    def checked(self) -> Settings:
+    def checked(self) -> ServiceSettings:
         """Return the settings of a service that is started: with its token and its names.
 
         Raises:

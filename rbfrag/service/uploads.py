@@ -8,11 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 
 from rbfrag.service import work
-from rbfrag.service.documents import CriticalAnswer, HazardAnswer, RockmassAnswer, SpectrumAnswer
+from rbfrag.service.documents import CriticalAnswer, HazardDocument, RockmassAnswer, SpectrumAnswer
 from rbfrag.service.parameters import CriticalQuery, HazardQuery, RockmassQuery, SpectrumQuery
 from rbfrag.service.problem import SENT, RequestRefusedError
 from rbfrag.service.reading import FILE_FORM, MULTIPART, media_type, sent_as, sent_file
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool
 
 CURVE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,0.0001\n"
@@ -59,7 +59,7 @@ _ACCELEROGRAM = sent_as(
 """An accelerogram in any format that rbfrag reads, as the body itself or as a form's one file."""
 
 
-def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
+def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -> None:
     """Add the operations on files, which a pool works on."""
 
     @routes.post(
@@ -93,7 +93,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
     @routes.post(
         "/v1/hazard",
         summary="Annual rate at which a block topples",
-        response_model=HazardAnswer,
+        response_model=HazardDocument,
         responses=SENT,
         openapi_extra=sent_as(
             {

@@ -33,14 +33,14 @@ from rbfrag.bench.cases import (
 )
 from rbfrag.bench.critical_search import compare_searches, search_runs
 from rbfrag.bench.methods import (
-    Method,
+    BenchMethod,
     methods,
     missing_peers,
     rocking_methods,
     rocking_reference_run,
     taylor_run,
 )
-from rbfrag.bench.peers import Answer
+from rbfrag.bench.peers import PeerAnswer
 from rbfrag.bench.reference import reference, rocking_reference
 from rbfrag.bench.tables import ratio, seconds
 from rbfrag.bench.work_precision import measure
@@ -136,11 +136,11 @@ def test_a_wrong_outcome_and_an_error_are_seen(records: Records) -> None:
     stays = [answer.outcome == "stable" for answer in truth]
     assert len(set(stays)) == 2
 
-    def off(case: object) -> Answer:
-        return Answer("stable", 1.25 * truth[[c is case for c in cases].index(True)].peak_rad)
+    def off(case: object) -> PeerAnswer:
+        return PeerAnswer("stable", 1.25 * truth[[c is case for c in cases].index(True)].peak_rad)
 
-    base = Method("right", "", taylor_run, of_use=True)
-    right, wrong = measure(cases, (base, Method("wrong", "", off)))
+    base = BenchMethod("right", "", taylor_run, of_use=True)
+    right, wrong = measure(cases, (base, BenchMethod("wrong", "", off)))
     assert right.wrong == 0
     assert wrong.wrong == stays.count(False)
     assert wrong.error_median == pytest.approx(0.25)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.extended import double_double as dd
 from benchmarks.extended.toppling import truth
-from rbfrag.bench.cases import Case
+from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.reference import reference
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
@@ -97,7 +97,7 @@ def test_it_agrees_with_two_other_integrators(seed: int, p2: float) -> None:
     for kr in (0.08, 0.15, 0.24):
         mine = truth(drive, p2=p2, kr=kr)
         plain = integrate(drive.time_s, drive.k_h, None, p2=p2, kr=kr)
-        longer = reference(Case(motion, "forward", drive, p2, kr))
+        longer = reference(BenchCase(motion, "forward", drive, p2, kr))
         assert mine.outcome == plain.outcome == longer.outcome
         assert mine.intervals_moved == plain.intervals_moved
         if mine.outcome == "stable":

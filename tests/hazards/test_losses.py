@@ -23,7 +23,7 @@ from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
-from rbfrag.hazards.event_counts import Part, count_part
+from rbfrag.hazards.event_counts import EventYears, count_part
 from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
 from rbfrag.hazards.standing_blocks import normals_by_law
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -182,7 +182,7 @@ def test_sampled_frequencies_are_the_probabilities(tmp_path: Path, seed: int) ->
     blocks = table(y, ["Z9"] * 5 + ["007"] * 2, kr_sigma=[0.0, 0.2, 0.0, 0.0, 0.1, 0.0, 0.0])
     draws = 50_000
     answer = answered(folder, blocks, component="rotd50", seed=seed, samples=1)
-    part = Part(0, answer.portfolio, answer.events, np.empty(0), np.empty(0), draws, seed)
+    part = EventYears(0, answer.portfolio, answer.events, np.empty(0), np.empty(0), draws, seed)
     ((event, shaken),) = event_counts._shaken(part)
     generator = np.random.default_rng(seed)
     p = event_counts._probabilities(part, shaken, generator)(draws)
@@ -291,7 +291,7 @@ def test_parts_of_the_work_change_nothing(
     assert seen == [(212, 212)] or seen[-1][0] == seen[-1][1]
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 7)
 
-    def backwards(parts: Iterator[Part], number: int) -> Iterator[Any]:
+    def backwards(parts: Iterator[EventYears], number: int) -> Iterator[Any]:
         results = [count_part(part) for part in parts]
         assert len(results) == number > 20
         return iter(results[::-1])

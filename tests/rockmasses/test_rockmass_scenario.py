@@ -12,7 +12,7 @@ import pytest
 from rbfrag.errors import DatabaseNotFoundError, InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.question.question import predict
-from rbfrag.rockmasses.counts import Crossing, crossings, mode_counts
+from rbfrag.rockmasses.counts import EqualCounts, crossings, mode_counts
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns
 from rbfrag.rockmasses.scenario import LOCKED, UNCOVERED, scenario
@@ -199,7 +199,7 @@ def test_the_report_is_plain_and_doubts_many_impossible_blocks(
 
 
 def test_an_error_that_cannot_be_told_is_null_in_the_report(made: Realisations) -> None:
-    crossing = Crossing("slump", "slide", 0.3, math.inf, 10.0)
+    crossing = EqualCounts("slump", "slide", 0.3, math.inf, 10.0)
     (told,) = as_dict(made, mode_counts(made), [crossing])["crossings"]
     assert told["standard_error_g"] is None
     assert told["pga_g"] == 0.3

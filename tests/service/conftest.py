@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.service.app import make_app
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from tests.cli.conftest import shell as shell
 
 
@@ -19,5 +19,7 @@ def database(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def client(database: Path) -> Iterator[TestClient]:
-    with TestClient(make_app(Settings(db=str(database))), raise_server_exceptions=False) as found:
+    with TestClient(
+        make_app(ServiceSettings(db=str(database))), raise_server_exceptions=False
+    ) as found:
         yield found

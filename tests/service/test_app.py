@@ -60,11 +60,11 @@ def test_the_reference_answers_where_there_is_no_database(tmp_path, monkeypatch,
     from fastapi.testclient import TestClient
 
     from rbfrag.service.app import make_app
-    from rbfrag.service.settings import Settings
+    from rbfrag.service.settings import ServiceSettings
 
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     monkeypatch.chdir(tmp_path)
-    client = TestClient(make_app(Settings()))
+    client = TestClient(make_app(ServiceSettings()))
     answer = client.get("/v1/predict?p2=3&kr=0.1&pgv=0.6").json()
     assert answer == json.loads(
         shell("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--json").stdout

@@ -10,7 +10,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.service.app import make_app
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.uploads import CURVE
 from rbfrag.service.uploads import ROCK_MASS as TABLES
 from rbfrag.service.uploads import ROCK_MASS_TOML as EXAMPLE_TOML
@@ -25,7 +25,7 @@ TOML = {"content-type": "application/toml"}
 def client():
     """One service for all: its processes take a while to start."""
     # its process may have to compile the kernels first, on a busy machine
-    settings = Settings(db=str(REFERENCE), row_limit=6000, jobs=1, time_limit=300.0)
+    settings = ServiceSettings(db=str(REFERENCE), row_limit=6000, jobs=1, time_limit=300.0)
     with TestClient(make_app(settings)) as found:
         yield found
 

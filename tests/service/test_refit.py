@@ -9,7 +9,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model, save_model
 from rbfrag.errors import DatabaseFailedError
 from rbfrag.service.problem import answer_error, in_parameters
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 
 
 def fitted_anew(database):
@@ -52,7 +52,7 @@ def test_a_database_that_is_gone_is_said_without_its_place(client, database):
 
 
 def test_a_server_is_not_named_in_an_answer():
-    told = Settings(db="postgresql://somebody:secret@db.example.org/rock")
+    told = ServiceSettings(db="postgresql://somebody:secret@db.example.org/rock")
     words = "there is no model 'x' in postgresql+psycopg://somebody:***@db.example.org/rock; it"
     assert in_parameters(words, told) == "there is no model 'x' in the database; it"
     failed = DatabaseFailedError("connection to db.example.org failed")

@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 from rbfrag.errors import InputError
 from rbfrag.service.app import make_app
 from rbfrag.service.run import listener
-from rbfrag.service.settings import VARIABLE, Settings, read_token
+from rbfrag.service.settings import VARIABLE, ServiceSettings, read_token
 from tests.cli.conftest import Shell
 
 TOKEN = "a-token-of-the-tests-0123456789"
@@ -22,7 +22,7 @@ def _no_token(monkeypatch):
 
 @pytest.fixture
 def guarded(database):
-    return TestClient(make_app(Settings(db=str(database), token=TOKEN)))
+    return TestClient(make_app(ServiceSettings(db=str(database), token=TOKEN)))
 
 
 @pytest.mark.parametrize(
@@ -54,14 +54,14 @@ def test_the_page_and_the_health_check_need_none(guarded):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "example.org"])
 def test_other_computers_need_a_token(host, monkeypatch):
     with pytest.raises(InputError, match="the service needs a token"):
-        Settings(host=host).checked()
+        ServiceSettings(host=host).checked()
     monkeypatch.setenv(VARIABLE, TOKEN)
-    assert Settings(host=host).checked().token == TOKEN
+    assert ServiceSettings(host=host).checked().token == TOKEN
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
 def test_this_computer_needs_none(host):
-    settings = Settings(host=host).checked()
+    settings = ServiceSettings(host=host).checked()
     assert settings.token is None
     assert {"localhost", "127.0.0.1", "[::1]"} <= set(settings.allow_host)
 
@@ -91,7 +91,7 @@ def test_a_token_comes_from_a_file(tmp_path):
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
     assert read_token(str(file)) == TOKEN
-    assert TOKEN not in repr(Settings(token_file=str(file)).checked())
+    assert TOKEN not in repr(ServiceSettings(token_file=str(file)).checked())
     for bad in ("", "short", "with a blank in between", "é" * 20):
         file.write_text(bad)
         with pytest.raises(InputError):
@@ -99,7 +99,7 @@ def test_a_token_comes_from_a_file(tmp_path):
 
 
 def test_a_service_without_a_token_is_asked_by_its_own_names_only(database):
-    settings = Settings(db=str(database), allow_host=("localhost", "127.0.0.1", "[::1]"))
+    settings = ServiceSettings(db=str(database), allow_host=("localhost", "127.0.0.1", "[::1]"))
     client = TestClient(make_app(settings))
     for host in ("localhost", "localhost:8000", "127.0.0.1:8000", "[::1]:8000", "LOCALHOST"):
         assert client.get(PATH, headers={"host": host}).status_code == 200
@@ -109,9 +109,11 @@ def test_a_service_without_a_token_is_asked_by_its_own_names_only(database):
 
 def test_pages_elsewhere_may_not_read_answers_unless_they_are_named(database):
     asking = {"origin": "https://maps.example.org"}
-    closed = TestClient(make_app(Settings(db=str(database))))
+    closed = TestClient(make_app(ServiceSettings(db=str(database))))
     assert "access-control-allow-origin" not in closed.get(PATH, headers=asking).headers
-    named = Settings(db=str(database), token=TOKEN, allow_origin=("https://maps.example.org",))
+    named = ServiceSettings(
+        db=str(database), token=TOKEN, allow_origin=("https://maps.example.org",)
+    )
     client = TestClient(make_app(named))
     before = {**asking, "access-control-request-method": "POST",
               "access-control-request-headers": "authorization"}  # fmt: skip

@@ -60,7 +60,7 @@ def critical(
         Given, fields_of("p2", ShapeFields, PlaneFields, WholeFields, without=("kind",))
     ],
     direction: options.Direction,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     searched: Searched,
     full_map: bool = option(
         "Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",

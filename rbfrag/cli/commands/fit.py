@@ -31,7 +31,7 @@ class Data:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stored:
+class ModelOptions:
     """How the model is stored, and what its bootstrap draws."""
 
     name: str | None = option("Name of the model. Default: method-term.")
@@ -70,7 +70,7 @@ def fit(
     free_m: bool = option(
         "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).", False
     ),
-    stored: Stored,
+    stored: ModelOptions,
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:

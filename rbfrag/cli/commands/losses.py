@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.commands.simulate import Workers
+from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.hazard_sentences import losses_in_words, rounded_values
 from rbfrag.cli.output import (
     ProgressBar,
@@ -23,7 +23,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, option, stacked
 
 if TYPE_CHECKING:
-    from rbfrag.hazards.event_counts import Part, PartCounts
+    from rbfrag.hazards.event_counts import EventYears, PartCounts
     from rbfrag.hazards.losses import LossAnswer
 
 EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
@@ -45,7 +45,7 @@ AFTER_A_DEATH = "run the same command again"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Files:
+class JobFileOptions:
     """The exports of one job."""
 
     gmf_data: str | None = option("File of ground motion fields.", metavar="FILE")
@@ -100,7 +100,7 @@ class Meaning:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class LossTable:
     """The table of blocks."""
 
     blocks: str = option(
@@ -120,12 +120,12 @@ def losses(
         None,
         metavar="[FOLDER]",
     ),
-    table: Table,
-    files: Files,
+    table: LossTable,
+    files: JobFileOptions,
     time: Time,
     sampling: Sampling,
     meaning: Meaning,
-    workers: Workers,
+    workers: WorkerOptions,
     answering: options.Answering,
     out: str | None = option("Write the table of events (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
@@ -174,7 +174,7 @@ class _Workers:
         check_workers(jobs, scheduler)
         self._jobs, self._scheduler = jobs, scheduler
 
-    def __call__(self, parts: Iterator[Part], number: int) -> Iterator[PartCounts]:
+    def __call__(self, parts: Iterator[EventYears], number: int) -> Iterator[PartCounts]:
         from rbfrag.campaign.executors.local import executor
         from rbfrag.hazards.event_counts import count_part
 

@@ -49,7 +49,7 @@ app = command_group(
 def add(
     *,
     paths: list[str] = argument("Files, or folders to search.", metavar="PATHS..."),
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     suite: str | None = option("Put the motions into this suite."),
     metadata: str | None = option(
         "Table with the columns file, trace_index, event_id, units, is_vertical, "
@@ -148,7 +148,7 @@ def list_motions(
 @stacked
 def show(
     motion: options.Motion,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
     *,
@@ -198,7 +198,7 @@ def show(
 def export(
     *,
     motions: options.Motions,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     out: str = option("File to write.", ..., metavar="FILE"),
     file_format: str | None = option(
         "csv (several motions, every label) or at2 (one motion). Default: what FILE ends in.",

@@ -165,7 +165,7 @@ def plot_spectrum(
     *,
     motions: options.Motions,
     out: Out,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     p2: str = option("The figure spans at least these p² [1/s²].", "0.1,30"),
     polarity: options.Polarity = "both",
     db: options.Db = None,
@@ -190,7 +190,7 @@ def plot_response(
     out: Out,
     given: Annotated[Given, fields_of("p2", "kr", ShapeFields, PlaneFields, WholeFields)],
     direction: options.Direction,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     db: options.Db = None,
 ) -> None:
     """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""

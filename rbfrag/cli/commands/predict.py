@@ -26,7 +26,7 @@ EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class RecordOptions:
     """The accelerogram itself."""
 
     motion: str | None = option(
@@ -38,7 +38,7 @@ class Record:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class BatchOptions:
     """A table of blocks, and one of answers."""
 
     blocks: str | None = option(
@@ -66,9 +66,9 @@ def predict(
     measures: options.Measures,
     request: Annotated[Given, fields_of(RequestFields)],
     block_draws: options.BlockDraws = None,
-    record: Record,
-    reading: options.Reading,
-    table: Table,
+    record: RecordOptions,
+    reading: options.ReadingOptions,
+    table: BatchOptions,
     printing: options.Printing,
 ) -> None:
     """Print the probability that a block fails.

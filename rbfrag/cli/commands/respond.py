@@ -89,7 +89,7 @@ class Directions(options.Direction):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Draws:
+class BlockDrawOptions:
     """What the block may be, and how many of it are run."""
 
     draws: int | None = option(
@@ -106,7 +106,7 @@ class Draws:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Files:
+class ResponseFiles:
     """What is written."""
 
     csv: str | None = option("Write the motion of the block in time.")
@@ -142,10 +142,10 @@ def respond(
         ),
     ],
     model: Model,
-    drawn: Draws,
+    drawn: BlockDrawOptions,
     direction: Directions,
-    files: Files,
-    reading: options.Reading,
+    files: ResponseFiles,
+    reading: options.ReadingOptions,
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
@@ -255,7 +255,7 @@ def respond(
 
 
 def _possible(
-    drawn: Draws, given: Given, kind: str | None
+    drawn: BlockDrawOptions, given: Given, kind: str | None
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the keywords that say what the one block may be, and warnings."""
     if drawn.block_draws is not None:

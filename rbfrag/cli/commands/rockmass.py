@@ -95,7 +95,7 @@ class ShakenBy(options.Direction):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class LimitOptions:
     """What counts as failure."""
 
     displacement: float | None = option(
@@ -109,7 +109,7 @@ class Limits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Files:
+class RockMassFiles:
     """What is written."""
 
     out: str | None = option(
@@ -130,11 +130,11 @@ def rockmass(
     ),
     drawn: Drawn,
     shaken: ShakenBy,
-    limits: Limits,
+    limits: LimitOptions,
     measures: options.Measures,
     answering: options.Answering,
-    reading: options.Reading,
-    files: Files,
+    reading: options.ReadingOptions,
+    files: RockMassFiles,
     printing: options.Printing,
 ) -> None:
     """Draw blocks from two fracture sets; print their modes and yields.

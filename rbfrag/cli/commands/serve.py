@@ -16,7 +16,7 @@ EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class RequestLimits:
     """What a request may take."""
 
     body_limit_mb: float = option("Longest body of a request [MB].", 16.0)
@@ -29,7 +29,7 @@ class Limits:
 @stacked
 def serve(
     *,
-    limits: Limits,
+    limits: RequestLimits,
     db: options.Db = None,
     host: str = option("Address to listen at; any but loopback needs a token.", "127.0.0.1"),
     port: int = option("Port to listen at; 0 for any that is free.", 8000),

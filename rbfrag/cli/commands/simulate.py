@@ -34,7 +34,7 @@ RECOVERY = "recovery"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workers:
+class WorkerOptions:
     """Who does the work."""
 
     jobs: options.Jobs = None
@@ -44,7 +44,7 @@ class Workers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Blocks:
+class BlockOptions:
     """Which blocks are run, and what counts as their failure; each kind has its own."""
 
     p2: str | None = option(
@@ -87,7 +87,7 @@ class Sequence:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stored:
+class StorageOptions:
     """What is stored of each motion."""
 
     vertical: str = option(
@@ -115,11 +115,11 @@ class Stored:
 @stacked
 def simulate(
     *,
-    workers: Workers,
+    workers: WorkerOptions,
     suite: options.Suite = None,
     kind: str = option("What the blocks do: toppling, rocking, slumping or sliding.", "toppling"),
-    blocks: Blocks,
-    stored: Stored,
+    blocks: BlockOptions,
+    stored: StorageOptions,
     sequence: Sequence,
     db: options.Db = None,
     printing: options.Printing,

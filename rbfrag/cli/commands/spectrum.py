@@ -22,7 +22,7 @@ EXAMPLE = "Example:  rbfrag spectrum record.AT2 --polarity both --plot spectrum.
 def spectrum(
     *,
     motions: options.Motions,
-    reading: options.Reading,
+    reading: options.ReadingOptions,
     p2: str = option("Frequency parameters p² [1/s²], separated by commas.", "30,10,3,1,0.3,0.1"),
     polarity: options.Polarity = "forward",
     csv: str | None = option("Write the values (.csv, .xlsx or .parquet)."),

@@ -5,18 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rbfrag.cli.parameters.options import Direction, Reading
+from rbfrag.cli.parameters.options import Direction, ReadingOptions
 
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
     from rbfrag.db.vertical_pairs import VerticalPair
     from rbfrag.motions.ground_motion import GroundMotion
 
-AS_STATED = Reading()
+AS_STATED = ReadingOptions()
 
 
 def find_motion(
-    text: str, *, db: str | None, reading: Reading = AS_STATED, allow_partial: bool = False
+    text: str, *, db: str | None, reading: ReadingOptions = AS_STATED, allow_partial: bool = False
 ) -> GroundMotion:
     """Return the motion that a MOTION argument means.
 
@@ -65,7 +65,7 @@ def _is_id(text: str) -> bool:
 
 
 def find_shaking(
-    text: str, direction: Direction, *, db: str | None, reading: Reading
+    text: str, direction: Direction, *, db: str | None, reading: ReadingOptions
 ) -> tuple[GroundMotion, GroundMotion | None, list[str]]:
     """Return the motion that a MOTION argument means, its vertical one, and what to warn of.
 

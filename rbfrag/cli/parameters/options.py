@@ -115,7 +115,7 @@ class Printing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class ReadingOptions:
     """What a text file of an accelerogram leaves open."""
 
     units: str | None = option(

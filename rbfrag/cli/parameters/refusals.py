@@ -34,7 +34,7 @@ MEASURES = _options(ShakingFields)
 ONCE = "a block is described once"
 
 
-class Conflict(NamedTuple):
+class OptionConflict(NamedTuple):
     """Options of which none goes with any of some others.
 
     Args:
@@ -74,40 +74,48 @@ OF_TABLES = ("hazard", "survival", "shakemap", "nrml", "pelicun")
 """Commands in which a table says all of its blocks; in predict some may be said of all rows."""
 
 CONFLICTS = (
-    Conflict((*FILES, "--rockmass"), NUMBERS, ONCE),
-    Conflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
-    Conflict(tuple(each for each in SHAPE if each != "--gamma"), FILES, "the file has the shape"),
-    Conflict(("--polygon",), ("--block",), ONCE),
-    Conflict(TABLES, (*SHAPE, *FILES), ONCE),
-    Conflict(("--mesh",), (*SHAPE, *FILES), ONCE),
-    Conflict(
+    OptionConflict((*FILES, "--rockmass"), NUMBERS, ONCE),
+    OptionConflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
+    OptionConflict(
+        tuple(each for each in SHAPE if each != "--gamma"), FILES, "the file has the shape"
+    ),
+    OptionConflict(("--polygon",), ("--block",), ONCE),
+    OptionConflict(TABLES, (*SHAPE, *FILES), ONCE),
+    OptionConflict(("--mesh",), (*SHAPE, *FILES), ONCE),
+    OptionConflict(
         ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
     ),
-    Conflict(
+    OptionConflict(
         ("--template",),
         (*SHAPE, *FILES, *PLANES, "--cohesion", "--density", "--kv", "--mesh", "--plot"),
         "it is an empty table",
     ),
-    Conflict(("--block-draws",), ("--blocks",), "one question is about one block"),
-    Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
-    Conflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
-    Conflict(
+    OptionConflict(("--block-draws",), ("--blocks",), "one question is about one block"),
+    OptionConflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
+    OptionConflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
+    OptionConflict(
         ("--vertical", "--map"),
         ("--sequence",),
         "two motions are two horizontal ones, and no map is made of them",
         ("simulate",),
     ),
-    Conflict(("--polarity",), ("--reverse",), "one of them is enough"),
-    Conflict(
+    OptionConflict(("--polarity",), ("--reverse",), "one of them is enough"),
+    OptionConflict(
         (*PLANES, "--cohesion", "--kv"),
         ("--mesh",),
         "a mesh stands free on level ground, in the pose that it was measured in",
     ),
-    Conflict(("--rockmass",), ("--blocks",), "one of them is enough"),
-    Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
-    Conflict((*FRICTION, "--motion"), ("--blocks",), "the table has the blocks", ("predict",)),
-    Conflict(("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"),
-    Conflict(
+    OptionConflict(("--rockmass",), ("--blocks",), "one of them is enough"),
+    OptionConflict(
+        PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")
+    ),
+    OptionConflict(
+        (*FRICTION, "--motion"), ("--blocks",), "the table has the blocks", ("predict",)
+    ),
+    OptionConflict(
+        ("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"
+    ),
+    OptionConflict(
         ("--motion",),
         MEASURES,
         "give the accelerogram, or the measures that a fragility model answers for",

@@ -17,10 +17,10 @@ from rbfrag.errors import MissingExtraError
 from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns, blank_rows
 from rbfrag.exchange.tables.parts import (
     Dialect,
-    Part,
     Parts,
     Rows,
     TableFile,
+    TablePart,
     Write,
     cells_of,
     columns_to_write,
@@ -89,7 +89,7 @@ def _rows(reader: Any) -> Rows:
 
 def _by_arrow(
     origin: Path, names: Sequence[str], line: int, numeric: Container[str]
-) -> Generator[Part, None, int | None]:
+) -> Generator[TablePart, None, int | None]:
     """Yield parts as long as that goes; return how many rows they have, None for all there are."""
     try:
         arrow, _ = pyarrow()
@@ -119,7 +119,7 @@ def _by_arrow(
             }
             first = above + done + 1
             if batch.num_rows:
-                yield Part(range(first, first + batch.num_rows), cells)
+                yield TablePart(range(first, first + batch.num_rows), cells)
             done += batch.num_rows
     except arrow.ArrowException:
         return done
@@ -152,7 +152,7 @@ def csv_writer(
     writer = csv.writer(file, lineterminator="\n", delimiter=dialect.delimiter)
     writer.writerow([*header, *answers])
 
-    def write_cells(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def write_cells(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         columns = [cells_of(part.cells[name]) for name in header]
         columns += [cells_of(answer[name]) for name in answers]
         if dialect.decimal == ",":
@@ -174,7 +174,7 @@ def csv_writer(
     options = arrow_csv.WriteOptions(include_header=False, batch_size=1 << 16)
     stream = stack.enter_context(partial.open("ab"))
 
-    def write(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def write(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         columns = arrow_columns(arrow, columns_to_write(part, header, numeric), bare=True)
         columns |= {name: arrow_array(arrow, answer[name], bare=True) for name in answers}
         arrow_csv.write_csv(arrow.table(columns), stream, options)

@@ -18,7 +18,7 @@ from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
 from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
 from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
-from rbfrag.exchange.tables.parts import Dialect, Part, TableFile, Write, pyarrow
+from rbfrag.exchange.tables.parts import Dialect, TableFile, TablePart, Write, pyarrow
 from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer
 from rbfrag.files import output_path, reading, written_whole
 
@@ -86,11 +86,11 @@ def _reading(source: Path) -> Iterator[None]:
         raise InputError(f"{source}: not a CSV file: {error}") from None
 
 
-def _of_one_part(part: Part, word: str) -> TableFile:
+def _of_one_part(part: TablePart, word: str) -> TableFile:
     return TableFile([*part.cells], lambda _: iter([part]), word=word)
 
 
-def _given_part(columns: Mapping[str, Any]) -> Part:
+def _given_part(columns: Mapping[str, Any]) -> TablePart:
     """Return columns by name, such as a pandas table, as the rows of a table."""
     cells = {str(name): np.ravel(np.asarray(column)) for name, column in columns.items()}
     if len({column.size for column in cells.values()}) > 1:
@@ -107,7 +107,7 @@ def _given_part(columns: Mapping[str, Any]) -> Part:
             for cell in column.tolist()
         ]
 
-    return Part(range(1, size + 1), {name: as_cells(column) for name, column in cells.items()})
+    return TablePart(range(1, size + 1), {name: as_cells(column) for name, column in cells.items()})
 
 
 def table_writer(
@@ -159,5 +159,5 @@ def write_block_table(
     length = len(next(iter(columns.values())))
     with written_whole(target, "table") as partial, ExitStack() as stack:
         write = table_writer(partial, [*columns], stack=stack)
-        write(Part(range(length), dict(columns)), {})
+        write(TablePart(range(length), dict(columns)), {})
     return target

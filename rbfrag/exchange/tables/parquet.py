@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables import parts
-from rbfrag.exchange.tables.parts import Part, Parts, TableFile, Write, keys, pyarrow
+from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, Write, keys, pyarrow
 
 
 def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
@@ -53,7 +53,7 @@ def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
                     cells[name] = np.array(column, dtype=np.float64)
                 else:
                     cells[name] = column
-            yield Part(lines, cells)
+            yield TablePart(lines, cells)
 
     return TableFile(names, read)
 
@@ -88,7 +88,7 @@ def parquet_writer(
     arrow, parquet = pyarrow()
     open_file: list[Any] = []
 
-    def write(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def write(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         # a column of numbers has no place for a cell that is none: its reason tells of it
         columns = {
             name: part.numbers(name)[0] if name in numeric else part.cells[name] for name in header

@@ -21,7 +21,7 @@ ROWS = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class TablePart:
     """Some rows of a table.
 
     Args:
@@ -57,9 +57,9 @@ class Part:
         return values, faults
 
 
-Parts = Iterator[Part]
+Parts = Iterator[TablePart]
 
-Write = Callable[[Part, Mapping[str, NDArray[Any]]], None]
+Write = Callable[[TablePart, Mapping[str, NDArray[Any]]], None]
 """Writes one part of the table, and its answers."""
 
 Rows = Iterator[tuple[int, Sequence[Any]]]
@@ -148,7 +148,7 @@ def parts_of_rows(
         names: of its columns.
         rows: the rows below them.
         empty: an empty cell; where it is None a row may end before the last column.
-        decimal: as of :class:`Part`.
+        decimal: as of :class:`TablePart`.
     """
     width = len(names)
     while some := list(islice(rows, ROWS)):
@@ -162,7 +162,7 @@ def parts_of_rows(
             kept.append(row)
         columns = map(list, zip(*kept, strict=True))
         lines = [line for line, _ in some]
-        yield Part(lines, dict(zip(keys(names), columns, strict=True)), faults, decimal)
+        yield TablePart(lines, dict(zip(keys(names), columns, strict=True)), faults, decimal)
 
 
 def _number(cell: object, decimal: str) -> float:
@@ -226,7 +226,7 @@ def cells_of(column: Any) -> list[Any]:
 
 
 def columns_to_write(
-    part: Part, header: Sequence[str], numeric: Container[str]
+    part: TablePart, header: Sequence[str], numeric: Container[str]
 ) -> Iterator[tuple[str, Any]]:
     """Yield the columns of a part: numbers as arrays, but for those with a cell that is none."""
     for name in header:

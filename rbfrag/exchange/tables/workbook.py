@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.tables.parts import (
-    Part,
     Parts,
     TableFile,
+    TablePart,
     Write,
     cells_of,
     columns_to_write,
@@ -188,7 +188,7 @@ def workbook_writer(
         cell.data_type = "s"
         return cell
 
-    def write(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+    def write(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         arrays = [column for _, column in columns_to_write(part, header, numeric)]
         arrays += [answer[name] for name in answers]
         columns = [

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.fit.scores import CLIP, Judged
+from rbfrag.fragility.fit.scores import CLIP, ScoredBlocks
 from rbfrag.solver.results import FloatArray
 
 Mask = NDArray[np.bool_]
@@ -75,7 +75,9 @@ def censoring_weights(
     return weights
 
 
-def score_bounds(judged: Judged, probability: FloatArray, chosen: Mask) -> tuple[float, float]:
+def score_bounds(
+    judged: ScoredBlocks, probability: FloatArray, chosen: Mask
+) -> tuple[float, float]:
     """Return the mean log loss of all outcomes, those not known counted as suits best and worst.
 
     Args:

@@ -22,7 +22,7 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
-from rbfrag.fragility.fit.scores import Judged, critical_outcomes
+from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
 from rbfrag.fragility.measures import SPECTRAL, Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -283,13 +283,13 @@ class FitData:
         return len(self.event_names)
 
     @property
-    def judged(self) -> Judged:
+    def judged(self) -> ScoredBlocks:
         """What the fit is judged on."""
         known = np.isfinite(self.failed) & self.scored
         if self.weights is not None:
             known &= self.weights > 0.0
         failed = np.where(known, self.failed, 0.0)
-        return Judged(failed, known, self.event, self.outcomes, self.weights)
+        return ScoredBlocks(failed, known, self.event, self.outcomes, self.weights)
 
     def grid(self, name: str) -> FloatArray:
         """Return a value of the blocks of the grid, shape (n, m)."""

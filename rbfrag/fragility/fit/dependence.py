@@ -59,7 +59,7 @@ class DependenceEstimate:
     seed: int
 
 
-class Blocks(TypedDict):
+class ObservedBlocks(TypedDict):
     """Blocks with what they did, as a dependence is estimated from them; arrays of shape (n,).
 
     Args:
@@ -83,7 +83,7 @@ class Blocks(TypedDict):
 
 
 def estimate_dependence(
-    *, replicates: int = REPLICATES, seed: int = 0, **blocks: Unpack[Blocks]
+    *, replicates: int = REPLICATES, seed: int = 0, **blocks: Unpack[ObservedBlocks]
 ) -> DependenceEstimate:
     """Estimate the copula of failures from predictions and outcomes.
 
@@ -176,7 +176,7 @@ class PairTables:
     own: PairTable
 
     @classmethod
-    def of(cls, *, seed: int = 0, **blocks: Unpack[Blocks]) -> PairTables:
+    def of(cls, *, seed: int = 0, **blocks: Unpack[ObservedBlocks]) -> PairTables:
         """Return the tables of all pairs (see `estimate_dependence`)."""
         numeric = (blocks["probability"], blocks["failed"], blocks["polarity"], blocks["p2"],
                    blocks["y_m_s"])  # fmt: skip

@@ -24,7 +24,7 @@ RESAMPLES = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ScoredBlocks:
     """The blocks that a fit is judged on.
 
     Args:
@@ -126,7 +126,9 @@ def calibration(
     return Calibration(float(b[0]), float(b[1]))
 
 
-def scores_of(judged: Judged, in_sample: FloatArray, held_out: FloatArray) -> dict[str, float]:
+def scores_of(
+    judged: ScoredBlocks, in_sample: FloatArray, held_out: FloatArray
+) -> dict[str, float]:
     """Return the scores of a report.
 
     Args:
@@ -147,7 +149,9 @@ def scores_of(judged: Judged, in_sample: FloatArray, held_out: FloatArray) -> di
     return {name: value for name, value in result.items() if np.isfinite(value)}
 
 
-def score_intervals(judged: Judged, held_out: FloatArray, *, seed: int) -> dict[str, list[float]]:
+def score_intervals(
+    judged: ScoredBlocks, held_out: FloatArray, *, seed: int
+) -> dict[str, list[float]]:
     """Return 95 % intervals of the mean held-out scores, by resampling whole earthquakes."""
     random = np.random.default_rng(seed)
     g = int(judged.event.max()) + 1
@@ -194,7 +198,9 @@ class CalibrationBins:
     events: int
 
 
-def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> CalibrationBins:
+def calibration_bins(
+    judged: ScoredBlocks, held_out: FloatArray, *, seed: int = 0
+) -> CalibrationBins:
     """Sort the blocks of known outcome by the probability that held-out fits gave them.
 
     Args:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.text.record_file import RecordFile, Trace
+from rbfrag.motions.text.record_file import ParsedTrace, RecordFile
 
 FORMAT = "BHRC V1"
 
@@ -30,13 +30,13 @@ _UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10|\S+)", re.IGNORECASE)
 recognises = _BLOCK.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the components of a BHRC file in their order, with one recording id."""
     for index, span in enumerate(file.blocks(_BLOCK)):
         yield _component(file, span, f"component {index}")
 
 
-def _component(file: RecordFile, span: range, name: str) -> Trace:
+def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     points = file.find(span, _POINTS, "number of points")
     count = file.count(points, "number of points", name)
     duration = file.find(span, _DURATION, "duration")
@@ -50,7 +50,7 @@ def _component(file: RecordFile, span: range, name: str) -> Trace:
     azimuth = file.label(
         span, re.compile(rf"\bAzimuth\b.*\b{re.escape(axis)}\s+(\d+(?:\.\d+)?)", re.ASCII)
     )
-    return Trace(
+    return ParsedTrace(
         values,
         dt,
         unit,

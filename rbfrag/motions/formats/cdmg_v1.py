@@ -15,7 +15,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Count, Field, PrintedTimes, RecordFile, Trace
+from rbfrag.motions.text.record_file import (
+    Count,
+    HeaderField,
+    ParsedTrace,
+    PrintedTimes,
+    RecordFile,
+)
 
 FORMAT = "CDMG V1"
 
@@ -46,7 +52,7 @@ _HEAD = re.compile(_BLOCK.pattern + r"(?s:.)*" + _POINTS.pattern, re.IGNORECASE)
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the channels of a V1 file in their order, with one recording id.
 
     A channel of zeros alone belongs to no sensor (the fourth channel of three-axis recorders);
@@ -66,7 +72,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
             yield replace(channel, remarks=remarks)
 
 
-def _channel(file: RecordFile, span: range) -> Trace:
+def _channel(file: RecordFile, span: range) -> ParsedTrace:
     points = file.find(span, _POINTS, "number of points")
     count = file.count(points, "number of points")
     duration = file.find(span, _DURATION, "record length")
@@ -86,7 +92,7 @@ def _channel(file: RecordFile, span: range) -> Trace:
     if not values.any():
         file.missing_samples(count, values.size)
     station = file.optional(span, _STATION)
-    return Trace(
+    return ParsedTrace(
         values,
         dt,
         unit,
@@ -101,8 +107,8 @@ def _channel(file: RecordFile, span: range) -> Trace:
 
 
 def _series(
-    file: RecordFile, at: int, count: Count, duration: Field, above: Field | None
-) -> tuple[float, Field]:
+    file: RecordFile, at: int, count: Count, duration: HeaderField, above: HeaderField | None
+) -> tuple[float, HeaderField]:
     """Return interval [s] and unit of accelerations alone, by the line of an index above them.
 
     Both must agree with what the text lines say, where they say it.
@@ -135,5 +141,5 @@ def _series(
     return dt, unit
 
 
-def _spelling(unit: Field) -> str:
+def _spelling(unit: HeaderField) -> str:
     return unit.text.replace(" ", "").lower()

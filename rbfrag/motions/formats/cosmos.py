@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.text.file import field_layout, finite_number
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "COSMOS V1c/V2c"
 
@@ -44,7 +44,7 @@ _RECORD = re.compile(r"^\|.*\bRcrdId:\s*(\S+)", re.IGNORECASE)
 recognises = _BLOCK.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the accelerations of a COSMOS file in their order."""
     others: list[str] = []
     spans = file.blocks(_BLOCK)
@@ -59,7 +59,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
         raise file.error(f"the file holds {', '.join(others)}: the acceleration is needed")
 
 
-def _trace(file: RecordFile, span: range, series: Field) -> Trace:
+def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
     here = range(series.line - 1, series.line)
     count = file.count(file.find(here, _POINTS, "number of points"), "number of points")
     unit = file.find(here, _UNIT, "unit of acceleration")
@@ -78,7 +78,7 @@ def _trace(file: RecordFile, span: range, series: Field) -> Trace:
     if vertical is None:
         vertical = is_vertical_name(component)
     record = file.label(header, _RECORD)
-    return Trace(
+    return ParsedTrace(
         values,
         dt,
         unit,
@@ -111,7 +111,7 @@ def _interval(file: RecordFile, header: range) -> tuple[float, int]:
     return milliseconds / 1000.0, at + 1
 
 
-def _layout(file: RecordFile, field: Field) -> tuple[int, int]:
+def _layout(file: RecordFile, field: HeaderField) -> tuple[int, int]:
     layout = field_layout(field.text)
     if layout is None:
         raise file.error("the line names no format such as (8F10.3)", field.line)

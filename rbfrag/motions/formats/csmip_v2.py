@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "CSMIP/CDMG V2"
 
@@ -43,7 +43,7 @@ _WIDE_GAP = re.compile(r"\s{2,}")
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the channels of a V2 file in their order, with one recording id."""
     spans = file.blocks(_BLOCK)
     remarks = file.missing_channels(spans[0], len(spans))
@@ -51,7 +51,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
         yield _channel(file, span, f"channel {index}", remarks)
 
 
-def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...]) -> Trace:
+def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...]) -> ParsedTrace:
     points = file.find(span, _POINTS, f"line 'points of accel data' in {name}")
     count = file.count(points, "number of points", name)
     here = range(points.line - 1, points.line)
@@ -70,7 +70,7 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
 
     header = range(span.start, points.line - 1)
     channel = file.find(header, _CHANNEL, f"line 'Chan' in {name}")
-    return Trace(
+    return ParsedTrace(
         values,
         dt,
         unit,
@@ -85,7 +85,7 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
     )
 
 
-def _station(file: RecordFile, number: Field | None) -> str:
+def _station(file: RecordFile, number: HeaderField | None) -> str:
     """Number and name; the name stands at the left of the line after the number."""
     if number is None:
         return ""
@@ -95,7 +95,7 @@ def _station(file: RecordFile, number: Field | None) -> str:
     return f"{number.text} {name}".strip() if not _CHANNEL.match(name) else number.text
 
 
-def _event(file: RecordFile, channel: Field, stop: int) -> str:
+def _event(file: RecordFile, channel: HeaderField, stop: int) -> str:
     """The line after the channel, unless it gives no more than the time of the record."""
     line = file.lines[channel.line].strip() if channel.line < stop else ""
     return "" if line.lower().startswith("rcrd of") else " ".join(line.split())

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from rbfrag.motions.text.file import field_layout
 from rbfrag.motions.text.record_file import (
     Count,
-    Field,
+    HeaderField,
     NamedFields,
+    ParsedTrace,
     PrintedTimes,
     RecordFile,
-    Trace,
 )
 
 FORMAT = "CWB dat"
@@ -32,7 +32,7 @@ _WORD = re.compile(r"[^\s.]+")
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the components of a file in the order of its columns, with one recording id."""
     lines = file.lines
     # one line within the header is blank
@@ -51,10 +51,10 @@ def parse(file: RecordFile) -> Iterator[Trace]:
     length = fields["RecordLength(sec)"]
     stated = file.positive(length, "record length") * frequency_hz
     for component, values in zip(components, table.T[1:], strict=True):
-        yield Trace(
+        yield ParsedTrace(
             values,
             dt,
-            Field(word[0] if word else unit.text, unit.line),
+            HeaderField(word[0] if word else unit.text, unit.line),
             Count(stated, length.line),
             component,
             times=PrintedTimes(table[:, 0], 1.000001 * last_digit_s, first + 1),
@@ -64,7 +64,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
         )
 
 
-def _components(file: RecordFile, sequence: Field) -> list[str]:
+def _components(file: RecordFile, sequence: HeaderField) -> list[str]:
     match = _SEQUENCE.fullmatch(sequence.text)
     if not match:
         raise file.error(
@@ -74,7 +74,7 @@ def _components(file: RecordFile, sequence: Field) -> list[str]:
     return _COLUMN.findall(match[1])
 
 
-def _layout(file: RecordFile, field: Field, columns: int) -> tuple[tuple[int, int], float]:
+def _layout(file: RecordFile, field: HeaderField, columns: int) -> tuple[tuple[int, int], float]:
     """Columns and characters a column of the printed format, and its last digit."""
     layout, decimals = field_layout(field.text), _DECIMALS.search(field.text)
     if layout is None or decimals is None or layout[0] != columns:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.text.file import read_text
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace, positive_number
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, positive_number
 from rbfrag.motions.text.times import sampling_interval
 from rbfrag.motions.units import acceleration_unit
 
@@ -86,7 +86,7 @@ def recognises(head: str) -> bool:
     return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of a delimited text file; such files state no number of samples."""
     lines = file.lines
     start = _first_data_line(lines)
@@ -113,7 +113,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
         if first_s == 0.0:
             remark = ""
     event, station, component = _event_station_component(header)
-    yield Trace(
+    yield ParsedTrace(
         samples,
         dt,
         unit,
@@ -236,7 +236,7 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
         fields = line.split()
         if len(fields) != 2 or fields[0] != path.name:
             continue
-        dt = positive_number(index, Field(fields[1], number), "dt")
+        dt = positive_number(index, HeaderField(fields[1], number), "dt")
         if entry is not None and entry[0] != dt:
             raise MotionFileError(
                 index,
@@ -248,10 +248,10 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
     return entry
 
 
-def _stated_unit(file: RecordFile, header: Header) -> Field | None:
+def _stated_unit(file: RecordFile, header: Header) -> HeaderField | None:
     """The unit of acceleration that the header states, once or alike several times."""
     _check_columns(file, header)
-    stated = [Field(spelling, number) for number, spelling in _spellings(header)]
+    stated = [HeaderField(spelling, number) for number, spelling in _spellings(header)]
     known = [field for field in stated if _is_unit(field.text)]
     for field in known[1:]:
         if acceleration_unit(field.text) != acceleration_unit(known[0].text):

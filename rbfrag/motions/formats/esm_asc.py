@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, RecordFile, Trace
+from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile
 
 FORMAT = "ESM ASC"
 
@@ -15,7 +15,7 @@ _KEY = re.compile(r"[A-Z][^:\s]*:")
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of a file."""
     lines = file.lines
     first = next((at for at, line in enumerate(lines) if not _KEY.match(line)), len(lines))
@@ -27,7 +27,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
             fields["DATA_TYPE"].line,
         )
     dt = file.dt(fields["SAMPLING_INTERVAL_S"])
-    yield Trace(
+    yield ParsedTrace(
         file.table(file.data(first), first + 1, 1, "acceleration")[:, 0],
         dt,
         fields["UNITS"],

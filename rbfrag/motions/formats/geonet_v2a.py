@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "GeoNet V2A"
 
@@ -36,16 +36,16 @@ _HEAD = re.compile(_BLOCK.pattern + r"(?s:.)*Number of points")
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the components of a V2A file in their order, with one recording id."""
     for index, span in enumerate(file.blocks(_BLOCK)):
         yield _component(file, span, f"component {index}")
 
 
-def _component(file: RecordFile, span: range, name: str) -> Trace:
+def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     header = range(span.start, min(span.start + TEXT_LINES, span.stop))
 
-    def field(pattern: re.Pattern[str], what: str) -> Field:
+    def field(pattern: re.Pattern[str], what: str) -> HeaderField:
         return file.find(header, pattern, f"{what} of {name}")
 
     recording = field(_BLOCK, "accelerogram name").text
@@ -75,7 +75,7 @@ def _component(file: RecordFile, span: range, name: str) -> Trace:
     values = file.fixed_width(data[:rows], first + 1, LAYOUT, "acceleration")
     if not is_cut:
         replace(file, allow_partial=False).missing_samples(count, values.size)
-    return Trace(
+    return ParsedTrace(
         values,
         dt,
         unit,

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rbfrag.motions.polarity import FloatArray
-from rbfrag.motions.text.record_file import Count, Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import Count, HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "K-NET/KiK-net ASCII"
 
@@ -39,17 +39,17 @@ _SCALE = re.compile(r"([\d.]+)\s*\(\s*([^)\s]+)\s*\)\s*/\s*([\d.]+)", re.ASCII)
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of a file."""
     fields, first = _header(file)
 
-    def field(name: str) -> Field:
+    def field(name: str) -> HeaderField:
         if name not in fields:
             raise file.error(f"the header has no {name!r}: export the record again", 1)
         return fields[name]
 
     rate = field("Sampling Freq(Hz)")
-    rate = Field(rate.text.removesuffix("Hz").strip(), rate.line)
+    rate = HeaderField(rate.text.removesuffix("Hz").strip(), rate.line)
     frequency_hz = file.positive(rate, "sampling frequency")
     dt = file.agreed_dt(1.0 / frequency_hz, rate.line)
     scale, unit = _scale(file, field("Scale Factor"))
@@ -70,7 +70,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
     if direction in _BOREHOLE:
         remarks.append("this is the borehole sensor, below the surface")
     recorded = fields.get("Record Time", field("Origin Time")).text
-    yield Trace(
+    yield ParsedTrace(
         counts - offset,
         dt,
         unit,
@@ -100,28 +100,28 @@ def _refuse_large(file: RecordFile, counts: FloatArray, first: int) -> None:
                 )
 
 
-def _header(file: RecordFile) -> tuple[dict[str, Field], int]:
+def _header(file: RecordFile) -> tuple[dict[str, HeaderField], int]:
     """Fields by name, and the index of the first line of counts."""
-    fields: dict[str, Field] = {}
+    fields: dict[str, HeaderField] = {}
     for at, line in enumerate(file.lines):
         name = line[:NAME_CHARACTERS].strip()
-        fields[name] = Field(line[NAME_CHARACTERS:].strip(), at + 1)
+        fields[name] = HeaderField(line[NAME_CHARACTERS:].strip(), at + 1)
         if name == LAST_FIELD:
             return fields, at + 1
     raise file.error(f"the header does not end with {LAST_FIELD!r}: export the record again", 1)
 
 
-def _scale(file: RecordFile, field: Field) -> tuple[float, Field]:
+def _scale(file: RecordFile, field: HeaderField) -> tuple[float, HeaderField]:
     """Units of acceleration a count, and the unit."""
     match = _SCALE.fullmatch(field.text)
     if not match:
         raise file.error(
             f"the scale factor {field.text!r} is not of the form 7845(gal)/8223790", field.line
         )
-    numerator = file.positive(Field(match[1], field.line), "scale factor's numerator")
-    denominator = file.positive(Field(match[3], field.line), "scale factor's denominator")
+    numerator = file.positive(HeaderField(match[1], field.line), "scale factor's numerator")
+    denominator = file.positive(HeaderField(match[3], field.line), "scale factor's denominator")
     if numerator > LARGEST_SCALE * denominator:
         raise file.error(
             f"the scale factor {field.text!r} is more than {LARGEST_SCALE:g} a count", field.line
         )
-    return numerator / denominator, Field(match[2], field.line)
+    return numerator / denominator, HeaderField(match[2], field.line)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, RecordFile, Trace
+from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile
 
 FORMAT = "AFAD NSMN text"
 
@@ -21,7 +21,7 @@ _UNIT = re.compile(r"PGA VALUES\s*\(([^)]*)\)", re.IGNORECASE)
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the components of a file in the order of its columns, with one recording id."""
     header = range(min(HEADER_LINES, len(file.lines)))
     columns = file.find(header, _COLUMNS, "line 'N-S E-W U-D'")
@@ -36,7 +36,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
     rows = file.data(columns.line)
     table = file.table(rows, columns.line + 1, len(components), "acceleration")
     for component, values in zip(components, table.T, strict=True):
-        yield Trace(
+        yield ParsedTrace(
             values,
             dt,
             unit,

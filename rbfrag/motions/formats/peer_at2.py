@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "PEER AT2"
 
@@ -40,16 +40,16 @@ def recognises(head: str) -> bool:
     return _sampling(head.split("\n")) is not None
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of an AT2 file."""
     sampling = _sampling(file.lines)
     assert sampling is not None, "parse() is called for recognised text only"
     at, match = sampling
-    count = file.count(Field(match[1], at + 1), "NPTS")
-    dt = file.dt(Field(match[2], at + 1), "DT")
+    count = file.count(HeaderField(match[1], at + 1), "NPTS")
+    dt = file.dt(HeaderField(match[2], at + 1), "DT")
     unit = _unit(file, file.lines[:at])
     event, station, component = _names(file.lines[1] if at >= 2 else "")
-    yield Trace(
+    yield ParsedTrace(
         file.free_numbers(file.lines[at + 1 :], at + 2, "acceleration"),
         dt,
         unit,
@@ -89,7 +89,7 @@ def _sampling(lines: list[str]) -> tuple[int, re.Match[str]] | None:
     return None
 
 
-def _unit(file: RecordFile, header: list[str]) -> Field | None:
+def _unit(file: RecordFile, header: list[str]) -> HeaderField | None:
     for number, line in enumerate(header, 1):
         quantity = _QUANTITY.search(line)
         if quantity and quantity[1].upper() != "ACCELERATION":
@@ -97,7 +97,7 @@ def _unit(file: RecordFile, header: list[str]) -> Field | None:
                 f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is needed", number
             )
         if match := _UNIT.search(line):
-            return Field(match[1], number)
+            return HeaderField(match[1], number)
     return None
 
 

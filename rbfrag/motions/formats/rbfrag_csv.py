@@ -26,7 +26,13 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Count, Field, PrintedTimes, RecordFile, Trace
+from rbfrag.motions.text.record_file import (
+    Count,
+    HeaderField,
+    ParsedTrace,
+    PrintedTimes,
+    RecordFile,
+)
 from rbfrag.motions.text.times import FIRST_YEAR
 
 FORMAT = "rbfrag CSV"
@@ -67,7 +73,7 @@ LARGEST_NUMBER = 1e12
 recognises = re.compile(FIRST_LINE).match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the motions of a file as they were written, bit for bit."""
     for span in file.blocks(re.compile(FIRST_LINE)):
         yield _motion(file, span)
@@ -94,7 +100,7 @@ def _labels(motion: GroundMotion) -> dict[str, object]:
     return {**kept, "dt_s": motion.dt_s, "npts": motion.npts, "samples_sha256": motion.sha256}
 
 
-def _motion(file: RecordFile, span: range) -> Trace:
+def _motion(file: RecordFile, span: range) -> ParsedTrace:
     first = next((at for at in span if file.lines[at].strip() == COLUMNS), None)
     if first is None:
         raise file.error(f"no line {COLUMNS!r} follows: export the motion again", span.start + 1)
@@ -114,10 +120,10 @@ def _motion(file: RecordFile, span: range) -> Trace:
         )
     labels: dict[str, Any] = {"recording": "", "orientation_deg": None, "is_vertical": None}
     labels |= {name: header[name] for name in _LABELS if name in header}
-    return Trace(
+    return ParsedTrace(
         samples,
         dt,
-        Field("g", 1),
+        HeaderField("g", 1),
         Count(header["npts"], first + 1),
         component="",
         times=PrintedTimes(times_s, TIME_ERROR * dt, first + 2),

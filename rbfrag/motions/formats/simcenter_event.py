@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.motions.text.record_file import Count, RecordFile, Trace
+from rbfrag.motions.text.record_file import Count, ParsedTrace, RecordFile
 
 FORMAT = "SimCenter event JSON"
 
@@ -26,7 +26,7 @@ _IS_VERTICAL = {1: False, 3: True}
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the time series of all events in their order."""
     try:
         content = json.loads(file.text)
@@ -62,7 +62,7 @@ def _trace(
     dof_of: dict[Any, Any],
     *,
     first: bool,
-) -> Trace:
+) -> ParsedTrace:
     if not isinstance(series, dict):
         raise file.error(f"{what} is no JSON object")
     component = str(series.get("name", ""))
@@ -101,7 +101,7 @@ def _trace(
     name = str(event.get("name", ""))
     dof = dof_of.get(component)
     vertical = _IS_VERTICAL.get(dof) if isinstance(dof, int) else None
-    return Trace(
+    return ParsedTrace(
         np.array(data, dtype=np.float64),
         dt,
         None,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "GeoNet text (.000/.090/.ver)"
 
@@ -24,7 +24,7 @@ _HEAD = re.compile(
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of a file.
 
     The stem of its name, which the three components share, is the recording id: the file names
@@ -32,10 +32,10 @@ def parse(file: RecordFile) -> Iterator[Trace]:
     """
     head = _HEAD.match(file.text)
     assert head is not None, "parse() is called for recognised text only"
-    count = file.count(Field(head["npts"], 2), "number of points")
-    dt = file.dt(Field(head["dt"], 2))
+    count = file.count(HeaderField(head["npts"], 2), "number of points")
+    dt = file.dt(HeaderField(head["dt"], 2))
     file.require_units("files of this format state")
-    yield Trace(
+    yield ParsedTrace(
         file.free_numbers(file.lines[2:], 3, "acceleration"),
         dt,
         None,

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Field, NamedFields, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, NamedFields, ParsedTrace, RecordFile
 
 FORMAT = "UNAM standard file"
 
@@ -23,7 +23,7 @@ _UNIT = re.compile(r"[^\s(]+")
 recognises = _HEAD.search
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the channels of a file in the order of its columns, with one recording id."""
     top, first = _data_starts(file)
     fields = NamedFields(file, range(top))
@@ -37,7 +37,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
         )
     unit = fields["UNIDADES DE LOS DATOS"]
     word = _UNIT.match(unit.text)
-    unit = Field(word[0] if word else unit.text, unit.line)
+    unit = HeaderField(word[0] if word else unit.text, unit.line)
     dt = file.dt(_same(file, fields["INTERVALO DE MUESTREO, C1-C6"], "sampling interval"))
     stated = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
     count = file.count(stated, "number of samples")
@@ -58,7 +58,7 @@ def parse(file: RecordFile) -> Iterator[Trace]:
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
     for component, values in zip(components, table.T, strict=True):
-        yield Trace(
+        yield ParsedTrace(
             values,
             dt,
             unit,
@@ -90,9 +90,9 @@ def _slashed(text: str) -> list[str]:
     return [part.strip() for part in text.split("/")[1:]]
 
 
-def _same(file: RecordFile, field: Field, what: str) -> Field:
+def _same(file: RecordFile, field: HeaderField, what: str) -> HeaderField:
     """The one value of all channels."""
     values = _slashed(field.text)
     if len(set(values)) != 1:
         raise file.error(f"the channels differ in their {what}: {field.text}", field.line)
-    return Field(values[0], field.line)
+    return HeaderField(values[0], field.line)

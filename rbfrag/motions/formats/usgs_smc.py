@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import MOST_DIGITS, holds_integers
-from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
 
 FORMAT = "USGS SMC"
 
@@ -36,7 +36,7 @@ _EVENT = re.compile(r"^\s*(\d{4}\s+\d{1,2}\s+\d{1,2}\s+\d{4}\s.*)", re.ASCII)
 recognises = _HEAD.match
 
 
-def parse(file: RecordFile) -> Iterator[Trace]:
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the one trace of a file."""
     lines = file.lines
     kind = _HEAD.match(file.text)
@@ -67,10 +67,10 @@ def parse(file: RecordFile) -> Iterator[Trace]:
             )
     values = file.fixed_width(file.data(first), first + 1, LAYOUT, "acceleration")
     header = range(top)
-    yield Trace(
+    yield ParsedTrace(
         values,
         dt,
-        Field(UNIT, 1),
+        HeaderField(UNIT, 1),
         count,
         component=file.find(header, _COMPONENT, "line 'component ='").text,
         station=" ".join(file.label(header, _STATION).split()),
@@ -85,14 +85,14 @@ def _is_corrected(kind: str) -> bool | None:
     return True if "CORRECTED" in kind else None
 
 
-def _value(file: RecordFile, top: int, place: int, per_line: int, width: int) -> Field:
+def _value(file: RecordFile, top: int, place: int, per_line: int, width: int) -> HeaderField:
     row, column = divmod(place - 1, per_line)
     at = top + row
     if at >= len(file.lines):
         raise file.error(
             "the file ends within its header: export the record again", len(file.lines)
         )
-    return Field(file.lines[at][column * width : (column + 1) * width].strip(), at + 1)
+    return HeaderField(file.lines[at][column * width : (column + 1) * width].strip(), at + 1)
 
 
 def _integer(file: RecordFile, top: int, place: int) -> int:

@@ -43,7 +43,7 @@ LONGEST_LINE = 1000
 _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
 
 
-class Field(NamedTuple):
+class HeaderField(NamedTuple):
     """A header field: its value as the file has it, and its line, from 1."""
 
     text: str
@@ -72,7 +72,7 @@ class PrintedTimes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trace:
+class ParsedTrace:
     """One trace as its format's parser returns it.
 
     Args:
@@ -93,7 +93,7 @@ class Trace:
 
     values: FloatArray
     dt_s: float
-    unit: Field | None
+    unit: HeaderField | None
     count: Count | None
     component: str
     scale: float = 1.0
@@ -141,11 +141,11 @@ class RecordFile:
 
     # fields of the header
 
-    def optional(self, span: range, pattern: re.Pattern[str]) -> Field | None:
+    def optional(self, span: range, pattern: re.Pattern[str]) -> HeaderField | None:
         """Return the first match's group 1 among the lines of a span of indices, or None."""
         for at in span:
             if match := pattern.search(self.lines[at][:LONGEST_LINE]):
-                return Field(match[1].strip(), at + 1)
+                return HeaderField(match[1].strip(), at + 1)
         return None
 
     def label(self, span: range, pattern: re.Pattern[str]) -> str:
@@ -153,7 +153,7 @@ class RecordFile:
         field = self.optional(span, pattern)
         return field.text if field else ""
 
-    def find(self, span: range, pattern: re.Pattern[str], what: str) -> Field:
+    def find(self, span: range, pattern: re.Pattern[str], what: str) -> HeaderField:
         """Return the first match's group 1 among the lines of a span, which must have it."""
         field = self.optional(span, pattern)
         if field is None:
@@ -186,11 +186,11 @@ class RecordFile:
 
     # what header and caller must agree on
 
-    def positive(self, field: Field, what: str) -> float:
+    def positive(self, field: HeaderField, what: str) -> float:
         """Return a field's number, which must be above zero."""
         return positive_number(self.path, field, what)
 
-    def count(self, field: Field, what: str, of: str = "") -> Count:
+    def count(self, field: HeaderField, what: str, of: str = "") -> Count:
         """Return the number of samples that a field states, a whole number of at least 1."""
         digits = field.text.removesuffix(".")
         # int() refuses thousands of digits in words of its own
@@ -208,7 +208,7 @@ class RecordFile:
                 fields=("units",),
             )
 
-    def dt(self, field: Field, what: str = "dt") -> float:
+    def dt(self, field: HeaderField, what: str = "dt") -> float:
         """Return the sampling interval [s] that a field states."""
         return self.agreed_dt(self.positive(field, what), field.line)
 
@@ -224,7 +224,7 @@ class RecordFile:
             )
         return dt
 
-    def dt_of_duration(self, duration: Field, npts: float) -> float:
+    def dt_of_duration(self, duration: HeaderField, npts: float) -> float:
         """Return the shortest decimal dt [s] with which npts samples last the printed duration."""
         seconds = self.positive(duration, "record length")
         _, _, decimals = duration.text.partition(".")
@@ -238,7 +238,14 @@ class RecordFile:
         return self.agreed_dt(dt, duration.line)
 
     def refuse_other_duration(
-        self, count: Count, dt: float, stated: Field, advice: str, *, slack_s: float, ratio: float
+        self,
+        count: Count,
+        dt: float,
+        stated: HeaderField,
+        advice: str,
+        *,
+        slack_s: float,
+        ratio: float,
     ) -> None:
         """Refuse a file whose samples do not last as long as its header says.
 
@@ -414,7 +421,7 @@ class RecordFile:
             )
 
 
-def positive_number(path: Path, field: Field, what: str) -> float:
+def positive_number(path: Path, field: HeaderField, what: str) -> float:
     """Return a field's number, which must be above zero."""
     value = finite_number(path, field.text, field.line, what)
     if value <= 0.0:
@@ -427,13 +434,13 @@ class NamedFields:
 
     def __init__(self, file: RecordFile, span: range) -> None:
         self._file = file
-        self._fields: dict[str, Field] = {}
+        self._fields: dict[str, HeaderField] = {}
         for at in span:
             name, colon, value = file.lines[at][:LONGEST_LINE].partition(":")
             if colon and name.strip():
-                self._fields.setdefault(name.strip(), Field(value.strip(), at + 1))
+                self._fields.setdefault(name.strip(), HeaderField(value.strip(), at + 1))
 
-    def __getitem__(self, name: str) -> Field:
+    def __getitem__(self, name: str) -> HeaderField:
         """Return the field of this name, or else the first whose name begins so."""
         field = self._find(name)
         if field is None:
@@ -447,7 +454,7 @@ class NamedFields:
         field = self._find(name)
         return field.text if field else ""
 
-    def _find(self, name: str) -> Field | None:
+    def _find(self, name: str) -> HeaderField | None:
         if name in self._fields:
             return self._fields[name]
         return next((field for key, field in self._fields.items() if key.startswith(name)), None)

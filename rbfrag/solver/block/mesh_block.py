@@ -38,7 +38,7 @@ USUAL_SIZE_M = (0.05, 50.0)
 """Greatest extents of a free-standing block that are not suspected of another unit."""
 
 
-class Rocking(NamedTuple):
+class TwoCorneredBlocks(NamedTuple):
     """Two-cornered blocks, one for each azimuth.
 
     Forward means over the contact on the side of the azimuth, backward over the other one.
@@ -87,7 +87,7 @@ class Weakest(NamedTuple):
         azimuth_deg: towards which it lifts off, counter-clockwise from plan x [deg].
         kr: tan of the critical angle.
         p2: p² [1/s²].
-        restitution: as in :class:`Rocking`.
+        restitution: as in :class:`TwoCorneredBlocks`.
     """
 
     azimuth_deg: float
@@ -120,7 +120,7 @@ class ContactHull:
         """Whether the centre of mass lies above the inside of the hull."""
         return self.corners_m.size > 0 and bool(self._edges()[1].min() > 0.0)
 
-    def rocking(self, azimuth_deg: Array) -> Rocking:
+    def rocking(self, azimuth_deg: Array) -> TwoCorneredBlocks:
         """Return the block of two corners along each azimuth.
 
         p² = g R/(I + R²), e = (I + r1·r3)/(I + R²): angular momentum about the new contact is
@@ -140,7 +140,7 @@ class ContactHull:
         about_forward = inertia + forward**2 + h * h
         about_backward = inertia + backward**2 + h * h
         kept = inertia + h * h - forward * backward
-        return Rocking(
+        return TwoCorneredBlocks(
             azimuth_deg=np.asarray(azimuth_deg, dtype=np.float64),
             kr_forward=forward / h,
             kr_backward=backward / h,
@@ -225,7 +225,7 @@ class MeshBlock(Tabular):
         """Mass [kg]; None without a density."""
         return None if self.density_kg_m3 is None else self.density_kg_m3 * self.volume_m3
 
-    def rocking(self) -> Rocking:
+    def rocking(self) -> TwoCorneredBlocks:
         """Return the blocks of two corners along :data:`LINES_DEG`."""
         return self.hull.rocking(LINES_DEG)
 

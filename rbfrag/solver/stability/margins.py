@@ -38,7 +38,7 @@ class Margin:
 
 
 def margins(
-    block: Block, finding: Finding, limit_deg: float, phi_for: Callable[[float], float]
+    block: Block, finding: MarginFacts, limit_deg: float, phi_for: Callable[[float], float]
 ) -> tuple[Margin, ...]:
     """Return the nearest boundaries in both directions of φ, α1 and α3, nearest first.
 
@@ -115,7 +115,7 @@ def degrees_of(tangent: float) -> float:
 
 
 @dataclass(frozen=True)
-class Finding:
+class MarginFacts:
     """What the warnings are about; the fields are those of the answer.
 
     Args:
@@ -142,12 +142,12 @@ class Finding:
     lifts: bool
 
 
-def warnings_about(block: Block, finding: Finding) -> tuple[str, ...]:
+def warnings_about(block: Block, finding: MarginFacts) -> tuple[str, ...]:
     """Return one sentence for everything that the answer takes for granted."""
     return tuple(_sentences(block, finding))
 
 
-def _sentences(block: Block, finding: Finding) -> Iterator[str]:
+def _sentences(block: Block, finding: MarginFacts) -> Iterator[str]:
     if abs(finding.k) <= AT_LIMIT:
         yield "the block is stable at its limit: its yield acceleration is zero to rounding"
     if finding.backward:
@@ -171,7 +171,7 @@ def _sentences(block: Block, finding: Finding) -> Iterator[str]:
         yield from _about_back_plane(block, finding)
 
 
-def _about_back_plane(block: Block, finding: Finding) -> Iterator[str]:
+def _about_back_plane(block: Block, finding: MarginFacts) -> Iterator[str]:
     corner = block.gamma_deg + finding.phi_deg + finding.phi_back_deg
     if finding.mode in ("slide", "confined_topple") and corner > 180.0:
         yield (

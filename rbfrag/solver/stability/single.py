@@ -21,8 +21,8 @@ from rbfrag.solver.quantity import (
     vertical_g,
 )
 from rbfrag.solver.stability.margins import (
-    Finding,
     Margin,
+    MarginFacts,
     degrees_of,
     margins,
     warnings_about,
@@ -173,7 +173,7 @@ def judged(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-) -> tuple[Finding, Planes[float]]:
+) -> tuple[MarginFacts, Planes[float]]:
     """Return the mode and yield of a block and its planes; arguments as for :func:`stability`."""
     if not isinstance(block, Block):
         raise InputError(f"block = {block!r}: make one with Block.from_angles or its siblings")
@@ -189,7 +189,7 @@ def judged(
     backward = not back_fracture and tb < t1
     k, untenable, lifts = planes.yield_of(code, block.arms, block.cot_gamma)
     k = -math.inf if backward else k
-    finding = Finding(
+    finding = MarginFacts(
         MODES[code], STATES[int(state_code(k, SCALAR))], k, beta_deg, phi_deg, phi_back_deg,
         back_fracture, backward, untenable and back_fracture, lifts,
     )  # fmt: skip

@@ -12,7 +12,7 @@ from rbfrag.fragility.fit.censoring import (
     score_bounds,
     unknown_shares,
 )
-from rbfrag.fragility.fit.scores import Judged, critical_outcomes, log_loss
+from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes, log_loss
 
 ASKED = np.array([0.9, 0.6, 0.4, 0.3, 0.2])
 
@@ -80,12 +80,12 @@ def test_bounds_enclose_the_score_whatever_the_unknown_outcomes_are():
     truth = (rng.uniform(size=p.shape) < 0.5) * 1.0
     known = rng.uniform(size=p.shape) < 0.7
     asked = np.ones(p.shape, dtype=bool)
-    judged = Judged(np.where(known, truth, 0.0), known, np.zeros(200, dtype=int), "")
+    judged = ScoredBlocks(np.where(known, truth, 0.0), known, np.zeros(200, dtype=int), "")
     low, high = score_bounds(judged, p, asked)
     assert low < log_loss(p, truth, asked) < high
     best = np.where(known, truth, p > 0.5)
     assert low == pytest.approx(log_loss(p, best, asked))
-    everything = Judged(truth, asked, judged.event, "")
+    everything = ScoredBlocks(truth, asked, judged.event, "")
     assert score_bounds(everything, p, asked) == pytest.approx([log_loss(p, truth, asked)] * 2)
 
 

@@ -10,7 +10,7 @@ import pytest
 from rbfrag.fragility.fit.scores import (
     CLIP,
     EDGES,
-    Judged,
+    ScoredBlocks,
     brier,
     calibration,
     calibration_bins,
@@ -65,12 +65,12 @@ def test_calibration_of_a_model_that_is_far_too_sure(between):
     assert (found.intercept, found.slope) == pytest.approx(best.x, abs=1e-4)
 
 
-def blocks(seed: int = 0, n: int = 2000, events: int = 40) -> tuple[Judged, np.ndarray]:
+def blocks(seed: int = 0, n: int = 2000, events: int = 40) -> tuple[ScoredBlocks, np.ndarray]:
     """Blocks that topple with exactly the probability that was predicted."""
     rng = np.random.default_rng(seed)
     p = rng.uniform(size=(n, 25))
     toppled = (rng.uniform(size=p.shape) < p).astype(float)
-    return Judged(toppled, np.ones(p.shape, dtype=bool), np.arange(n) % events, "made up"), p
+    return ScoredBlocks(toppled, np.ones(p.shape, dtype=bool), np.arange(n) % events, "made up"), p
 
 
 def test_a_calibrated_model_lies_on_the_diagonal() -> None:
@@ -98,7 +98,7 @@ def test_unknown_outcomes_do_not_count() -> None:
     seen, p = blocks(n=400)
     known = np.zeros(p.shape, dtype=bool)
     known[:, 3] = True
-    bins = calibration_bins(Judged(seen.failed, known, seen.event, ""), p)
+    bins = calibration_bins(ScoredBlocks(seen.failed, known, seen.event, ""), p)
     held = np.histogram(p[:, 3], EDGES)[0]
     assert bins.blocks.sum() == held[held >= 20].sum()
 
@@ -110,7 +110,7 @@ def test_intervals_are_wider_where_earthquakes_differ() -> None:
     shift = rng.normal(size=40)[np.arange(2000) % 40][:, None]
     real = 1.0 / (1.0 + np.exp(-(np.log(p / (1.0 - p)) + shift)))
     toppled = (rng.uniform(size=p.shape) < real).astype(float)
-    apart = calibration_bins(Judged(toppled, seen.known, seen.event, ""), p)
+    apart = calibration_bins(ScoredBlocks(toppled, seen.known, seen.event, ""), p)
     middle = slice(4, 9)
     assert ((apart.high - apart.low) > 2.0 * (same.high - same.low))[middle].all()
     assert calibration_bins(seen, p).low == pytest.approx(same.low)
