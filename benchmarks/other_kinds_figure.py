@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numb
 def plot_other_kinds(
     sliding: FragilityModel, slides: FitData, slumping: FragilityModel, slumps: FitData,
     path: str | PathLike[str],
-) -> Path:  # fmt: skip
+) -> None:  # fmt: skip
     """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
 
     Args:
@@ -27,9 +26,6 @@ def plot_other_kinds(
         slumping: a model on PGV and PGA.
         slumps: what it was fitted to.
         path: file to write: .png, .pdf or .svg.
-
-    Returns:
-        The path.
 
     Raises:
         InputError: a path that cannot be written.

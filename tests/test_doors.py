@@ -542,7 +542,7 @@ def test_no_critical_value_of_a_block_that_is_unstable_at_rest(
     with pytest.raises(InputError, match="unstable at rest"):
         rbfrag.critical(motion, block=block, **backed)
     if kind is None:
-        with TestClient(make_app(Settings(db=str(REFERENCE)))) as client:
+        with TestClient(make_app(ServiceSettings(db=str(REFERENCE)))) as client:
             answer = client.post(
                 "/v1/critical",
                 params=parameters({**UNSTABLE, **planes}),

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rbfrag.plots import canvas
@@ -103,7 +101,7 @@ _INK, _RESULTANT = "#222222", "#b2182b"
 
 
 @canvas.in_own_style
-def plot_block(block: Block, stability: Stability, path: str | PathLike[str]) -> Path:
+def plot_block(block: Block, stability: Stability, path: canvas.Out) -> canvas.Picture:
     """Draw a block to scale on its base and back planes, out of the slope to the right.
 
     The contacts are 1 heel, 2 back and 3 toe, C is the centroid. The arrow is the direction of

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
@@ -22,11 +20,11 @@ MOST_MODELS = len(COLOURS)
 @canvas.in_own_style
 def plot_calibration(
     models: Mapping[str, CalibrationBins],
-    path: str | PathLike[str],
+    path: canvas.Out,
     *,
     scores: Mapping[str, Mapping[str, float]] | None = None,
     data: str = "",
-) -> Path:
+) -> canvas.Picture:
     """Draw the share of blocks that toppled over the probability predicted for them.
 
     Each earthquake was predicted by a fit without it. On the diagonal a model is calibrated.

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import wraps
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
@@ -70,22 +72,49 @@ def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
-def plot_path(path: str | PathLike[str]) -> Path:
+Out = str | PathLike[str] | None
+"""File to write (.png, .pdf, .svg); None for a picture in memory, which a notebook shows."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure.
+
+    Args:
+        path: its file; None of one in memory.
+        png: the image of one in memory.
+        warnings: what to know about it.
+    """
+
+    path: Path | None
+    png: bytes | None = field(default=None, repr=False)
+    warnings: tuple[str, ...] = ()
+
+    def _repr_png_(self) -> bytes | None:
+        """Return what a notebook shows."""
+        return self.png
+
+
+def plot_path(path: Out) -> Path | None:
     """Return the path if a figure can be saved there; ask before long work."""
-    return output_path(path, SUFFIXES, "plot file")
+    return None if path is None else output_path(path, SUFFIXES, "plot file")
 
 
-def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
+def save_figure(figure: Figure, path: Out) -> Picture:
     """Write a figure as PNG, PDF or SVG by the suffix of the path, whole or not at all.
 
     Args:
-        path: file to write, which is returned; an existing file is replaced.
+        path: file to write; an existing file is replaced. None for a picture in memory.
     """
     target = plot_path(path)
     settle_labels(figure)
+    if target is None:
+        image = BytesIO()
+        figure.savefig(image, format="png", dpi=160)
+        return Picture(None, image.getvalue())
     with written_whole(target, "plot file") as partial, partial.open("wb") as stream:
         figure.savefig(stream, format=target.suffix.lower()[1:], dpi=160)
-    return target
+    return Picture(target)
 
 
 _LAYOUT_DIGITS = 6

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,8 +52,8 @@ _DEFAULT_RANGE = (0.01, 2.0)
 
 @canvas.in_own_style
 def plot_chart(
-    model: FragilityModel, path: str | PathLike[str], held: HeldMeasures | None = None
-) -> Path:
+    model: FragilityModel, path: canvas.Out, held: HeldMeasures | None = None
+) -> canvas.Picture:
     """Draw lines of equal probability of toppling over intensity and block.
 
     The ordinate is the block's toppling velocity k_r g/p, and of blocks of a given size k_r. What

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -82,7 +80,9 @@ STYLES = {
 
 
 @canvas.in_own_style
-def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
+def plot_sensitivity(
+    table: CombinationTable, path: canvas.Out, *, data: str = ""
+) -> canvas.Picture:
     """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
 
     The legend says how many of the critical values lie above each line.
@@ -186,7 +186,7 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
 
 
 @canvas.in_own_style
-def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
+def plot_vertical(pairs: VerticalPairs, path: canvas.Out) -> canvas.Picture:
     """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
 
     Ratios beyond the edges of the histogram are counted in its outermost bars.

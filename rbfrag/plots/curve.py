@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from os import PathLike
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -21,6 +19,8 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
     RED,
+    Out,
+    Picture,
     in_own_style,
     legend_below,
     light_grid,
@@ -77,13 +77,13 @@ _SUBSCRIPT = re.compile(r"([kp])_([a-z])")
 def plot_curve(
     model: FragilityModel,
     block: Mapping[str, float],
-    path: str | PathLike[str],
+    path: Out,
     *,
     over: str | None = None,
     fixed: Mapping[str, float] | None = None,
     level: float = LEVEL,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
-) -> Path:
+) -> Picture:
     """Draw the fragility curve of one block with two bands.
 
     The narrow band is the interval of P: the share of such blocks that fail over all earthquakes

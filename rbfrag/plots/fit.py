@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,11 +33,11 @@ _BARS = 40
 def plot_fit(
     table: CombinationTable,
     model: FragilityModel,
-    path: str | PathLike[str],
+    path: canvas.Out,
     *,
     log: bool = False,
     xp_m_s: NDArray[np.float64] | None = None,
-) -> Path:
+) -> canvas.Picture:
     """Draw critical toppling velocities against intensity with the lines of a model.
 
     A block above the upper line fails with less than 2.5 % probability, one below the lower
@@ -54,9 +52,6 @@ def plot_fit(
     Args:
         log: logarithmic axes.
         xp_m_s: toppling spectrum of each row [m/s], which models of the term xp need.
-
-    Returns:
-        The path.
 
     Raises:
         InputError: nothing to draw, or a path that cannot be written.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
@@ -29,13 +28,25 @@ def measure_title(curve: HazardCurve) -> str:
 
 
 @canvas.in_own_style
-def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | PathLike[str]) -> Path:
+def plot_contribution(
+    curve: CurveLike,
+    answer: HazardAnswer,
+    out: canvas.Out = None,
+    *,
+    imt: str | None = None,
+    site: str | None = None,
+) -> canvas.Picture:
     """Draw a hazard curve and, below it, where the failures of the first block come from.
 
     Args:
-        answer: the answer; its first block is drawn.
+        curve: hazard curve, or its file.
+        answer: of :func:`rbfrag.hazard` under it.
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
+        imt: as for :func:`rbfrag.hazard`.
+        site: as for :func:`rbfrag.hazard`.
     """
-    canvas.plot_path(path)
+    canvas.plot_path(out)
+    (curve,) = as_curves(curve, imt=imt, site=site)
     figure = canvas.new_figure(6.4, 6.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
     draw_contribution(top, bottom, curve, answer)
@@ -48,7 +59,7 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
         f"{100 * answer.probability[0]:.3g} % in {answer.years:g} years",
         fontsize=10,
     )
-    return canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, out)
 
 
 def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: HazardAnswer) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,11 +41,11 @@ NEAR_CRITICAL = 0.03
 def plot_islands(
     motion: GroundMotion,
     result: CriticalResult,
-    path: str | os.PathLike[str],
+    path: canvas.Out,
     *,
     vertical: GroundMotion | None = None,
     title: str = "",
-) -> None:
+) -> canvas.Picture:
     """Draw the map of outcomes over k_r/PGA with the peak rotations, and a part enlarged.
 
     The bands are what the search proved for whole intervals; the curve is peak rotations of
@@ -81,7 +80,7 @@ def plot_islands(
     name = f"{title}{', reversed' if result.polarity == 'reverse' else ''}"
     name += ", with vertical motion" if vertical is not None else ""
     figure.suptitle(f"{as_written(name, 85)}\n{_verdict(result)}", fontsize=10)
-    canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:

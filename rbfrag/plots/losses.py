@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rbfrag.errors import InputError
@@ -19,19 +17,20 @@ _LOWEST = 0.05  # of one event in the effective time
 
 
 @canvas.in_own_style
-def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
+def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     """Draw the curves of exceedance of failures and, where there is one, of the loss.
 
     Bands are those of the counting error of the event set. Of years, the sum is drawn beside the
     events; what happens less than once in the time that the events cover is shaded.
 
     Args:
-        answer: the answer, with samples.
+        answer: of :func:`rbfrag.losses`, with samples.
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
 
     Raises:
         InputError: the answer has no curve.
     """
-    canvas.plot_path(path)
+    canvas.plot_path(out)
     panels = [("blocks that fail", answer.exceedance)]
     if answer.has_losses:
         panels.append(("loss", answer.loss_exceedance))
@@ -47,7 +46,7 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
         canvas.open_corner(axes)
     canvas.light_grid(*all_axes)
     canvas.legend_below(figure, 4)
-    return canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, out)
 
 
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -24,7 +22,7 @@ _LINES = ("-", "--", "-.", ":")
 
 
 @canvas.in_own_style
-def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
+def plot_mesh_block(block: MeshBlock, path: canvas.Out) -> canvas.Picture:
     """Draw the contacts of a block in plan, and k_r towards every azimuth.
 
     At the left the contact points, their hull and the whole block from above, C being the centre

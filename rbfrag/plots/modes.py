@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -53,7 +51,7 @@ _FINE_LEVELS = tuple(0.05 * i for i in range(1, 60))
 
 @canvas.in_own_style
 def plot_modes(
-    path: str | PathLike[str],
+    out: canvas.Out = None,
     *,
     phi_deg: float,
     beta_deg: float = 0.0,
@@ -62,13 +60,14 @@ def plot_modes(
     alpha1_deg: ArrayLike | None = None,
     alpha3_deg: ArrayLike | None = None,
     title: str = "",
-) -> Path:
+) -> canvas.Picture:
     """Draw which mode governs a block of given angles, and its yield acceleration.
 
     The modes do not depend on the dip of the base if there is a back fracture; the yield
     accelerations, and what is unstable or locked, do.
 
     Args:
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
         phi_deg: friction angle of the base [deg].
         beta_deg: dip of the base for the yield accelerations [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
@@ -77,7 +76,7 @@ def plot_modes(
         alpha3_deg: angles of the toe of these blocks [deg], shape (m,).
         title: title of the figure; friction and dip if empty.
     """
-    canvas.plot_path(path)
+    canvas.plot_path(out)
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
@@ -110,7 +109,7 @@ def plot_modes(
     figure.draw_without_rendering()  # the extents of texts are known once the layout is
     for lines, here in contours:
         _write_values(chart, lines, here, names)
-    return canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, out)
 
 
 def _title(phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool) -> str:

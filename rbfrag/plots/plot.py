@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
+from importlib import import_module
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Required, TypedDict, Unpack
-
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model
@@ -17,62 +14,44 @@ from rbfrag.db.queries import combination_table
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES, spectral
-from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.motions.polarity import POLARITIES, Polarity
+from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
-from rbfrag.plots.canvas import plot_path
+from rbfrag.plots.canvas import Out, Picture, plot_path
 from rbfrag.question.fields import AnsweringFields, ShakingFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.question import described
-from rbfrag.solver.block.geometry import Block
 
 if TYPE_CHECKING:
-    from rbfrag.hazards.answer import HazardAnswer
-    from rbfrag.hazards.losses import LossAnswer
-    from rbfrag.hazards.survival import SurvivalAnswer
+    from rbfrag.plots.hazard import plot_contribution as hazard
+    from rbfrag.plots.losses import plot_losses as losses
+    from rbfrag.plots.modes import plot_modes as modes
+    from rbfrag.plots.rotation import plot_rotation as rotation
+    from rbfrag.plots.spectrum import plot_spectrum as spectrum
+    from rbfrag.plots.survival import plot_survival as survival
     from rbfrag.rockmasses.joint_sets import Realisations
     from rbfrag.rockmasses.shaking import ShakenMass
 
-Out = str | PathLike[str] | None
-"""File to write (.png, .pdf, .svg); None for a picture in memory, which a notebook shows."""
+__all__ = (
+    "Picture", "calibration", "chart", "curve", "fit", "hazard", "losses", "modes", "response",
+    "rockmass", "rotation", "sensitivity", "shakemap", "spectrum", "survival", "vertical",
+)  # fmt: skip
+
+_DRAWN_THERE = {
+    "hazard": "plot_contribution",
+    "losses": "plot_losses",
+    "modes": "plot_modes",
+    "rotation": "plot_rotation",
+    "spectrum": "plot_spectrum",
+    "survival": "plot_survival",
+}
+"""Figures of what is given alone: each in the file of its name, loaded when it is asked for."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure.
-
-    Args:
-        path: its file; None of one in memory.
-        png: the image of one in memory.
-        warnings: what to know about it.
-    """
-
-    path: Path | None
-    png: bytes | None = field(default=None, repr=False)
-    warnings: tuple[str, ...] = ()
-
-    def _repr_png_(self) -> bytes | None:
-        """Return what a notebook shows."""
-        return self.png
-
-
-def _drawn(
-    out: Out, draw: Callable[[str | PathLike[str]], object], warnings: Sequence[str] = ()
-) -> Picture:
-    """Return the figure that a function draws into a file."""
-    if out is not None:
-        draw(out)
-        return Picture(Path(out), None, tuple(warnings))
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "figure.png"
-        draw(file)
-        return Picture(None, file.read_bytes(), tuple(warnings))
-
-
-def _checked(out: Out) -> None:
-    """Refuse a file that cannot be written, before long work."""
-    if out is not None:
-        plot_path(out)
+def __getattr__(name: str) -> Any:
+    """Load the figure of a file (PEP 562)."""
+    if name not in _DRAWN_THERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"rbfrag.plots.{name}"), _DRAWN_THERE[name])
 
 
 def fit(
@@ -96,7 +75,7 @@ def fit(
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.plots.fit import plot_fit
 
-    _checked(out)
+    plot_path(out)
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         row = load_model(connection, model)
         fitted, source = FragilityModel.from_row(row), source_of(connection, row)
@@ -109,11 +88,8 @@ def fit(
             "today; fitting it again takes them",
         )
     )
-    return _drawn(
-        out,
-        lambda path: plot_fit(source.table, fitted, path, log=log, xp_m_s=source.xp_m_s),
-        warnings,
-    )
+    picture = plot_fit(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
+    return replace(picture, warnings=warnings)
 
 
 def chart(
@@ -141,7 +117,7 @@ def chart(
 
     chosen = find_model(model, ["pgv_m_s"] if model is None else MEASURES, db)
     held = held_measures(chosen, p2=p2, pga_g=pga_g, tm_s=tm_s)
-    return _drawn(out, lambda path: plot_chart(chosen, path, held))
+    return plot_chart(chosen, out, held)
 
 
 VARIED = {
@@ -216,14 +192,12 @@ def curve(
             "over"
         )
     others = {} if beside is None else beside(varied)
-    return _drawn(
-        drawing.get("out", out),
-        lambda path: plot_curve(
-            chosen, group.numbers, path, over=varied, fixed=held,
-            level=answering.get("level", LEVEL), beside=others,
-        ),
-        (*blocks.remarks, *rise_of_curve(chosen, group.numbers)),
+    picture = plot_curve(
+        chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
+        level=answering.get("level", LEVEL), beside=others,
     )  # fmt: skip
+    warnings = (*blocks.remarks, *rise_of_curve(chosen, group.numbers))
+    return replace(picture, warnings=warnings)
 
 
 def sensitivity(
@@ -241,7 +215,7 @@ def sensitivity(
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         table = combination_table(connection, suite=suite)
     data = "without vertical motion" + (f", suite {suite}" if suite else "")
-    return _drawn(out, lambda path: plot_sensitivity(table, path, data=data))
+    return plot_sensitivity(table, out, data=data)
 
 
 def vertical(
@@ -260,7 +234,7 @@ def vertical(
         without = combination_table(connection, suite=suite)
         with_it = combination_table(connection, suite=suite, vertical="with")
     pairs = vertical_pairs(without, with_it)
-    return _drawn(out, lambda path: plot_vertical(pairs, path))
+    return plot_vertical(pairs, out)
 
 
 def calibration(
@@ -282,37 +256,12 @@ def calibration(
     from rbfrag.fragility.fit.check import held_out_of
     from rbfrag.plots.calibration import plot_calibration
 
-    _checked(out)
+    plot_path(out)
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         names: Sequence[str | None] = models or [None]
         answers = [held_out_of(connection, name, seed=seed) for name in names]
     bins, scores = ({each.name: getattr(each, of) for each in answers} for of in ("bins", "scores"))
-    return _drawn(
-        out, lambda path: plot_calibration(bins, path, scores=scores, data=answers[0].outcomes)
-    )
-
-
-def spectrum(
-    motions: MotionLike | Sequence[MotionLike],
-    out: Out = None,
-    *,
-    p2: Sequence[float] = (0.1, 30.0),
-    polarities: Sequence[Polarity] = POLARITIES,
-) -> Picture:
-    """Draw the toppling spectra of motions over the size of the block, with PGV beside them.
-
-    Args:
-        motions: up to eight motions or their files.
-        out: as for :func:`fit`.
-        p2: the figure spans at least these p² [1/s²].
-        polarities: ``forward``, ``reverse`` or both.
-    """
-    from rbfrag.plots.spectrum import plot_spectrum
-
-    _checked(out)
-    given: Any = motions if isinstance(motions, list | tuple) else [motions]
-    records = [as_motion(each) for each in given]
-    return _drawn(out, lambda path: plot_spectrum(records, path, polarities=polarities, p2=p2))
+    return plot_calibration(bins, out, scores=scores, data=answers[0].outcomes)
 
 
 def response(
@@ -337,129 +286,12 @@ def response(
     from rbfrag.plots.response import plot_response
     from rbfrag.solver.toppling_run import respond
 
-    _checked(out)
+    plot_path(out)
     ground = as_motion(motion)
     upward = None if vertical is None else as_motion(vertical, "vertical")
     shaken = respond(ground, p2=p2, kr=kr, vertical=upward, polarity=polarity, history=True)
     reverse = polarity == "reverse"
-    return _drawn(
-        out,
-        lambda path: plot_response(shaken, path, p2=p2, kr=kr, reverse=reverse, title=ground.label),
-    )
-
-
-class ModePlanes(TypedDict, total=False):
-    """The planes that modes are drawn for, and blocks to show on them."""
-
-    phi_deg: Required[float]
-    beta_deg: float
-    phi_back_deg: float | None
-    back_fracture: bool
-    alpha1_deg: ArrayLike | None
-    alpha3_deg: ArrayLike | None
-
-
-def modes(out: Out = None, **planes: Unpack[ModePlanes]) -> Picture:
-    """Draw failure modes and yield accelerations over the block angles α1 and α3.
-
-    Args:
-        out: as for :func:`fit`.
-        planes: ``phi_deg``, friction angle of the base [deg]; ``beta_deg``, its dip for the yield
-            accelerations [deg]; ``phi_back_deg``, friction angle of the back plane [deg], None for
-            that of the base; ``back_fracture``, whether there is a fracture behind the block;
-            ``alpha1_deg`` and ``alpha3_deg``, angles of heel and toe of blocks to show [deg].
-    """
-    from rbfrag.plots.modes import plot_modes
-
-    return _drawn(out, lambda path: plot_modes(path, **planes))
-
-
-def rotation(
-    block: Block,
-    out: Out = None,
-    *,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = None,
-    back_follows: Sequence[float] = (0.0, 0.5, 1.0),
-) -> Picture:
-    """Draw the yield of a slump or a confined topple over its rotation.
-
-    Args:
-        block: the block.
-        out: as for :func:`fit`.
-        beta_deg: dip of the base [deg].
-        phi_deg: friction angle of the base [deg].
-        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
-        back_follows: shares of the rotation by which the back plane turns with the block.
-    """
-    from rbfrag.plots.rotation import plot_rotation
-
-    return _drawn(
-        out,
-        lambda path: plot_rotation(
-            block, path, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg,
-            shares=back_follows,
-        ),
-    )  # fmt: skip
-
-
-def hazard(
-    curve: CurveLike,
-    answer: HazardAnswer,
-    out: Out = None,
-    *,
-    imt: str | None = None,
-    site: str | None = None,
-) -> Picture:
-    """Draw a hazard curve and where the failures of the first block come from.
-
-    Args:
-        curve: hazard curve, or its file.
-        answer: of :func:`rbfrag.hazard` under it.
-        out: as for :func:`fit`.
-        imt: as for :func:`rbfrag.hazard`.
-        site: as for :func:`rbfrag.hazard`.
-    """
-    from rbfrag.plots.hazard import plot_contribution
-
-    (read,) = as_curves(curve, imt=imt, site=site)
-    return _drawn(out, lambda path: plot_contribution(read, answer, path))
-
-
-def survival(
-    curves: CurveLike | Sequence[CurveLike],
-    answer: SurvivalAnswer,
-    out: Out = None,
-    *,
-    imt: str | None = None,
-    site: str | None = None,
-) -> Picture:
-    """Draw hazard curves, survival over a factor on their rates, and weights of branches.
-
-    Args:
-        curves: hazard curves, or their files.
-        answer: of :func:`rbfrag.survival` under them.
-        out: as for :func:`fit`.
-        imt: as for :func:`rbfrag.hazard`.
-        site: as for :func:`rbfrag.hazard`.
-    """
-    from rbfrag.plots.survival import plot_survival
-
-    read = as_curves(curves, imt=imt, site=site)
-    return _drawn(out, lambda path: plot_survival(read, answer, path))
-
-
-def losses(answer: LossAnswer, out: Out = None) -> Picture:
-    """Draw how often numbers of failures, and losses, are reached.
-
-    Args:
-        answer: of :func:`rbfrag.losses`, with samples.
-        out: as for :func:`fit`.
-    """
-    from rbfrag.plots.losses import plot_losses
-
-    return _drawn(out, lambda path: plot_losses(answer, path))
+    return plot_response(shaken, out, p2=p2, kr=kr, reverse=reverse, title=ground.label)
 
 
 class _OfRockMass(Protocol):
@@ -484,8 +316,8 @@ def rockmass(answer: _OfRockMass, out: Out = None) -> Picture:
 
     ran = answer.outcomes
     if ran is None:
-        return _drawn(out, lambda path: plot_rockmass(answer.blocks, path))
-    return _drawn(out, lambda path: plot_failures(ran, path, level=answer.level))
+        return plot_rockmass(answer.blocks, out)
+    return plot_failures(ran, out, level=answer.level)
 
 
 class _OfMap(Protocol):
@@ -511,10 +343,7 @@ def shakemap(answer: _OfMap, out: Out = None) -> Picture:
     from rbfrag.plots.shakemap import plot_shakemap
 
     lon, lat, probability = (answer.columns[name] for name in ("lon", "lat", "probability"))
-    return _drawn(
-        out,
-        lambda path: plot_shakemap(
-            lon, lat, probability, path, title=answer.title, epicentre=answer.epicentre,
-            shape=answer.shape,
-        ),
+    return plot_shakemap(
+        lon, lat, probability, out, title=answer.title, epicentre=answer.epicentre,
+        shape=answer.shape,
     )  # fmt: skip

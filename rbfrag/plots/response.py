@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,13 +30,13 @@ TALLEST_SHOWN = 6.0
 @canvas.in_own_style
 def plot_response(
     response: Response,
-    path: str | os.PathLike[str],
+    path: canvas.Out,
     *,
     p2: float,
     kr: float,
     reverse: bool = False,
     title: str = "",
-) -> None:
+) -> canvas.Picture:
     """Draw one response as the dissertation reads it and write it to `path`.
 
     The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength left
@@ -73,7 +72,7 @@ def plot_response(
         _name_time(lower, response.toppled_s, "toppling inevitable", 0.97)
     lower.set_xlim(*_window(history.time_s, ratio, response))
     figure.suptitle(_title(title, reverse, _verdict(response, p2, kr)), fontsize=10)
-    canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _name_balance(axes: Axes, ratio: float, name: str) -> None:
@@ -143,8 +142,8 @@ ROTATION = "#b7791f"
 
 @canvas.in_own_style
 def plot_motion(
-    response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
-) -> None:
+    response: Response, path: canvas.Out, *, title: str = "", reverse: bool = False
+) -> canvas.Picture:
     """Draw the response of a sliding, slumping or confined block and write it to `path`.
 
     The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength where
@@ -177,7 +176,7 @@ def plot_motion(
             axes.axvline(part.begins_s, color="black", lw=0.9, ls=":")
     lower.set_xlim(*_motion_window(history, response))
     figure.suptitle(_title(title, reverse, _motion_verdict(response)), fontsize=10)
-    canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _least_top(strength_g: FloatArray) -> float:
@@ -218,8 +217,8 @@ def _motion_verdict(response: Response) -> str:
 
 @canvas.in_own_style
 def plot_rocking(
-    response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
-) -> None:
+    response: Response, path: canvas.Out, *, title: str = "", reverse: bool = False
+) -> canvas.Picture:
     """Draw the response of a free-standing block and write it to `path`.
 
     The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength left about
@@ -258,7 +257,7 @@ def plot_rocking(
         _name_time(lower, response.toppled_s, "overturning certain", 0.03)
     lower.set_xlim(*_window(history.time_s, np.abs(ratio), response))
     figure.suptitle(_title(title, reverse, _rocking_verdict(response)), fontsize=10)
-    canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, path)
 
 
 def _rocking_verdict(response: Response) -> str:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +36,7 @@ TITLE_WIDTH = 90
 
 
 @canvas.in_own_style
-def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path:
+def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Picture:
     """Draw the cumulative counts of blocks against PGA by mode, and the shares of the modes.
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
@@ -122,7 +120,7 @@ PARTS = (
 
 
 @canvas.in_own_style
-def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95) -> Path:
+def plot_failures(shaken: ShakenMass, path: canvas.Out, *, level: float = 0.95) -> canvas.Picture:
     """Draw the share of the blocks that fail against the scale of the motion, by mode.
 
     Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,12 +28,12 @@ def plot_shakemap(
     lon: FloatArray,
     lat: FloatArray,
     probability: FloatArray,
-    path: str | PathLike[str],
+    path: canvas.Out,
     *,
     title: str,
     epicentre: tuple[float, float] | None = None,
     shape: tuple[int, int] | None = None,
-) -> Path:
+) -> canvas.Picture:
     """Draw probabilities at nodes or blocks on a map with coast, colour bar, epicentre and scale.
 
     Args:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
@@ -41,27 +39,30 @@ def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
 
 @canvas.in_own_style
 def plot_spectrum(
-    motions: Sequence[GroundMotion],
-    path: str | PathLike[str],
+    motions: MotionLike | Sequence[MotionLike],
+    out: canvas.Out = None,
     *,
     polarities: Sequence[Polarity] = POLARITIES,
     p2: Sequence[float] = (0.1, 30.0),
     names: Sequence[str] = (),
-) -> Path:
+) -> canvas.Picture:
     """Draw the toppling spectra of several motions with the PGV of each.
 
     Args:
-        motions: at most eight.
+        motions: up to eight motions or their files.
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
         polarities: the polarities to draw, forward solid, reverse dashed.
         p2: the figure spans at least these frequency parameters [1/s²].
         names: names of the motions in the legend; their labels if empty.
     """
-    canvas.plot_path(path)
-    if not 1 <= len(motions) <= MOST_MOTIONS:
+    canvas.plot_path(out)
+    given: Any = motions if isinstance(motions, list | tuple) else [motions]
+    records = [as_motion(each) for each in given]
+    if not 1 <= len(records) <= MOST_MOTIONS:
         raise InputError(
-            f"{len(motions)} motions: a figure of spectra shows 1 to {MOST_MOTIONS} of them"
+            f"{len(records)} motions: a figure of spectra shows 1 to {MOST_MOTIONS} of them"
         )
-    named = names or [motion.label for motion in motions]
+    named = names or [motion.label for motion in records]
     low, high = min(p2), max(p2)
     if high < 4.0 * low:
         low, high = 0.5 * low, 2.0 * high
@@ -69,7 +70,7 @@ def plot_spectrum(
     figure = canvas.new_figure(7.2, 5.0)
     axes = figure.add_subplot()
     highest = 0.0
-    for motion, name, colour in zip(motions, named, COLOURS, strict=False):
+    for motion, name, colour in zip(records, named, COLOURS, strict=False):
         for polarity in polarities:
             x = toppling_spectrum(motion, sizes, polarity)
             highest = max(highest, float(np.max(x)))
@@ -94,7 +95,7 @@ def plot_spectrum(
     for label, style in (*key, ("PGV, either polarity", ":")):
         axes.plot([], [], style, color="black", lw=1.2, label=label)
     canvas.legend_below(figure, 2)
-    return canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, out)
 
 
 def _lowest(axes: Axes) -> float:

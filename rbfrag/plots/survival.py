@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.standing import Standing
 from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
 from rbfrag.plots import canvas
@@ -40,15 +39,28 @@ _LEAST_RATE = 1e-7
 
 @canvas.in_own_style
 def plot_survival(
-    curves: Sequence[HazardCurve], answer: SurvivalAnswer, path: str | PathLike[str]
-) -> Path:
-    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights."""
-    canvas.plot_path(path)
+    curves: CurveLike | Sequence[CurveLike],
+    answer: SurvivalAnswer,
+    out: canvas.Out = None,
+    *,
+    imt: str | None = None,
+    site: str | None = None,
+) -> canvas.Picture:
+    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights.
+
+    Args:
+        curves: hazard curves, or their files.
+        answer: of :func:`rbfrag.survival` under them.
+        out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
+        imt: as for :func:`rbfrag.hazard`.
+        site: as for :func:`rbfrag.hazard`.
+    """
+    canvas.plot_path(out)
     weighted = [one for one in answer.branches if one.weight is not None]
     figure = canvas.new_figure(11.0 if weighted else 9.0, 4.6)
     ratios = (1.0, 1.0, 0.7) if weighted else (1.0, 1.0)
     panels = figure.subplots(1, len(ratios), width_ratios=ratios)
-    _draw_curves(panels[0], curves, answer)
+    _draw_curves(panels[0], as_curves(curves, imt=imt, site=site), answer)
     _draw_survival(panels[1], answer)
     if weighted:
         _draw_weights(panels[2], weighted)
@@ -62,7 +74,7 @@ def plot_survival(
         fontsize=11,
     )
     canvas.legend_below(figure, 4)
-    return canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, out)
 
 
 def _style(i: int, curves: int) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -50,7 +49,7 @@ class WorkPoint(Protocol):
 
 
 @canvas.in_own_style
-def plot_work_precision(points: Sequence[WorkPoint], path: str | os.PathLike[str]) -> None:
+def plot_work_precision(points: Sequence[WorkPoint], path: canvas.Out) -> canvas.Picture:
     """Draw time against error, a marker per method and setting, and write it to `path`.
 
     The marker is at the median error, a thin bar reaches to the worst. Open markers had
@@ -93,4 +92,4 @@ def plot_work_precision(points: Sequence[WorkPoint], path: str | os.PathLike[str
     axes.set_ylabel("median time of one run [s]")
     canvas.light_grid(axes)
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    canvas.save_figure(figure, path)
+    return canvas.save_figure(figure, path)

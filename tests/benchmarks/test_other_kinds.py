@@ -23,7 +23,7 @@ def test_the_figure_is_written(tmp_path: Path) -> None:
         for kind in ("sliding", "slumping")
     ]
     both = [part for fit in fits for part in (fit.report.model, fit.data)]
-    path = plot_other_kinds(*both, tmp_path / "kinds.svg")
+    path = plot_other_kinds(*both, tmp_path / "kinds.svg").path
     text = path.read_text(encoding="utf-8")
     assert text.count("<g id=") > 20
     with pytest.raises(InputError, match="suffix"):

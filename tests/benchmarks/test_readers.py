@@ -31,7 +31,6 @@ NO_READERS = {
     "__init__.py:_home_of_names": "the package's own stub",
     "campaign/machine.py:_processor": "the computer's own description",
     "plots/coast.py:world": "the package's own coastline",
-    "plots/plot.py:_drawn": "the picture that it has just drawn",
     "service/app.py:lifespan": "opens the pool of processes",
     "service/app.py:make_app": "its inner function opens the pool of processes",
     "service/work.py:run": "opens the pool of processes",

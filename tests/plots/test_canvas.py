@@ -24,7 +24,7 @@ def figure():
 def test_the_suffix_chooses_the_format_and_nothing_else_stays(figure, tmp_path, kind):
     path = tmp_path / f"figure.{kind.upper()}"
     path.write_text("older")
-    assert save_figure(figure, str(path)) == path
+    assert save_figure(figure, str(path)).path == path
     assert path.read_bytes().startswith(BEGINNINGS[kind])
     assert list(tmp_path.iterdir()) == [path]
 

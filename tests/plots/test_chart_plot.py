@@ -28,7 +28,7 @@ def ends_of_labels(axes) -> dict[str, tuple[float, float]]:
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_is_written(tmp_path, suffix) -> None:
-    path = plot_chart(straight_line_model(), tmp_path / f"c.{suffix}")
+    path = plot_chart(straight_line_model(), tmp_path / f"c.{suffix}").path
     assert path.stat().st_size > 5000
 
 

@@ -81,7 +81,7 @@ def drawn(monkeypatch):
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
 def test_the_file_is_written(table, model, tmp_path, suffix):
     path = tmp_path / f"fit.{suffix}"
-    assert plot_fit(table, model, path) == path
+    assert plot_fit(table, model, path).path == path
     assert path.stat().st_size > 5000
 
 

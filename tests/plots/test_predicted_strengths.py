@@ -36,7 +36,8 @@ def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
     names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
     free = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")
     for model in (record, free, WITH_TM):
-        path = plot_fit(source.table, model, tmp_path / "fit.svg", log=True, xp_m_s=source.xp_m_s)
+        path = tmp_path / "fit.svg"
+        plot_fit(source.table, model, path, log=True, xp_m_s=source.xp_m_s)
         assert "at 50 % probability of failure" in path.read_text(encoding="utf-8")
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rbfrag.errors import InputError
 from rbfrag.plots import rotation as module
-from rbfrag.plots.rotation import plot_rotation
+from rbfrag.plots.rotation import plot_rotation, yield_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.rotated_yield import kct_after_rotation, ks_after_rotation
 
@@ -27,7 +27,8 @@ def test_lines_are_the_yields(tmp_path: Path, caught: Caught) -> None:
     ):
         block = Block.from_angles(*angles, 1.0)
         planes = {"beta_deg": 3.0, "phi_deg": 35.0}
-        lines = plot_rotation(block, tmp_path / "r.png", shares=(0.0, 0.5), **planes)
+        plot_rotation(block, tmp_path / "r.png", back_follows=(0.0, 0.5), **planes)
+        lines = yield_lines(block, back_follows=(0.0, 0.5), **planes)
         (axes,) = figures[-1].axes
         drawn = [line for line in axes.lines if len(np.atleast_1d(line.get_xdata())) > 2]
         for share, line in zip((0.0, 0.5), drawn, strict=True):

@@ -28,7 +28,7 @@ MOTIONS = [
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_is_written(tmp_path: Path, suffix: str) -> None:
-    path = plot_spectrum(MOTIONS, tmp_path / f"s.{suffix}")
+    path = plot_spectrum(MOTIONS, tmp_path / f"s.{suffix}").path
     assert path.stat().st_size > 2000
 
 

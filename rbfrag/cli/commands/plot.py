@@ -265,13 +265,16 @@ def plot_rotation(
     block's rotation.
     """
     from rbfrag.plots.rotation import plot_rotation as draw
+    from rbfrag.plots.rotation import yield_lines
     from rbfrag.question.blocks import on_planes, without_kv
 
     with given.named():
         block, planes, *_ = on_planes(without_kv(given))
     if not planes.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
-    lines = draw(block, out, shares=options.number_list(back_follows, "--back-follows"), **planes)
+    shares = options.number_list(back_follows, "--back-follows")
+    draw(block, out, back_follows=shares, **planes)
+    lines = yield_lines(block, back_follows=shares, **planes)
     if json:
         print_json({"plot": out, "lines": [line._asdict() for line in lines]})
         return
