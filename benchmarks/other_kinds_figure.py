@@ -17,7 +17,7 @@ from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numb
 def plot_other_kinds(
     sliding: FragilityModel, slides: FitData, slumping: FragilityModel, slumps: FitData,
     path: str | PathLike[str],
-) -> None:  # fmt: skip
+) -> Picture:  # fmt: skip
     """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
 
     Args:
