@@ -196,7 +196,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
         if not isinstance(kind, SingleBlocks):
             return 0.0
         alone = kind.history(shaking, case, k_over_pga)
-        if not alone.peak_theta_rad or alone.peak_theta_n is None:
+        if not alone.peak_theta_rad or alone.peak_theta_n is None or not alone.error_estimate:
             return 0.0
         return alone.error_estimate * alone.peak_theta_n / alone.peak_theta_rad
 

@@ -1,7 +1,9 @@
 """A block on its planes where no mechanism describes it any more: `free_motion`.
 
 Which corners touch is found step by step (`rbfrag.solver.integrator.free_body`). Impacts take the
-speed towards the plane and leave the rest: rigid bodies without rebound.
+speed towards the plane and leave the rest: rigid bodies without rebound. Rigid contact does not
+decide what an impact does, and a block that slides for millimetres goes by its impacts: the error
+is what other laws of impact and friction make of the same motion.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +24,10 @@ from rbfrag.solver.integrator.free_body import (
     BACKWARD,
     FORWARD,
     HEEL,
+    JUMPED,
     ON_BACK,
     ON_BASE,
     ROWS,
-    THROWN,
     TOE,
     Frame,
     FreeRun,
@@ -39,7 +42,14 @@ from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 
 STEP_S = 2e-4
-"""Step [s]; a run of twice the step beside it tells the error."""
+"""Step [s]; a run of twice the step beside it tells the error of the steps."""
+
+RIGID = (0.0, 1.0)
+"""Restitution and friction of impacts, as `rbfrag.solver.integrator.free_body.Frame` has them: they
+take all of the speed towards the plane, and rub by Coulomb's law."""
+
+OTHER_LAWS = ((0.2, 1.0), (0.0, 0.0))
+"""The same of laws that rigid contact permits, too: with rebound; without friction in impacts."""
 
 SHORTEST_S = 0.02
 """Time for which a block must do something for it to count as a change of what it does [s]."""
@@ -79,6 +89,13 @@ class FreeHistory:
     slip_m_s: FloatArray
 
 
+class FreeError(NamedTuple):
+    """Error of the rotation [rad] and of the displacement [m], of their extremes and at the end."""
+
+    rotation_rad: float
+    displacement_m: float
+
+
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
     """What became of a block without a mechanism.
@@ -93,11 +110,11 @@ class FreeMotion:
         backward_rad: greatest rotation backward (counter-clockwise) [rad].
         forward_rad: greatest rotation forward [rad].
         slip_m: greatest displacement of the contact along the base [m].
-        error_rad: difference of the rotation from a run of twice the step [rad].
-        error_m: the same of the displacement [m].
+        step_error: difference from a run of twice the step.
         steps: steps of both runs.
         contact: the contact whose displacement is told, from the centroid [m].
         rows: what the kernel kept of the motion.
+        by_other_laws: runs the block by the laws of `OTHER_LAWS`.
     """
 
     outcome: Outcome
@@ -109,12 +126,23 @@ class FreeMotion:
     backward_rad: float
     forward_rad: float
     slip_m: float
-    error_rad: float
-    error_m: float
+    step_error: FreeError
     steps: int
     block: Block
     contact: tuple[float, float]
     rows: FloatArray
+    by_other_laws: Callable[[], FreeError | None]
+
+    @cached_property
+    def error(self) -> FreeError | None:
+        """What steps and laws of impact and friction leave open; None where it is whether it fails.
+
+        Takes as long as the motion itself has taken.
+        """
+        of_laws = self.by_other_laws()
+        if of_laws is None:
+            return None
+        return FreeError(*(a + b for a, b in zip(self.step_error, of_laws, strict=True)))
 
     @cached_property
     def history(self) -> FreeHistory:
@@ -125,6 +153,25 @@ class FreeMotion:
     def changes(self) -> tuple[ModeChange, ...]:
         """What the block did."""
         return _changes(self.rows)
+
+
+class _Path(NamedTuple):
+    """One run: its history, and least, greatest and last rotation [rad] and displacement [m]."""
+
+    run: FreeRun
+    rows: FloatArray
+    rotations: tuple[float, float, float]
+    slips: tuple[float, float, float]
+
+    @property
+    def fails(self) -> bool:
+        return self.run.stop in (BACKWARD, FORWARD)
+
+    def beside(self, other: _Path) -> FreeError:
+        """Return how far apart two runs are."""
+        rotations = zip(self.rotations, other.rotations, strict=True)
+        slips = zip(self.slips, other.slips, strict=True)
+        return FreeError(*(max(abs(a - b) for a, b in pairs) for pairs in (rotations, slips)))
 
 
 def free_motion(
@@ -143,36 +190,50 @@ def free_motion(
     block = site.block
     assert block is not None
     contact = block.toe if at_toe else block.heel
+
+    def path(step_s: float, law: tuple[float, float]) -> _Path:
+        run, rows = _run(site, excited, release, step_s, law)
+        begin, end = release.pose, _pose(block, run.motion, contact)
+        return _Path(
+            run,
+            rows,
+            _extremes_and_end(begin.turned_rad, rows[3], end.turned_rad),
+            _extremes_and_end(
+                begin.displacement_m, _slips(block, rows, contact), end.displacement_m
+            ),
+        )
+
     # the method is of first order: the difference of both is the error of the finer one
-    coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S)
-    fine, rows = _run(site, excited, release, STEP_S)
-    slips, slips_coarse = (
-        _extremes(release.pose.displacement_m, _slips(block, each, contact))
-        for each in (rows, coarse_rows)
-    )
-    turns, turns_coarse = (
-        _extremes(release.pose.turned_rad, each[3]) for each in (rows, coarse_rows)
-    )
-    outcome, sentence = _ending(fine)
+    fine, coarse = path(STEP_S, RIGID), path(2.0 * STEP_S, RIGID)
+
+    def by_other_laws() -> FreeError | None:
+        # beside the coarse run: what laws differ by needs no finer steps
+        others = [path(2.0 * STEP_S, law) for law in OTHER_LAWS]
+        if any(other.fails != coarse.fails for other in others):
+            return None
+        return FreeError(*map(max, *(coarse.beside(other) for other in others)))
+
+    outcome, sentence = _ending(fine.run)
+    least_rad, most_rad, _ = fine.rotations
     # whether it fails hangs on the step: closer to critical than the error
-    if (fine.stop in (BACKWARD, FORWARD)) != (coarse.stop in (BACKWARD, FORWARD)):
+    if fine.fails != coarse.fails:
         outcome, sentence = Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice
     return FreeMotion(
         outcome=outcome,
         sentence=sentence,
-        time_s=fine.time_s,
-        pose=_pose(block, fine.motion, contact),
-        started_s=finite_or_none(fine.moved_s),
-        landed_s=finite_or_none(fine.landed_s),
-        backward_rad=max(0.0, turns[1]),
-        forward_rad=max(0.0, -turns[0]),
-        slip_m=slips[1],
-        error_rad=max(abs(a - b) for a, b in zip(turns, turns_coarse, strict=True)),
-        error_m=abs(slips[1] - slips_coarse[1]),
-        steps=fine.steps + coarse.steps,
+        time_s=fine.run.time_s,
+        pose=_pose(block, fine.run.motion, contact),
+        started_s=finite_or_none(fine.run.moved_s),
+        landed_s=finite_or_none(fine.run.landed_s),
+        backward_rad=max(0.0, most_rad),
+        forward_rad=max(0.0, -least_rad),
+        slip_m=fine.slips[1],
+        step_error=fine.beside(coarse),
+        steps=fine.run.steps + coarse.run.steps,
         block=block,
         contact=contact,
-        rows=rows,
+        rows=fine.rows,
+        by_other_laws=by_other_laws,
     )
 
 
@@ -196,7 +257,11 @@ def _corner(
 
 
 def _run(
-    site: BlockOnPlanes, excited: Excitation, release: Release, step_s: float
+    site: BlockOnPlanes,
+    excited: Excitation,
+    release: Release,
+    step_s: float,
+    law: tuple[float, float],
 ) -> tuple[FreeRun, FloatArray]:
     block = site.block
     assert block is not None
@@ -207,6 +272,7 @@ def _run(
         math.cos(site.beta_rad),
         block.on_back_edge_rad,
         block.on_front_face_rad,
+        *law,
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)
@@ -259,8 +325,8 @@ def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
     return Pose(at.turned, (at.x, at.y), here[0] - start)
 
 
-def _extremes(start: float, values: FloatArray) -> tuple[float, float]:
-    return (float(values.min(initial=start)), float(values.max(initial=start)))
+def _extremes_and_end(begin: float, values: FloatArray, end: float) -> tuple[float, float, float]:
+    return (float(values.min(initial=begin)), float(values.max(initial=begin)), end)
 
 
 def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FloatArray:
@@ -290,7 +356,7 @@ def _ending(run: FreeRun) -> tuple[Outcome, str]:
         return Outcome.TOPPLED, ON_ITS_BACK_EDGE.format(run.time_s)
     if run.stop == FORWARD:
         return Outcome.TOPPLED, ON_ITS_FACE.format(run.time_s)
-    if run.stop == THROWN:
+    if run.stop == JUMPED:
         return Outcome.JUMP, f"at {run.time_s:.3f} s: {Outcome.JUMP.advice}"
     return Outcome.UNDETERMINED, "a minute after the record the block neither stops nor falls"
 

@@ -13,6 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
+    FreeError,
     FreeHistory,
     FreeMotion,
     Release,
@@ -76,7 +77,7 @@ class MechanismKind(Kind):
                 moved=whole.started_s is not None,
                 peak_rad=None if failed else whole.peak_rad,
                 peak_displacement_m=None if failed else whole.peak_displacement_m,
-                error=whole.error,
+                error=whole.step_error,
                 about_block=mechanism.warnings,
             )
 
@@ -155,12 +156,25 @@ class WholeRun:
         return max([*slips, self.free.slip_m] if self.free is not None else slips)
 
     @property
-    def error(self) -> float:
-        """Bound on the error of the peak rotation [rad], of a sliding block [m]."""
-        error = 0.0 if self.run is None else self.run.error
+    def step_error(self) -> float:
+        """Bound on the error of the integration: of the peak rotation [rad], of a slide [m]."""
+        return self._error(None if self.free is None else self.free.step_error)
+
+    @property
+    def error(self) -> float | None:
+        """The same with what laws of impact and friction leave open after a lost contact.
+
+        None where some of them let the block fail and others do not.
+        """
         if self.free is None:
+            return self.step_error
+        return None if self.free.error is None else self._error(self.free.error)
+
+    def _error(self, of_free: FreeError | None) -> float:
+        error = 0.0 if self.run is None else self.run.error
+        if of_free is None:
             return error
-        return error + (self.free.error_rad if self.mechanism.rotates else self.free.error_m)
+        return error + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
 
     @property
     def changes(self) -> tuple[ModeChange, ...]:
@@ -178,8 +192,11 @@ class WholeRun:
         # the end of its mechanism is not the end of the block any more
         if self.run is not None and self.run.ending:
             known = known[:-1]
-        impact = [FALLS_ON_ITS_BASE.format(self.free.landed_s)] if self.free.landed_s else []
-        return (*known, *impact, *([self.free.sentence] if self.free.sentence else []))
+        if self.free.landed_s:
+            known = (*known, FALLS_ON_ITS_BASE.format(self.free.landed_s))
+        if self.free.error is None:
+            known = (*known, FAILS_BY_SOME_LAWS)
+        return (*known, self.free.sentence) if self.free.sentence else known
 
     @property
     def state(self) -> BlockState | None:
@@ -187,7 +204,7 @@ class WholeRun:
         pose, block = self.pose, self.site.block
         if self.outcome is not Outcome.STABLE:
             return None
-        position, error = None, self.error
+        position = None
         # only the first phase can be entered at rest: what comes after it goes on step by step
         if self.free is None and self.run is not None and self.run.phase is self.mechanism.first:
             position = self.run.x
@@ -198,14 +215,19 @@ class WholeRun:
             gap_m=gap_m(block, pose) if block is not None else pose.displacement_m,
             touching=touching(self.site, pose) if block is not None else ("base",),
             position=position,
-            error=error if position else 0.0,
+            error=self.step_error if position else 0.0,
         )
 
 
 FALLS_ON_ITS_BASE = (
-    "at {:.3f} s, and perhaps later, the block falls on its whole base: rigid contact takes the "
-    "speed of such an impact and does not decide how far it pushes the block, so that the "
-    "displacement may be a tenth off"
+    "at {:.3f} s, and perhaps later, the block falls on its whole base: how far such impacts push "
+    "it depends on how its corners rebound and rub, which rigid contact does not decide, so that "
+    "the displacement may be off by up to some tens of per cent, one of millimetres by more"
+)
+
+FAILS_BY_SOME_LAWS = (
+    "whether the block fails hangs on how its corners rebound and rub in impacts, which rigid "
+    "contact does not decide: treat it as critical; there is no error estimate"
 )
 
 

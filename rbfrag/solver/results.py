@@ -179,7 +179,8 @@ class Response(Tabular):
         toppled_s: time at which failure became inevitable [s]; None unless it fails.
         error_estimate: estimated bound on the error of the peak rotation [rad] (sliding: of
             the peak displacement [m]); for a toppling block, on the rotation at the moment
-            of the verdict.
+            of the verdict. After a lost contact, the spread of laws of impact and friction; None
+            where the block fails by some of them and not by others.
         steps: integration steps taken.
         samples_moved: sample intervals that had to be integrated.
         samples_total: sample intervals of the record.
@@ -213,7 +214,7 @@ class Response(Tabular):
     critical_angle_deg: float | None
     started_s: float | None
     toppled_s: float | None
-    error_estimate: float
+    error_estimate: float | None
     steps: int
     samples_moved: int
     samples_total: int

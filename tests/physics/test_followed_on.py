@@ -122,7 +122,10 @@ def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
         assert free.pose.turned_rad == pytest.approx(exact.final_theta_rad, rel=1e-4)
         assert free.slip_m == pytest.approx(exact.peak_displacement_m, rel=1e-4)
         assert free.time_s == pytest.approx(exact.stopped_s, abs=5e-4)
-        assert abs(free.backward_rad - exact.peak_theta_rad) < 3.0 * free.error_rad + 1e-7
+        assert (
+            abs(free.backward_rad - exact.peak_theta_rad)
+            < 3.0 * free.step_error.rotation_rad + 1e-7
+        )
 
 
 def site_of(case: Case) -> BlockOnPlanes:

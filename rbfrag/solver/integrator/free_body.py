@@ -22,7 +22,7 @@ from rbfrag.solver.results import FloatArray
 GOES_ON = -1
 """A run that has not ended."""
 
-AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS = range(5)
+AT_REST, BACKWARD, FORWARD, JUMPED, ENDLESS = range(5)
 """How a run ends: at rest to the end; on its back edge; on its front face; by a jump of the ground;
 not within `FREE_MOST_S` of rest after the record."""
 
@@ -56,13 +56,17 @@ KEEP = 5
 
 
 class Frame(NamedTuple):
-    """What else of the block and its slope enters.
+    """What else of the block and its slope enters, and what its impacts do.
 
     Args:
         inertia_m2: moment of inertia about the centroid per mass [m²].
         sine: of the dip of the base.
         backward_rad: rotation at which the back edge lies on the base [rad].
         forward_rad: clockwise rotation at which the front face does [rad].
+        restitution: speed of a corner from its plane after an impact over that towards it before.
+        impact_friction: part of Coulomb's limit that an impact mobilises: 1 where corners give as
+            little along their plane as across it; 0 where they give so much more along it that an
+            impact is over before they grip.
     """
 
     inertia_m2: float
@@ -70,6 +74,8 @@ class Frame(NamedTuple):
     cosine: float
     backward_rad: float
     forward_rad: float
+    restitution: float
+    impact_friction: float
 
 
 class Motion(NamedTuple):
@@ -157,6 +163,12 @@ def one_step(
             work.least[k] = -gap / h
         else:
             work.least[k] = LET_OUT * max(-gap - NEAR_M, 0.0) / h
+        work.friction[k] = corners.friction[i]
+        # an impact: it meets its plane within the step, at a speed that is more than rounding
+        if work.approach[k] > LANDING_M_S and gap + h * fastest <= 0.0:
+            work.friction[k] *= frame.impact_friction
+            if frame.restitution > 0.0:
+                work.least[k] = frame.restitution * work.approach[k]
     vx, vy, spin = after_impulses(
         corners, work, active, 1.0 / frame.inertia_m2, Velocity(vx, vy, spin), CONVERGED * g * h
     )
@@ -269,7 +281,7 @@ def run_free(
     while True:
         free = node >= last
         if free and last < time_s.size - 1:  # 1 + k_v <= 0 at the next node
-            return FreeRun(THROWN, now, at, steps, filled, moved_s, landed_s)
+            return FreeRun(JUMPED, now, at, steps, filled, moved_s, landed_s)
         if free and now > end_s + FREE_MOST_S:
             return FreeRun(ENDLESS, now, at, steps, filled, moved_s, landed_s)
         a0 = a1 = 0.0

@@ -71,6 +71,7 @@ class Work(NamedTuple):
         per_t: the same along the plane, shape (m,).
         least: speed from the plane that each must have at the end of the step [m/s], shape (m,).
         approach: speed towards it before the step [m/s], shape (m,).
+        friction: tangent of the friction angle that holds for each in this step, shape (m,).
         does: what each does: `OPEN`, `DOWN`, `UP` or `STUCK`, shape (m,).
         equations: coefficients and right sides of the linear equations, shape (3, 4).
         columns: velocity and spin that the unknown impulses of them give, shape (3, 3).
@@ -85,6 +86,7 @@ class Work(NamedTuple):
     per_t: FloatArray
     least: FloatArray
     approach: FloatArray
+    friction: FloatArray
     does: FloatArray
     equations: FloatArray
     columns: FloatArray
@@ -93,7 +95,7 @@ class Work(NamedTuple):
 def work_of(corners: Corners) -> Work:
     """Return the work arrays of a run."""
     m = corners.arm_x.size
-    shapes = [*10 * [(m,)], (3, 4), (3, 3)]
+    shapes = [*11 * [(m,)], (3, 4), (3, 3)]
     return Work(*[np.zeros(shape) for shape in shapes])
 
 
@@ -148,7 +150,7 @@ def after_impulses(
             change = max(change, abs(part))
             # and what stops it along its plane, as far as Coulomb's law lets it
             speed = vx * ny - vy * nx + spin * mt
-            limit = corners.friction[i] * push
+            limit = work.friction[k] * push
             grip = min(max(along[i] - speed * work.per_t[k], -limit), limit)
             part = grip - along[i]
             along[i] = grip
@@ -183,7 +185,7 @@ def _of_one(
         Whether there is one solution; and the velocity.
     """
     i = int(work.pair[0])
-    nx, ny, friction = corners.normal_x[i], corners.normal_y[i], corners.friction[i]
+    nx, ny, friction = corners.normal_x[i], corners.normal_y[i], work.friction[0]
     mn, mt = work.moment_n[0], work.moment_t[0]
     # speed of the corner along and across its normal that unit impulses of both kinds give
     nn, nt = 1.0 + mn * mn * per_inertia, mn * mt * per_inertia
@@ -231,7 +233,7 @@ def _solved(
     velocity = _substituted(work, n, free)
     if not _keeps_coulomb(corners, work, active, velocity):
         return False, free
-    _put_impulses(corners, work, active)
+    _put_impulses(work, active)
     return True, velocity
 
 
@@ -252,7 +254,7 @@ def _fill_columns(corners: Corners, work: Work, active: int, per_inertia: float)
         # a slipping corner pushes along its normal and rubs along its plane in one proportion
         rubs = 0.0
         if not stuck:
-            rubs = corners.friction[i] if work.does[k] == DOWN else -corners.friction[i]
+            rubs = work.friction[k] if work.does[k] == DOWN else -work.friction[k]
         columns[n, 0] = nx + rubs * ny
         columns[n, 1] = ny - rubs * nx
         columns[n, 2] = (mn + rubs * mt) * per_inertia
@@ -336,7 +338,7 @@ def _keeps_coulomb(corners: Corners, work: Work, active: int, velocity: Velocity
         if push <= 0.0:  # planes do not pull
             return False
         if does == STUCK:
-            if abs(work.equations[row + 1, 3]) > corners.friction[i] * push:
+            if abs(work.equations[row + 1, 3]) > work.friction[k] * push:
                 return False
         else:
             # friction opposes the slip
@@ -348,7 +350,7 @@ def _keeps_coulomb(corners: Corners, work: Work, active: int, velocity: Velocity
 
 
 @inner_kernel
-def _put_impulses(corners: Corners, work: Work, active: int) -> None:
+def _put_impulses(work: Work, active: int) -> None:
     """Put the solution in the place of the impulses that sweeps have left."""
     row = 0
     for k in range(active):
@@ -362,5 +364,5 @@ def _put_impulses(corners: Corners, work: Work, active: int) -> None:
             row += 1
             work.along[i] = work.equations[row, 3]
         else:
-            work.along[i] = corners.friction[i] * (push if does == DOWN else -push)
+            work.along[i] = work.friction[k] * (push if does == DOWN else -push)
         row += 1

@@ -32,6 +32,7 @@ def test_impulses_push_and_rub_as_coulomb_says() -> None:
         free = Velocity(*random.normal(size=3) * 1e-3)
         work = work_of(corners)
         work.pair[:] = np.arange(m)
+        work.friction[:] = friction
         work.moment_n[:] = arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]
         work.moment_t[:] = -arms[:, 0] * normals[:, 0] - arms[:, 1] * normals[:, 1]
         work.least[:] = random.choice([0.0, -1e-4], m)
