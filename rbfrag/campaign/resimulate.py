@@ -14,7 +14,7 @@ from rbfrag.campaign.kind import Case, CaseRequest, SingleBlocks
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.sequences import PairWork, SequenceTask, run_pair
-from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.check.damage import COMPUTE_AGAIN, Damage
 from rbfrag.db.check.maps import BORDER_ERROR, ROTATION_ERROR, contradictions
 from rbfrag.db.motions import load_motion
 from rbfrag.db.rows import Interval
@@ -23,7 +23,7 @@ from rbfrag.db.shock_pairs import (
     ShockEnd,
     StoredShockPair,
     pair_keys_with_samples,
-    stored_shock_pair,
+    stored_shock_pairs,
 )
 from rbfrag.db.stored_combination import StoredCombination, keys_with_samples, stored_combination
 from rbfrag.errors import RbfragError
@@ -84,7 +84,7 @@ class Resimulation:
     within_error: int
     eligible: int
     seed: int
-    findings: tuple[Finding, ...]
+    findings: tuple[Damage, ...]
 
 
 def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimulation:
@@ -104,17 +104,17 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
     chosen = random.Random(seed).sample(keys, min(sample, len(keys)))
     here = processor_and_compiler()
     exact = within_error = 0
-    findings: list[Finding] = []
+    findings: list[Damage] = []
     for key in chosen:
         if key in of_pairs:
-            pair = stored_shock_pair(connection, key)
+            (pair,) = stored_shock_pairs(connection, [key])
             off = _pair_differences(connection, pair, exactly=True)
             exact += not off
             if off and pair.processor != here:
                 off = _pair_differences(connection, pair, exactly=False)
                 within_error += not off
             findings += (
-                Finding("shock_pair", str(pair.id), problem, COMPUTE_AGAIN) for problem in off
+                Damage("shock_pair", str(pair.id), problem, COMPUTE_AGAIN) for problem in off
             )
             continue
         stored = stored_combination(connection, key)
@@ -165,8 +165,8 @@ def _pair_differences(connection: Connection, pair: StoredShockPair, *, exactly:
     ]
 
 
-def _finding(stored: StoredCombination, problem: str) -> Finding:
-    return Finding("combination", str(stored.id), problem, COMPUTE_AGAIN)
+def _finding(stored: StoredCombination, problem: str) -> Damage:
+    return Damage("combination", str(stored.id), problem, COMPUTE_AGAIN)
 
 
 def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain:

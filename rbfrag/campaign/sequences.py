@@ -25,7 +25,7 @@ from rbfrag.db.shock_pairs import (
     ShockPairRecord,
     insert_shock_pairs,
     known_shock_pairs,
-    shock_pair_rows,
+    stored_shock_pairs,
 )
 from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
@@ -132,7 +132,7 @@ def simulate_sequences(
             store, total=len(keys), resumed=len(known), started=started,
         )  # fmt: skip
         with engine.connect() as connection:
-            rows = shock_pair_rows(connection, keys)
+            rows = stored_shock_pairs(connection, keys)
     of_station = sum(pair.pairing == "station" for pair in pairs)
     return CampaignSummary(
         kind=kind.kind,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from sqlalchemy import Connection, select
@@ -60,7 +60,9 @@ def frames(
     for frame in pd.read_sql_query(query, connection, chunksize=rows):
         for column in columns:
             if column.type == "array":
-                frame[column.name] = frame[column.name].map(_as_array, na_action="ignore")
+                frame[column.name] = frame[column.name].map(
+                    lambda blob: np.frombuffer(blob, dtype="<f8"), na_action="ignore"
+                )
         yield frame.astype(types)
 
 
@@ -70,7 +72,3 @@ def _frame_type(column: ColumnMeaning) -> str:
     if column.type == "integer":
         return "Int64" if column.may_be_missing else "int64"
     return "bool" if column.type == "true/false" and not column.may_be_missing else "object"
-
-
-def _as_array(blob: bytes) -> Any:
-    return np.frombuffer(blob, dtype="<f8")

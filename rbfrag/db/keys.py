@@ -73,20 +73,29 @@ def pair_key(
 
 
 def key_of_row(
-    row: Mapping[str, Any] | RowMapping,
-    motion_sha256: str,
-    dt_s: float,
-    vertical_sha256: str | None,
+    row: Mapping[str, Any] | RowMapping, samples: Mapping[int, tuple[str, float]]
 ) -> str:
-    """Return the key that a row of `combination` has by its columns and the samples given."""
-    return combination_key(
-        motion_sha256=motion_sha256,
-        dt_s=dt_s,
-        vertical_sha256=vertical_sha256,
-        settings=json.loads(row["settings"]),
-        block=None if row["block"] is None else json.loads(row["block"]),
-        **{name: row[name] for name in ("polarity", "kind", "p2", "numerics_version", "linear")},
-    )
+    """Return the natural key that a stored result has by its columns.
+
+    Args:
+        row: of `combination`, `response` or `shock_pair`.
+        samples: SHA-256 of the samples and their interval [s] of each motion, by row id.
+    """
+    inputs = {name: row[name] for name in ("polarity", "kind", "numerics_version")}
+    if "first_motion_id" in row:
+        first_sha256, first_dt_s = samples[row["first_motion_id"]]
+        sha256, dt_s = samples[row["second_motion_id"]]
+        inputs |= {"motion_sha256": sha256, "dt_s": dt_s, "block": json.loads(row["block"])}
+        return pair_key(first_sha256=first_sha256, first_dt_s=first_dt_s, **inputs)
+    sha256, dt_s = samples[row["motion_id"]]
+    vertical_id = row["vertical_motion_id"]
+    vertical_sha256 = None if vertical_id is None else samples[vertical_id][0]
+    inputs |= {"motion_sha256": sha256, "dt_s": dt_s, "vertical_sha256": vertical_sha256}
+    inputs |= {"linear": row["linear"], "p2": row["p2"]}
+    if "settings" not in row:
+        return response_key(kr=row["kr"], **inputs)
+    block = None if row["block"] is None else json.loads(row["block"])
+    return combination_key(settings=json.loads(row["settings"]), block=block, **inputs)
 
 
 def _inputs(

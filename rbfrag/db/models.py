@@ -79,7 +79,9 @@ def load_model(
         stored = connection.execute(query).one_or_none()
         default = None if stored is None else _with_default(connection, decode_model(stored))
     if default is None:
-        raise _unknown(connection, name)
+        known = sorted(connection.scalars(select(fragility_model.c.name)))
+        place = database_label(connection.engine.url)
+        raise UnknownModelError(unknown_model(name, known, place))
     return default
 
 
@@ -105,8 +107,3 @@ def _clear_default(connection: Connection, kind: str) -> None:
 
 def _model_query() -> Select[Any]:
     return select(*(fragility_model.c[column] for column in STORED))
-
-
-def _unknown(connection: Connection, name: str | None) -> UnknownModelError:
-    known = sorted(connection.scalars(select(fragility_model.c.name)))
-    return UnknownModelError(unknown_model(name, known, database_label(connection.engine.url)))

@@ -32,6 +32,9 @@ MEASURES = (
 )  # fmt: skip
 """Columns of a motion that are calculated from its samples."""
 
+UNKNOWN_EVENT = "unknown event of "
+"""How the id of an event begins of which nothing at all is known."""
+
 _OF_ROWS = (
     "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *MEASURES, "source_file",
     "trace_index", "file_format", "processing", "source_sha256", "start_time",
@@ -93,7 +96,10 @@ def add_motion(
             f"{motion.label}: the database holds equally spaced samples only; "
             "sample the motion first"
         )
-    recording = storable(recording or motion.recording or _own_name(motion))
+    own_name = motion.sha256[:12]
+    if motion.source_file:
+        own_name = f"{motion.source_file}#{motion.trace_index}"
+    recording = storable(recording or motion.recording or own_name)
     labels: dict[str, Any] = {
         "component": storable(component or motion.component),
         "orientation_deg": motion.orientation_deg,
@@ -144,6 +150,13 @@ def motion_rows(connection: Connection, *, suite: str | None = None) -> list[Mot
     ]
 
 
+def samples_of_motions(connection: Connection) -> dict[int, tuple[str, float]]:
+    """Return the SHA-256 of the samples and their interval [s] of all motions, by row id."""
+    column = schema.motion.c
+    rows = connection.execute(select(column.id, column.samples_sha256, column.dt_s))
+    return {row_id: (sha256, dt_s) for row_id, sha256, dt_s in rows}
+
+
 def times_of_earthquakes(connection: Connection) -> dict[str, str]:
     """Return origin times or years, as metadata state them, by event id."""
     column = schema.earthquake.c
@@ -183,7 +196,7 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
         remarks=tuple(_listed(row, "remarks")),
         is_corrected=_is_corrected(row),
         is_partial="partial" in _listed(row, "flags"),
-        start_time=_time(row["start_time"]),
+        start_time=row["start_time"] and datetime.fromisoformat(row["start_time"]),
         processing_applied=_parameters(row),
         source_sha256="" if row["processing_applied"] is None else row["source_sha256"],
     )
@@ -281,10 +294,6 @@ def _is_corrected(row: RowMapping) -> bool | None:
     return True if "filter" in (_parameters(row) or {}) else None
 
 
-def _time(text: str | None) -> datetime | None:
-    return None if text is None else datetime.fromisoformat(text)
-
-
 def _parameters(row: RowMapping) -> dict[str, object] | None:
     where = f"processing_applied of motion {row['id']}"
     parameters: dict[str, object] | None = stored_json(row["processing_applied"], dict, where)
@@ -294,12 +303,6 @@ def _parameters(row: RowMapping) -> dict[str, object] | None:
 def _listed(row: RowMapping, name: str) -> list[Any]:
     listed: list[Any] = stored_json(row[name], list, f"{name} of motion {row['id']}") or []
     return listed
-
-
-def _own_name(motion: GroundMotion) -> str:
-    if motion.source_file:
-        return f"{motion.source_file}#{motion.trace_index}"
-    return motion.sha256[:12]
 
 
 def _recording_id_for(
@@ -397,7 +400,7 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
         raise InputError(
             f"event {info.event_id}: {info.magnitude} is no magnitude of an earthquake"
         )
-    event_id = storable(info.event_id) or f"unknown event of {recording}"
+    event_id = storable(info.event_id) or UNKNOWN_EVENT + recording
     guessed = info.guessed or not info.event_id
     known = {
         "name": storable(info.name),

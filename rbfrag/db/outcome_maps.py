@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,20 +26,15 @@ class OutcomeMaps:
 
     Args:
         combination_id: row ids, shape (n,), in the order that was asked for.
-        start: where the intervals of each begin, shape (n + 1,): those of number i are
-            ``start[i]:start[i + 1]``, by rising k_r/PGA.
-        k_lo: lower ends, k_r/PGA. Where intervals leave a gap, nothing is known in it.
-        k_hi: upper ends, k_r/PGA.
-        outcome: 1 every block of the interval topples, 0 none does, NaN undecided.
+        intervals: of each combination lower end and upper end, k_r/PGA, and outcome of its
+            intervals, shape (3, intervals), by rising k_r/PGA: 1 every block topples, 0 none does,
+            NaN undecided. Where intervals leave a gap, nothing is known in it.
         known_from: least k_r/PGA for which anything is known, shape (n,): the search limit, or
             more where a search was given up; inf where nothing is known (``outside_model``).
     """
 
     combination_id: NDArray[np.int64]
-    start: NDArray[np.int64]
-    k_lo: FloatArray
-    k_hi: FloatArray
-    outcome: FloatArray
+    intervals: tuple[FloatArray, ...]
     known_from: FloatArray
 
     def outcomes(self, kr_over_pga: ArrayLike) -> FloatArray:
@@ -69,8 +65,7 @@ class OutcomeMaps:
         return answer
 
     def _look_up(self, i: int, k: FloatArray, answer: FloatArray) -> None:
-        mine = slice(self.start[i], self.start[i + 1])
-        low, high, outcome = self.k_lo[mine], self.k_hi[mine], self.outcome[mine]
+        low, high, outcome = self.intervals[i]
         known = k >= self.known_from[i] * (1.0 - _ROUNDING)
         if not low.size:
             answer[known] = SAFE
@@ -94,60 +89,30 @@ def outcome_maps(connection: Connection, combination_id: ArrayLike) -> OutcomeMa
         combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
     """
     wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
-    if not wanted.size:
-        none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
-        start = np.zeros(1, dtype=np.int64)
-        return OutcomeMaps(none, start, nothing, nothing, nothing, nothing)
-    owner, low, high, outcome = _intervals(connection, wanted)
-    start, number = _of_each(owner, wanted)
-    known_from = _known_from(connection, wanted)
-    mapped = np.diff(start) > 0
-    known_from[mapped] = low[number[start[:-1][mapped]]]
-    return OutcomeMaps(
-        combination_id=wanted,
-        start=start,
-        k_lo=low[number],
-        k_hi=high[number],
-        outcome=outcome[number],
-        known_from=known_from,
-    )
-
-
-def _of_each(
-    owner: NDArray[np.int64], wanted: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return where the rows of each one wanted begin, and their numbers one after the other."""
-    begin = np.searchsorted(owner, wanted, side="left")
-    count = np.searchsorted(owner, wanted, side="right") - begin
-    start = np.concatenate([[0], np.cumsum(count)])
-    return start, np.repeat(begin - start[:-1], count) + np.arange(start[-1])
-
-
-def _intervals(
-    connection: Connection, wanted: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-    column = outcome_interval.c
-    code = case((column.outcome == "topples", TOPPLES), (column.outcome == "safe", SAFE))
-    query = (
-        select(column.combination_id, column.k_lo, column.k_hi, code)
-        .where(column.combination_id.between(int(wanted.min()), int(wanted.max())))
-        .order_by(column.combination_id, column.k_lo)
-    )
-    rows = [tuple(row) for row in connection.execute(query)]
-    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    return table[:, 0].astype(np.int64), table[:, 1], table[:, 2], table[:, 3]
-
-
-def _known_from(connection: Connection, wanted: NDArray[np.int64]) -> FloatArray:
-    """Return where knowledge begins without any interval: no block that moves, or no model."""
-    column = combination.c
-    rows = connection.execute(
-        select(column.id, column.status, column.search_limit).where(
-            column.id.between(int(wanted.min()), int(wanted.max()))
-        )
-    )
-    begins = {row_id: limit if status == "no_motion" else np.inf for row_id, status, limit in rows}
-    missing = [row_id for row_id in wanted.tolist() if row_id not in begins]
+    ids: list[int] = wanted.tolist()
+    first, last = min(ids, default=0), max(ids, default=0)
+    search, interval = combination.c, outcome_interval.c
+    query = select(search.id, search.status, search.search_limit)
+    # without any interval: no block that moves, or no model
+    known_from = {
+        row_id: limit if status == "no_motion" else np.inf
+        for row_id, status, limit in connection.execute(query.where(search.id.between(first, last)))
+    }
+    missing = [row_id for row_id in ids if row_id not in known_from]
     if missing:
         raise InputError(f"there is no combination {missing[0]} in the database")
-    return np.array([begins[row_id] for row_id in wanted.tolist()])
+    code = case((interval.outcome == "topples", TOPPLES), (interval.outcome == "safe", SAFE))
+    stored = (
+        select(interval.combination_id, interval.k_lo, interval.k_hi, code)
+        .where(interval.combination_id.between(first, last))
+        .order_by(interval.combination_id, interval.k_lo)
+    )
+    rows: defaultdict[int, list[tuple[float, ...]]] = defaultdict(list)
+    for owner, *ends_and_outcome in connection.execute(stored):
+        rows[owner].append(tuple(ends_and_outcome))
+    known_from |= {owner: intervals[0][0] for owner, intervals in rows.items()}
+    return OutcomeMaps(
+        combination_id=wanted,
+        intervals=tuple(np.array(rows[i], dtype=np.float64).reshape(-1, 3).T for i in ids),
+        known_from=np.array([known_from[i] for i in ids], dtype=np.float64),
+    )

@@ -37,7 +37,8 @@ class DatabaseInfo:
     Args:
         dialect: ``sqlite`` or ``postgresql``.
         numerics_versions: versions of the solver that made its combinations.
-        default_model: name of the model of toppling that answers when none is named.
+        default_model: name of the model of toppling that answers when none is named; None
+            without one, or where a model is damaged.
     """
 
     revision: str
@@ -225,6 +226,10 @@ def database_info(connection: Connection) -> DatabaseInfo:
         combination.c.status
     )
     versions = select(combination.c.numerics_version).distinct()
+    try:
+        default_model = load_model(connection).name
+    except (DatabaseError, UnknownModelError):  # none, or one that is damaged
+        default_model = None
     return DatabaseInfo(
         revision=SCHEMA_REVISION,  # opening refuses any other
         dialect=connection.dialect.name,
@@ -236,16 +241,8 @@ def database_info(connection: Connection) -> DatabaseInfo:
             row.status: row.number for row in connection.execute(by_status.order_by("status"))
         },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
-        default_model=_default_name(connection),
+        default_model=default_model,
     )
-
-
-def _default_name(connection: Connection) -> str | None:
-    """Return the name of the default; None without one, or where a model is damaged."""
-    try:
-        return load_model(connection).name
-    except (DatabaseError, UnknownModelError):
-        return None
 
 
 def suite_counts(connection: Connection) -> tuple[SuiteCount, ...]:

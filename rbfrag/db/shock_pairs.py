@@ -73,40 +73,20 @@ class ShockPairRecord:
     intact: ShockEnd
 
 
-class ShockPairRow(NamedTuple):
-    """One block under two motions as tables of conditional fragility read it.
-
-    Args:
-        event_id: earthquake of the second motion.
-        pga_g: its PGA [g].
-        pairing: ``station`` or ``drawn``.
-        yield_g: yield acceleration of the block [g].
-        critical_rad: rotation without strength [rad]; None of slides.
-        first: after the first motion.
-        second: after both.
-        intact: after the second alone.
-    """
-
-    event_id: str
-    pga_g: float
-    pairing: Pairing
-    yield_g: float
-    critical_rad: float | None
-    first: ShockEnd
-    second: ShockEnd
-    intact: ShockEnd
-
-
 @dataclass(frozen=True)
 class StoredShockPair:
     """One stored block under two motions.
 
     Args:
         processor: the processor and numba of its campaign.
+        event_id: earthquake of the second motion.
+        pga_g: its PGA [g].
     """
 
     id: int
     processor: object
+    event_id: str
+    pga_g: float
     record: ShockPairRecord
 
 
@@ -144,51 +124,33 @@ def pair_keys_with_samples(connection: Connection, *, numerics_version: str) -> 
     return sorted(connection.scalars(query))
 
 
-def stored_shock_pair(connection: Connection, natural_key: str) -> StoredShockPair:
-    """Return one block under two motions by its natural key."""
-    query = select(shock_pair, campaign.c.settings).join(campaign)
-    row = connection.execute(query.where(shock_pair.c.natural_key == natural_key)).mappings().one()
-    what = f"of pair of motions {row['id']}"
-    ends: dict[str, Any] = {
-        part: ShockEnd(*(row[f"{part}_{name}"] for name in ShockEnd._fields)) for part in PARTS
-    }
-    names = [each.name for each in fields(ShockPairRecord) if each.name not in (*PARTS, "block")]
-    return StoredShockPair(
-        id=row["id"],
-        processor=stored_json(row["settings"], dict, f"settings of the campaign {what}").get(
-            "made_on"
-        ),
-        record=ShockPairRecord(
-            **{name: row[name] for name in names},
-            block=stored_json(row["block"], dict, f"block {what}"),
-            **ends,
-        ),
-    )
-
-
-def shock_pair_rows(connection: Connection, keys: Iterable[str]) -> list[ShockPairRow]:
+def stored_shock_pairs(connection: Connection, keys: Iterable[str]) -> list[StoredShockPair]:
     """Return what is stored under some natural keys, in the order of the keys' text."""
-    ends = [shock_pair.c[f"{part}_{name}"] for part in PARTS for name in ShockEnd._fields]
     query = select(
-        shock_pair.c.natural_key,
-        earthquake.c.event_id,
-        motion.c.pga_g,
-        shock_pair.c.pairing,
-        shock_pair.c.yield_g,
-        shock_pair.c.critical_rad,
-        *ends,
+        shock_pair, campaign.c.settings, earthquake.c.event_id, motion.c.pga_g
     ).select_from(
         shock_pair.join(motion, motion.c.id == shock_pair.c.second_motion_id)
         .join(recording)
         .join(earthquake)
+        .join(campaign, campaign.c.id == shock_pair.c.campaign_id)
     )
-    size, rows = len(ShockEnd._fields), []
-    stored = map(tuple, rows_of_keys(connection, query, shock_pair.c.natural_key, keys))
-    for _, *values in sorted(stored, key=lambda row: row[0]):
-        known, runs = values[:5], values[5:]
-        each = (ShockEnd(*runs[start : start + size]) for start in range(0, len(runs), size))
-        rows.append(ShockPairRow(*known, *each))
-    return rows
+    names = [each.name for each in fields(ShockPairRecord) if each.name not in (*PARTS, "block")]
+    pairs = []
+    for stored in rows_of_keys(connection, query, shock_pair.c.natural_key, keys):
+        row = stored._mapping
+        what = f"of pair of motions {row['id']}"
+        settings = stored_json(row["settings"], dict, f"settings of the campaign {what}")
+        ends: dict[str, Any] = {
+            part: ShockEnd(*(row[f"{part}_{name}"] for name in ShockEnd._fields)) for part in PARTS
+        }
+        record = ShockPairRecord(
+            **{name: row[name] for name in names},
+            block=stored_json(row["block"], dict, f"block {what}"),
+            **ends,
+        )
+        of_second = row["event_id"], row["pga_g"]
+        pairs.append(StoredShockPair(row["id"], settings.get("made_on"), *of_second, record))
+    return sorted(pairs, key=lambda pair: pair.record.natural_key)
 
 
 def _row(campaign_id: int, record: ShockPairRecord) -> tuple[object, ...]:

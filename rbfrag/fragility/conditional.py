@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from rbfrag.db.shock_pairs import ShockEnd, ShockPairRow
+from rbfrag.db.shock_pairs import ShockEnd, StoredShockPair
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.methods import SINGLE
@@ -90,7 +90,7 @@ class ConditionalShare:
 
 
 def conditional_shares(
-    rows: Sequence[ShockPairRow], measure: Measure, limits: Iterable[float | None]
+    rows: Sequence[StoredShockPair], measure: Measure, limits: Iterable[float | None]
 ) -> tuple[ConditionalShare, ...]:
     """Return what a second shock does to survivors of a first, by limit, state and shaking.
 
@@ -109,17 +109,18 @@ def conditional_shares(
 
 
 def _of_limit(
-    rows: Sequence[ShockPairRow], measure: Measure, limit: float | None
+    rows: Sequence[StoredShockPair], measure: Measure, limit: float | None
 ) -> Iterable[ConditionalShare]:
     left = "displacement_m" if measure == "displacement_m" else "rotation_rad"
-    classes: dict[tuple[int, int], list[tuple[ShockPairRow, bool, bool]]] = {}
+    classes: dict[tuple[int, int], list[tuple[StoredShockPair, bool, bool]]] = {}
     unknown: Counter[tuple[int, int]] = Counter()
     for row in rows:
-        if _fails(row.first, measure, limit) is not False:
+        pair = row.record
+        if _fails(pair.first, measure, limit) is not False:
             continue
-        state = (getattr(row.first, left) or 0.0) / (limit or row.critical_rad or math.inf)
-        cell = _class(STATES, state), _class(SHAKING, row.pga_g / row.yield_g)
-        after, intact = (_fails(end, measure, limit) for end in (row.second, row.intact))
+        state = (getattr(pair.first, left) or 0.0) / (limit or pair.critical_rad or math.inf)
+        cell = _class(STATES, state), _class(SHAKING, row.pga_g / pair.yield_g)
+        after, intact = (_fails(end, measure, limit) for end in (pair.second, pair.intact))
         if after is None or intact is None:
             unknown[cell] += 1
         else:
@@ -142,7 +143,7 @@ def _of_limit(
             pga_over_yield_to=None if math.isinf(end) else end,
             blocks=len(blocks),
             earthquakes=int(event.max()) + 1,
-            of_station=sum(row.pairing == "station" for row, *_ in blocks),
+            of_station=sum(row.record.pairing == "station" for row, *_ in blocks),
             **after_share._asdict(),
             **{f"intact_{name}": value for name, value in intact_share._asdict().items()},
             ratio=after_share.fails / intact_share.fails if intact_share.fails else None,

@@ -16,8 +16,8 @@ from sqlalchemy import Connection, MetaData, Table, inspect, select, text, tuple
 
 from rbfrag.db.insert import table_digests
 from rbfrag.db.keys import canonical_json, key_of_row
-from rbfrag.db.motions import LATER_MEASURES, measures_of
-from rbfrag.db.schema import combination, metadata, motion, vertical, with_motions
+from rbfrag.db.motions import LATER_MEASURES, measures_of, samples_of_motions
+from rbfrag.db.schema import combination, metadata, motion
 from rbfrag.motions.ground_motion import GroundMotion
 
 BEFORE = {
@@ -75,21 +75,14 @@ def _move(connection: Connection, table: Table, had: set[str]) -> None:
 
 def _take_maps_out_of_keys(connection: Connection) -> None:
     """Key combinations without how their map was made; of two that differ in it, keep the finer."""
-    query = select(
-        combination,
-        motion.c.samples_sha256,
-        motion.c.dt_s,
-        vertical.c.samples_sha256.label("vertical_sha256"),
-    ).select_from(with_motions(combination))
+    samples = samples_of_motions(connection)
     best: dict[str, tuple[tuple[object, ...], int, str]] = {}
     superseded: list[int] = []
-    for row in connection.execute(query.order_by(combination.c.id)).mappings():
+    for row in connection.execute(select(combination).order_by(combination.c.id)).mappings():
         settings = json.loads(row["settings"])
         extent, depth = settings.pop("map", None), settings.pop("map_depth", None)
         stored = canonical_json(settings)
-        key = key_of_row(
-            {**row, "settings": stored}, row["samples_sha256"], row["dt_s"], row["vertical_sha256"]
-        )
+        key = key_of_row({**row, "settings": stored}, samples)
         order = (extent != "full", extent is None, depth or 0.0, row["id"])
         other = best.get(key)
         if other is not None:

@@ -12,13 +12,13 @@ from sqlalchemy import Engine, Text, and_, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 
 from rbfrag.db import schema
+from rbfrag.db.check.damage import Damage
 from rbfrag.db.check.database import (
     ALTERED,
     NOT_COVERED,
     check_database,
     check_digests,
 )
-from rbfrag.db.check.finding import Finding
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row, insert_rows
 from rbfrag.db.keys import pair_key, response_key
@@ -43,7 +43,7 @@ MAP = (
 )
 
 
-def _checked(connection: Any) -> list[Finding]:
+def _checked(connection: Any) -> list[Damage]:
     """What is found apart from the digests, which differ wherever a test alters a value."""
     return [found for found in check_database(connection) if found.problem != ALTERED]
 

@@ -8,8 +8,22 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rbfrag.db.shock_pairs import NOT_RUN, ShockEnd, ShockPairRow
+from rbfrag.db.shock_pairs import NOT_RUN, Pairing, ShockEnd, ShockPairRecord, StoredShockPair
 from rbfrag.fragility.conditional import conditional_shares, share_of_events
+
+
+def stored(
+    event: str,
+    pga_g: float,
+    pairing: Pairing,
+    critical_rad: float | None,
+    ends: tuple[ShockEnd, ShockEnd, ShockEnd],
+) -> StoredShockPair:
+    """A block of yield acceleration 0.1 g as a campaign stores it."""
+    record = ShockPairRecord(
+        "", 1, 2, pairing, "forward", "slumping", {}, 0.1, critical_rad, "0", *ends
+    )
+    return StoredShockPair(0, None, event, pga_g, record)
 
 
 def slide(
@@ -19,25 +33,23 @@ def slide(
     pga_g: float = 0.3,
     event: str = "a",
     outcome: str = "stable",
-) -> ShockPairRow:
+) -> StoredShockPair:
     """A block of k_y 0.1 that each shock slides so far."""
 
     def end(slip_m: float, word: str = "stable") -> ShockEnd:
         return ShockEnd(word, slip_m if word == "stable" else None, None, None)
 
     after = end(first_m + second_m, outcome)
-    return ShockPairRow(
-        event, pga_g, "drawn", 0.1, None, end(first_m), after, end(second_m, outcome)
-    )
+    return stored(event, pga_g, "drawn", None, (end(first_m), after, end(second_m, outcome)))
 
 
-def slump(first: float, second: float, intact: float, outcome: str = "stable") -> ShockPairRow:
+def slump(first: float, second: float, intact: float, outcome: str = "stable") -> StoredShockPair:
     """A block of k_s 0.1 whose peaks are stated; it is left at half of the first one."""
-    ends = [
+    after_first, after_second, alone = (
         ShockEnd(outcome if part == 1 else "stable", 0.0, 0.5 * peak, peak)
         for part, peak in enumerate((first, second, intact))
-    ]
-    return ShockPairRow("a", 0.5, "station", 0.1, 0.4, *ends)
+    )
+    return stored("a", 0.5, "station", 0.4, (after_first, after_second, alone))
 
 
 def test_survivors_are_counted_by_state_and_shaking() -> None:
@@ -87,7 +99,8 @@ def test_a_slump_fails_by_its_rotation_from_its_first_place_or_past_recovery() -
 
 
 def test_a_block_that_the_first_shock_leaves_nowhere_known_is_no_survivor() -> None:
-    row = slide(0.0, 0.1)._replace(first=ShockEnd("jump", None, None, None), second=NOT_RUN)
+    jump = ShockEnd("jump", None, None, None)
+    row = stored("a", 0.3, "drawn", None, (jump, NOT_RUN, ShockEnd("stable", 0.1, None, None)))
     assert conditional_shares([row], "displacement_m", (0.05,)) == ()
 
 

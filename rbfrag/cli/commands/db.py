@@ -115,8 +115,8 @@ def check(
 ) -> None:
     """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
     computed again. Exit 1 if any is found."""
+    from rbfrag.db.check.damage import Damage
     from rbfrag.db.check.database import check_database, coverage
-    from rbfrag.db.check.finding import Finding
     from rbfrag.db.engine import opened_database
 
     again = None
@@ -135,7 +135,7 @@ def check(
                     raise
                 # what a damaged row can raise there, nobody can list; the row is found already
                 why = f"{type(error).__name__}: {error}"
-                findings.append(Finding("database", "-", f"computing again broke off ({why})"))
+                findings.append(Damage("database", "-", f"computing again broke off ({why})"))
     if json:
         computed = None if again is None else asdict(again)
         if computed is not None:

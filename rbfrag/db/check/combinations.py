@@ -1,4 +1,4 @@
-"""Stored combinations and histories against their inputs, their brackets and what was simulated."""
+"""Stored combinations against their inputs, their brackets and what was simulated."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from sqlalchemy import Connection, RowMapping, func, select
+from sqlalchemy import Connection, RowMapping, select
 
-from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.check.damage import COMPUTE_AGAIN, Damage
+from rbfrag.db.check.inputs import Inputs, input_problems, stored_inputs
 from rbfrag.db.check.maps import interval_problems
-from rbfrag.db.keys import key_of_row, response_key
 from rbfrag.db.rows import Interval, Point
-from rbfrag.db.schema import campaign, combination, motion, response, vertical, with_motions
+from rbfrag.db.schema import combination, motion
 from rbfrag.db.stored_combination import intervals_of, points_of
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -25,24 +25,15 @@ _ROUNDING_OF_SUMS = 1e-9
 
 _ROWS_AT_ONCE = 500
 
-_SERIES = ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v")
-_BLOCK_OF_RESPONSE = ("polarity", "kind", "p2", "kr", "numerics_version", "linear")
 
-
-def check_combinations(connection: Connection) -> Iterator[Finding]:
+def check_combinations(connection: Connection) -> Iterator[Damage]:
     """Yield what is wrong with combinations, their intervals and their simulations."""
     query = (
-        select(
-            combination,
-            motion.c.pga_g,
-            motion.c.dt_s,
-            motion.c.samples_sha256,
-            vertical.c.samples_sha256.label("vertical_sha256"),
-            campaign.c.numerics_version.label("campaign_numerics"),
-        )
-        .select_from(with_motions(combination).outerjoin(campaign))
+        select(combination, motion.c.pga_g)
+        .join(motion, motion.c.id == combination.c.motion_id)
         .order_by(combination.c.id)
     )
+    inputs = stored_inputs(connection)
     last = 0
     while True:
         some = query.where(combination.c.id > last).limit(_ROWS_AT_ONCE)
@@ -53,19 +44,14 @@ def check_combinations(connection: Connection) -> Iterator[Finding]:
         ids = [row["id"] for row in rows]
         intervals, points = intervals_of(connection, ids), points_of(connection, ids)
         for row in rows:
-            for problem in _problems(row, intervals[row["id"]], points[row["id"]]):
-                yield Finding("combination", str(row["id"]), problem, COMPUTE_AGAIN)
+            for problem in _problems(row, inputs, intervals[row["id"]], points[row["id"]]):
+                yield Damage("combination", str(row["id"]), problem, COMPUTE_AGAIN)
 
 
 def _problems(
-    row: RowMapping, intervals: Sequence[Interval], points: Sequence[Point]
+    row: RowMapping, inputs: Inputs, intervals: Sequence[Interval], points: Sequence[Point]
 ) -> Iterator[str]:
-    yield from _key_problems(row)
-    if row["campaign_numerics"] not in (None, row["numerics_version"]):
-        yield (
-            f"numerics version {row['numerics_version']}, its campaign says "
-            f"{row['campaign_numerics']}"
-        )
+    yield from input_problems(row, inputs)
     try:
         json.loads(row["warnings"])
     except ValueError as error:
@@ -78,18 +64,6 @@ def _problems(
         yield from _point_problems(row, toppled, unsure)
     stable = [point.kr_over_pga for point in points if point.outcome == "stable"]
     yield from interval_problems(row, intervals, toppled, stable)
-
-
-def _key_problems(row: RowMapping) -> Iterator[str]:
-    for name in ("block", "settings"):
-        try:
-            json.loads(row[name] or "{}")
-        except ValueError as error:
-            yield f"its {name} cannot be read: {error}"
-            return
-    expected = key_of_row(row, row["samples_sha256"], row["dt_s"], row["vertical_sha256"])
-    if expected != row["natural_key"]:
-        yield "its natural key is not the hash of its inputs"
 
 
 def _value_problems(row: RowMapping) -> Iterator[str]:
@@ -155,36 +129,3 @@ def displacement_problems(row: RowMapping, points: Sequence[Point]) -> Iterator[
         for k, d in slid:
             if d > 0.0 and k >= row["kr_over_pga"]:
                 yield f"a block of ky/PGA {k!r} slides, yet none moves from {row['kr_over_pga']!r}"
-
-
-def check_responses(connection: Connection) -> Iterator[Finding]:
-    """Yield histories whose key is not the hash of their inputs, or of another length."""
-    lengths = [func.length(response.c[name]).label(name) for name in _SERIES]
-    query = (
-        select(
-            response.c.id,
-            response.c.natural_key,
-            response.c.npts,
-            *(response.c[name] for name in _BLOCK_OF_RESPONSE),
-            motion.c.samples_sha256,
-            motion.c.dt_s,
-            vertical.c.samples_sha256.label("vertical_sha256"),
-            *lengths,
-        )
-        .select_from(with_motions(response))
-        .order_by(response.c.id)
-    )
-    for row in connection.execute(query).mappings():
-        expected = response_key(
-            motion_sha256=row["samples_sha256"],
-            dt_s=row["dt_s"],
-            vertical_sha256=row["vertical_sha256"],
-            **{name: row[name] for name in _BLOCK_OF_RESPONSE},
-        )
-        if expected != row["natural_key"]:
-            problem = "its natural key is not the hash of its inputs"
-            yield Finding("response", str(row["id"]), problem, COMPUTE_AGAIN)
-        for name in _SERIES:
-            if row[name] != 8 * row["npts"]:
-                problem = f"{name} holds {row[name]} bytes, not 8 x {row['npts']}"
-                yield Finding("response", str(row["id"]), problem, COMPUTE_AGAIN)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from sqlalchemy import (
@@ -20,16 +21,14 @@ from sqlalchemy import (
 )
 from sqlalchemy.sql.elements import ColumnElement
 
-from rbfrag.db.check.combinations import check_combinations, check_responses
-from rbfrag.db.check.finding import FIT_AGAIN, RESTORE, Finding
+from rbfrag.db.check.combinations import check_combinations
+from rbfrag.db.check.damage import FIT_AGAIN, RESTORE, Damage
+from rbfrag.db.check.inputs import check_responses, check_shock_pairs
 from rbfrag.db.check.motions import check_motions, check_spectra
-from rbfrag.db.check.shock_pairs import check_shock_pairs
 from rbfrag.db.insert import table_digests
 from rbfrag.db.model_file import STORED, decode_model
 from rbfrag.db.schema import earthquake, fragility_model, metadata, motion, recording
 from rbfrag.errors import DatabaseError, RbfragError
-
-_GREATEST = 1.7976931348623157e308
 
 NOT_COVERED = ("id",)
 """Columns of which nothing tells whether they were altered: row numbers that nothing refers to."""
@@ -49,7 +48,7 @@ _STORAGE: Mapping[type, tuple[str, ...]] = {
 ALTERED = "its values are not those that were written: its digest differs"
 
 
-def check_database(connection: Connection) -> list[Finding]:
+def check_database(connection: Connection) -> list[Damage]:
     """Return everything that is wrong with a database; an empty list is a clean bill.
 
     Looks at the file itself (SQLite), references, the samples against their sha256 and their
@@ -58,7 +57,7 @@ def check_database(connection: Connection) -> list[Finding]:
     refers to, the digest of each row, numbers that are not finite, and the models. Makes no
     simulation.
     """
-    findings: list[Finding] = []
+    findings: list[Damage] = []
     of_sqlite = (_check_sqlite_file, _check_types) if connection.dialect.name == "sqlite" else ()
     for look in (*of_sqlite, *_LOOKS):
         try:
@@ -67,7 +66,7 @@ def check_database(connection: Connection) -> list[Finding]:
         except (*_DAMAGE, RbfragError) as error:
             what = look.__name__.removeprefix("_").removeprefix("check_")
             problem = f"the check of {what} broke off ({type(error).__name__}: {error})"
-            findings.append(Finding("database", "-", problem))
+            findings.append(Damage("database", "-", problem))
     return findings
 
 
@@ -86,39 +85,39 @@ def coverage(connection: Connection) -> str:
     )
 
 
-def _check_sqlite_file(connection: Connection) -> Iterator[Finding]:
+def _check_sqlite_file(connection: Connection) -> Iterator[Damage]:
     for (line,) in connection.exec_driver_sql("PRAGMA integrity_check"):
         if line != "ok":
-            yield Finding("file", "-", str(line), RESTORE)
+            yield Damage("file", "-", str(line), RESTORE)
     for table, row, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
-        yield Finding(str(table), str(row), f"points to a row of {parent} that is not there")
+        yield Damage(str(table), str(row), f"points to a row of {parent} that is not there")
 
 
-def _check_unused(connection: Connection) -> Iterator[Finding]:
+def _check_unused(connection: Connection) -> Iterator[Damage]:
     no_motion = ~exists().where(motion.c.recording_id == recording.c.id)
     for row_id in connection.scalars(select(recording.c.id).where(no_motion)):
-        yield Finding("recording", str(row_id), "no motion belongs to it")
+        yield Damage("recording", str(row_id), "no motion belongs to it")
     no_recording = ~exists().where(recording.c.earthquake_id == earthquake.c.id)
     for event_id in connection.scalars(select(earthquake.c.event_id).where(no_recording)):
-        yield Finding("earthquake", str(event_id), "no recording belongs to it")
+        yield Damage("earthquake", str(event_id), "no recording belongs to it")
 
 
-def _check_models(connection: Connection) -> Iterator[Finding]:
+def _check_models(connection: Connection) -> Iterator[Damage]:
     columns = [fragility_model.c[name] for name in STORED]
     for row in connection.execute(select(*columns).order_by(fragility_model.c.name)):
         try:
             model = decode_model(row)
         except DatabaseError as error:
-            yield Finding("fragility_model", row.name, str(error), FIT_AGAIN)
+            yield Damage("fragility_model", row.name, str(error), FIT_AGAIN)
             continue
         n = len(model.coefficients)
         if len(model.covariance) != n or any(len(line) != n for line in model.covariance):
             problem = f"the covariance is not {n} by {n}"
-            yield Finding("fragility_model", row.name, problem, FIT_AGAIN)
+            yield Damage("fragility_model", row.name, problem, FIT_AGAIN)
 
 
-def check_digests(connection: Connection) -> Iterator[Finding]:
-    """Yield every row whose values were altered after rbfrag wrote it."""
+def check_digests(connection: Connection) -> Iterator[Damage]:
+    """Yield every row whose values were altered after rbfrag wrote it, or are no finite numbers."""
     for name, table in sorted(metadata.tables.items()):
         key = list(table.primary_key.columns)
         columns = [column.name for column in table.c]
@@ -133,9 +132,17 @@ def check_digests(connection: Connection) -> Iterator[Finding]:
             except _DAMAGE:
                 digests = [_digest_or_none(table, columns, row) for row in rows]
             for row, digest in zip(rows, digests, strict=True):
-                if row.digest != digest:
-                    at = ", ".join(str(row._mapping[column]) for column in key)
-                    yield Finding(name, at, ALTERED)
+                problems = [] if row.digest == digest else [ALTERED]
+                bad = [
+                    column
+                    for column, value in zip(columns, row, strict=True)
+                    if isinstance(value, float) and not math.isfinite(value)
+                ]
+                if bad:
+                    problems.append(f"{', '.join(bad)}: not a finite number")
+                at = ", ".join(str(row._mapping[column]) for column in key) if problems else ""
+                for problem in problems:
+                    yield Damage(name, at, problem)
 
 
 def _digest_or_none(table: Table, columns: Sequence[str], row: Sequence[object]) -> int | None:
@@ -146,7 +153,7 @@ def _digest_or_none(table: Table, columns: Sequence[str], row: Sequence[object])
         return None
 
 
-def _check_types(connection: Connection) -> Iterator[Finding]:
+def _check_types(connection: Connection) -> Iterator[Damage]:
     """Yield the values that are of another type than their column, which SQLite allows."""
     for name, table in sorted(metadata.tables.items()):
         key: list[ColumnElement[object]] = [
@@ -158,34 +165,10 @@ def _check_types(connection: Connection) -> Iterator[Finding]:
             if isinstance(column.type, Boolean):  # read as true, and yet not equal to it
                 wrong = or_(wrong, literal_column(column.name).not_in((0, 1)))
             for row in connection.execute(select(*key).select_from(table).where(wrong)):
-                yield Finding(name, ", ".join(map(str, row)), f"{column.name}: of another type")
-
-
-def check_numbers(connection: Connection) -> Iterator[Finding]:
-    """Yield every row with a number that is not finite."""
-    for name, table in sorted(metadata.tables.items()):
-        doubles = [column for column in table.c if isinstance(column.type, Double)]
-        if not doubles:
-            continue
-        key = list(table.primary_key.columns)
-        # PostgreSQL sorts NaN above every number; SQLite holds it as NULL.
-        wrong: list[ColumnElement[bool]] = [
-            or_(column > _GREATEST, column < -_GREATEST) for column in doubles
-        ]
-        query = select(*key, *doubles).where(or_(*wrong))
-        for row in connection.execute(query).mappings():
-            bad = [c.name for c in doubles if not _finite(row[c.name])]
-            at = ", ".join(str(row[column.name]) for column in key)
-            yield Finding(name, at, f"{', '.join(bad)}: not a finite number")
-
-
-def _finite(value: object) -> bool:
-    # a text, which SQLite sorts above every number, is its own finding
-    return not isinstance(value, int | float) or abs(value) <= _GREATEST
+                yield Damage(name, ", ".join(map(str, row)), f"{column.name}: of another type")
 
 
 _LOOKS = (
-    check_numbers,
     check_digests,
     check_motions,
     check_spectra,

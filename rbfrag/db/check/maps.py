@@ -42,18 +42,17 @@ def interval_problems(
         return
     yield from _cover_problems(row, intervals)
     yield from _bracket_problems(row, intervals)
-    for points, word, other in ((toppled, "topples", "safe"), (stable, "stays", "topples")):
+    for points, word, outcome, other in (
+        (toppled, "topples", "safe", "safe"),
+        (stable, "stays", "topples", "said to topple"),
+    ):
         for k in points:
             inside = _holding(intervals, k)
-            if inside is not None and inside.outcome == other:
+            if inside is not None and inside.outcome == outcome:
                 yield (
                     f"a simulation {word} at kr/PGA {k!r}, inside the interval "
-                    f"{inside.k_lo!r} to {inside.k_hi!r} that is {_verb(other)}"
+                    f"{inside.k_lo!r} to {inside.k_hi!r} that is {other}"
                 )
-
-
-def _verb(outcome: str) -> str:
-    return "safe" if outcome == "safe" else "said to topple"
 
 
 def _cover_problems(row: RowMapping, intervals: Sequence[Interval]) -> Iterator[str]:

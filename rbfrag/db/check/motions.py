@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from sqlalchemy import Connection, select
 
-from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.check.damage import COMPUTE_AGAIN, Damage
 from rbfrag.db.motions import load_motion, measures_of, same_measure
 from rbfrag.db.schema import motion, toppling_spectrum
 from rbfrag.errors import InputError, RbfragError
@@ -25,32 +25,26 @@ from rbfrag.solver.results import NUMERICS_VERSION
 _ROUNDING = 1e-9
 
 
-def check_motions(connection: Connection) -> Iterator[Finding]:
+def check_motions(connection: Connection) -> Iterator[Damage]:
     """Yield what is wrong with motions: bytes, sha256, and intensity measures calculated anew."""
     query = select(motion).order_by(motion.c.id)
     ids = list(connection.scalars(select(motion.c.id).order_by(motion.c.id)))
     for row_id in ids:  # one at a time: the samples of all may not fit into memory
         row = connection.execute(query.where(motion.c.id == row_id)).mappings().one()
         for problem in _problems(row):
-            yield Finding("motion", str(row_id), problem, _advice(row["source_file"]))
-
-
-def _advice(source_file: str) -> str:
-    file = source_file or "the file of its record"
-    return f"restore the database from a copy, or add {file} to a new database"
+            file = row["source_file"] or "the file of its record"
+            advice = f"restore the database from a copy, or add {file} to a new database"
+            yield Damage("motion", str(row_id), problem, advice)
 
 
 def _problems(row: Any) -> Iterator[str]:
-    for column in ("flags", "remarks"):
+    for column in ("flags", "remarks", "processing_applied"):
         try:
-            if not isinstance(json.loads(row[column]), list):
+            value = json.loads(row[column] or "{}")
+            if column != "processing_applied" and not isinstance(value, list):
                 yield f"its {column} are no JSON list"
         except (ValueError, RecursionError) as error:
             yield f"its {column} cannot be read: {error}"
-    try:
-        json.loads(row["processing_applied"] or "{}")
-    except (ValueError, RecursionError) as error:
-        yield f"its processing_applied cannot be read: {error}"
     if row["processing_applied"] is None and row["source_sha256"] != row["samples_sha256"]:
         yield "its samples are not those of the file, yet no processing is said to be applied"
     samples = row["samples"]
@@ -77,7 +71,7 @@ def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
             yield f"{name} is {stored!r}, the samples give {now!r}"
 
 
-def check_spectra(connection: Connection) -> Iterator[Finding]:
+def check_spectra(connection: Connection) -> Iterator[Damage]:
     """Yield every X(p) of the present numerics that its motion does not give."""
     column = toppling_spectrum.c
     query = (
@@ -102,4 +96,4 @@ def check_spectra(connection: Connection) -> Iterator[Finding]:
                 if not math.isclose(stored, now, rel_tol=_ROUNDING, abs_tol=1e-15):
                     row = f"motion {motion_id}, {polarity}, p2 {p2:g}"
                     problem = f"X(p) is {stored!r} m/s, the motion gives {now!r} m/s"
-                    yield Finding("toppling_spectrum", row, problem, COMPUTE_AGAIN)
+                    yield Damage("toppling_spectrum", row, problem, COMPUTE_AGAIN)

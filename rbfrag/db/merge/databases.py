@@ -3,27 +3,93 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from sqlalchemy import Connection, text
+from sqlalchemy import select, text
 
 from rbfrag.db.check.database import check_database
+from rbfrag.db.check.maps import ROTATION_ERROR
 from rbfrag.db.connect import database_label
+from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.engine import opened_database
+from rbfrag.db.insert import insert_row, update_rows
 from rbfrag.db.location import locate
-from rbfrag.db.merge.ledger import CONFLICTS_SHOWN, Ledger, Merge
-from rbfrag.db.merge.motions import merge_motions, merge_suites
-from rbfrag.db.merge.results import (
-    merge_campaigns,
-    merge_combinations,
-    merge_models,
-    merge_responses,
-    merge_shock_pairs,
-    merge_spectra,
+from rbfrag.db.merge.results import merge_combinations
+from rbfrag.db.merge.rows import Merge, Row, Rule, stored_rows
+from rbfrag.db.model_file import ModelRow, encode_model
+from rbfrag.db.models import model_rows
+from rbfrag.db.motions import (
+    LATER_MEASURES,
+    MEASURES,
+    UNKNOWN_EVENT,
+    delete_orphans,
+    same_measure,
 )
-from rbfrag.db.schema import metadata
+from rbfrag.db.schema import (
+    campaign,
+    earthquake,
+    fragility_model,
+    metadata,
+    motion,
+    recording,
+    response,
+    shock_pair,
+    suite,
+    suite_motion,
+    toppling_spectrum,
+)
+from rbfrag.db.shock_pairs import PARTS
 from rbfrag.errors import DatabaseError, InputError, MergeConflictError
+
+_CONFLICTS_SHOWN = 5
+
+# What is said of a motion, besides its samples and what follows from them.
+_OWN = (*NOT_DIGESTED, "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added")
+_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *MEASURES))
+
+_EARTHQUAKE = Rule(
+    earthquake,
+    (("event_id", "guessed"),),
+    "{event_id}",
+    {"magnitude": 0.0},
+    ("name", "magnitude", "time"),
+)
+_RECORDING = Rule(recording, (("earthquake_id", "name", "station"),))
+# the same samples of a file, processed alike, are one motion too (as for `motions add`)
+_MOTION = Rule(
+    motion,
+    (("samples_sha256", "dt_s"), ("source_sha256", "processing_applied", "dt_s")),
+    "{source_file}#{trace_index}",
+    {"npts": 0.0},
+    (*LATER_MEASURES, "samples"),
+)
+_OTHERS = (
+    Rule(suite, (("name",),)),
+    Rule(suite_motion, (("suite_id", "motion_id"),)),
+    Rule(
+        campaign,
+        (("started", "settings", "numerics_version", "rbfrag_version"),),
+        filled=("finished",),
+    ),
+    Rule(
+        toppling_spectrum,
+        (("motion_id", "polarity", "p2", "numerics_version"),),
+        "of motion {motion_id} at p2 {p2:g}, {polarity}",
+        {"x_m_s": 1e-9},
+    ),
+    Rule(response, compared={"outcome": 0.0, "peak_theta_n": ROTATION_ERROR}),
+    Rule(
+        shock_pair,
+        compared={
+            f"{part}_{end}": ROTATION_ERROR
+            for part in PARTS
+            for end in ("outcome", "displacement_m", "rotation_rad", "peak_rad")
+        },
+    ),
+)
+"""Tables whose rows are taken over one by one, each behind those that it refers to."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +102,7 @@ class MergeReport:
         restated: motions whose guessed earthquake became the stated one of the other.
         within_error: results that differ from those here by no more than the solver's error
             (made on another processor): those here stay.
-        notes: sentences about everything else that is said differently, and what was kept.
+        notes: sentences about what was stored under another name.
     """
 
     added: dict[str, int]
@@ -57,8 +123,8 @@ def merge_databases(
 
     Rows are the same when their natural keys are: samples and interval of a motion, id of an
     earthquake (guessed and stated apart), name of a suite, hash over all inputs of a
-    combination. Merging twice changes nothing. Where the values of one key differ by more than
-    rounding, nothing is written.
+    combination. What is here stays; merging twice changes nothing. Where results or stated
+    earthquakes of one key differ by more than rounding, nothing is written.
 
     Args:
         other: the database to read (path or URL); it is checked first and not changed.
@@ -71,7 +137,6 @@ def merge_databases(
     """
     if _is_same(locate(other), locate(db)):
         raise InputError("both are the same database: name another one to merge")
-    ledger = Ledger()
     with opened_database(other, read_only=True) as theirs, theirs.connect() as source:
         label = database_label(theirs.url)
         findings = check_database(source)
@@ -82,24 +147,32 @@ def merge_databases(
                 f"{first.table} {first.row}: {first.problem}; rbfrag db check tells of it"
             )
         with opened_database(db, create=True) as ours, ours.begin() as target:
-            _keep_writers_out(target)
-            merge = Merge(source, target, ledger)
-            merge_motions(merge)
-            merge_suites(merge)
-            merge_campaigns(merge)
-            merge_spectra(merge)
+            if target.dialect.name == "postgresql":
+                # keeps writers out, as SQLite's transactions do by themselves
+                names = ", ".join(sorted(metadata.tables))
+                target.execute(text(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE"))
+            merge = Merge(source, target)
+            _merge_motions(merge)
+            for rule in _OTHERS:
+                for row in merge.rows(rule.table):
+                    merge.bring(rule, row)
             merge_combinations(merge)
-            merge_responses(merge)
-            merge_shock_pairs(merge)
-            merge_models(merge)
-            if ledger.conflicts:
-                raise _refusal(ledger, database_label(ours.url), label)
+            _merge_models(merge)
+            conflicts = list(dict.fromkeys(merge.conflicts))
+            if conflicts:
+                shown = "; ".join(conflicts[:_CONFLICTS_SHOWN])
+                more = len(conflicts) - _CONFLICTS_SHOWN
+                raise MergeConflictError(
+                    f"{database_label(ours.url)} (here) and {label} (there) contradict each other: "
+                    f"{shown}{f'; and {more} more' if more > 0 else ''}. Nothing was written: "
+                    "correct one of them"
+                )
     return MergeReport(
-        added={name: n for name, n in sorted(ledger.added.items()) if n},
-        same={name: n for name, n in sorted(ledger.same.items()) if n},
-        restated=ledger.restated,
-        within_error=ledger.within_error,
-        notes=tuple(ledger.notes),
+        added={name: n for name, n in sorted(merge.added.items()) if n},
+        same=dict(sorted(merge.same.items())),
+        restated=merge.restated,
+        within_error=merge.within_error,
+        notes=tuple(merge.notes),
     )
 
 
@@ -111,18 +184,109 @@ def _is_same(one: Path | str, other: Path | str) -> bool:
     return one == other
 
 
-def _keep_writers_out(target: Connection) -> None:
-    # SQLite's transactions do so by themselves; readers go on in both.
-    if target.dialect.name == "postgresql":
-        names = ", ".join(sorted(metadata.tables))
-        target.execute(text(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE"))
+def _merge_motions(merge: Merge) -> None:
+    """Bring motions in, each with its recording and earthquake; a guess gives way."""
+    places = {row["id"]: row for row in stored_rows(merge.source, recording)}
+    events = {row["id"]: row for row in stored_rows(merge.source, earthquake)}
+    left: set[int] = set()
+    for row in stored_rows(merge.source, motion):
+        place = places[row["recording_id"]]
+        event = events[place["earthquake_id"]]
+        ours = merge.find(_MOTION, row)
+        if ours is None:
+            merge.bring(_MOTION, {**row, "recording_id": _recording(merge, row, place, event)})
+            continue
+        theirs = {**row, "source_file": row["source_file"] or place["name"]}
+        if ours["samples_sha256"] != row["samples_sha256"]:
+            merge.other_bits = True
+            theirs["samples"] = None
+        merge.bring(_MOTION, theirs)
+        peaks = ours["pgv_m_s"], ours["pgd_m"]
+        for column in MEASURES:
+            here, there = ours[column], row[column]
+            unknown = column in LATER_MEASURES and None in (here, there)
+            if not (unknown or same_measure(column, here, there, *peaks)):
+                merge.conflict(_MOTION, theirs, column, here, there)
+        of_ours = select(earthquake).join(recording)
+        of_ours = of_ours.where(recording.c.id == ours["recording_id"])
+        our_event = merge.target.execute(of_ours).mappings().one()
+        same_event = our_event["event_id"] == event["event_id"]
+        if our_event["guessed"] and not event["guessed"]:
+            values = {name: row[name] for name in _LABELS}
+            values["recording_id"] = _recording(merge, row, place, event)
+            update_rows(merge.target, motion, motion.c.id == ours["id"], values)
+            left.add(ours["recording_id"])
+            merge.restated += 1
+        elif same_event and our_event["guessed"] == event["guessed"]:
+            merge.bring(_EARTHQUAKE, event)
+        if our_event["guessed"] or event["guessed"]:
+            continue
+        if not same_event:
+            both = our_event["event_id"], event["event_id"]
+            merge.conflict(_MOTION, theirs, "event_id", *both)
+        if ours["is_vertical"] != row["is_vertical"]:
+            both = ours["is_vertical"], row["is_vertical"]
+            merge.conflict(_MOTION, theirs, "is_vertical", *both)
+    for recording_id in left:
+        delete_orphans(merge.target, recording_id)
 
 
-def _refusal(ledger: Ledger, here: str, there: str) -> MergeConflictError:
-    shown = "; ".join(map(str, ledger.conflicts[:CONFLICTS_SHOWN]))
-    more = len(ledger.conflicts) - CONFLICTS_SHOWN
-    rest = f"; and {more} more" if more > 0 else ""
-    return MergeConflictError(
-        f"{here} (here) and {there} (there) contradict each other: {shown}{rest}. Nothing was "
-        "written: correct one of them"
-    )
+def _recording(merge: Merge, row: Row, place: Row, event: Row) -> int:
+    """Return the id here of the recording of a motion that comes in."""
+    if event["guessed"] and event["event_id"].startswith(UNKNOWN_EVENT):
+        stranger = (
+            select(motion.c.id)
+            .select_from(motion.join(recording).join(earthquake))
+            .where(
+                earthquake.c.event_id == event["event_id"],
+                earthquake.c.guessed,
+                recording.c.name == place["name"],
+                recording.c.station == place["station"],
+                motion.c.source_file == row["source_file"],
+                motion.c.trace_index == row["trace_index"],
+            )
+        )
+        if merge.target.execute(stranger).first() is not None:
+            # Files of one name in two folders are no companions: nothing says they are.
+            name = row["samples_sha256"][:12]
+            merge.notes.append(
+                f"there is another record {place['name']!r} of no known event here: theirs is "
+                f"another, stored as recording {name!r}"
+            )
+            event = {**event, "id": -row["id"], "event_id": UNKNOWN_EVENT + name}
+            place = {**place, "id": -row["id"], "name": name}
+    earthquake_id = merge.bring(_EARTHQUAKE, event)
+    return merge.bring(_RECORDING, {**place, "earthquake_id": earthquake_id})
+
+
+def _merge_models(merge: Merge) -> None:
+    """Bring models in; of two that differ under one name, the other's gets a number.
+
+    A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
+    free. Chosen defaults stay; a database without models of a kind takes the other's choice.
+    """
+    ours = {row.name: row for row in model_rows(merge.target)}
+    kinds = {row.kind for row in ours.values()}
+    is_chosen = select(fragility_model.c.name).where(fragility_model.c.is_default)
+    chosen = set(merge.source.scalars(is_chosen))
+    for theirs in model_rows(merge.source):
+        name, number = theirs.name, 1
+        while name in ours and _content(ours[name]) != _content(theirs):
+            number += 1
+            name = f"{theirs.name}-{number}"
+        if name in ours:
+            merge.same["fragility_model"] += 1
+            continue
+        is_default = theirs.name in chosen and theirs.kind not in kinds
+        ours[name] = replace(theirs, name=name, is_default=is_default)
+        insert_row(merge.target, fragility_model, encode_model(ours[name]))
+        merge.added["fragility_model"] += 1
+        if name != theirs.name:
+            merge.notes.append(
+                f"there is another model {theirs.name!r} here: theirs is stored as {name!r}"
+            )
+
+
+def _content(row: ModelRow) -> dict[str, Any]:
+    """Return what a model says, whatever its name and the time of its fit."""
+    return encode_model(replace(row, name="-", is_default=False, created=""))

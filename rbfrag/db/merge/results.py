@@ -1,380 +1,156 @@
-"""Bringing in the results of another database: combinations, histories, spectra, models."""
+"""Bringing in the combinations of another database, with their maps and simulations."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from itertools import islice
 
-from sqlalchemy import RowMapping, select
+from sqlalchemy import Connection, select
 
-from rbfrag.db.campaigns import (
-    GRID_MEETS_POINT,
-    INTERVAL_COLUMNS,
-    POINT_COLUMNS,
-    known_combinations,
-)
+from rbfrag.db.campaigns import GRID_MEETS_POINT, INTERVAL_COLUMNS, POINT_COLUMNS
 from rbfrag.db.check.maps import BORDER_ERROR, ROTATION_ERROR, contradictions
 from rbfrag.db.digest import NOT_DIGESTED
-from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
-from rbfrag.db.keys import key_of_row
-from rbfrag.db.merge.ledger import Ledger, Merge
-from rbfrag.db.model_file import ModelRow, encode_model
-from rbfrag.db.models import model_rows
+from rbfrag.db.insert import insert_rows, rows_of_keys, update_rows
+from rbfrag.db.merge.rows import Merge, Row, Rule, agree
 from rbfrag.db.rows import Interval, Point
-from rbfrag.db.schema import (
-    campaign,
-    combination,
-    fragility_model,
-    motion,
-    outcome_interval,
-    response,
-    shock_pair,
-    simulation,
-    toppling_spectrum,
-)
-from rbfrag.db.shock_pairs import PARTS, ShockEnd
+from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.db.stored_combination import intervals_of, points_of
 
 _AT_ONCE = 500
-_COLUMNS = tuple(c.name for c in combination.c if c.name not in ("id", "digest"))
-_INPUTS = (
-    "natural_key", "polarity", "kind", "linear", "p2", "block", "settings", "numerics_version",
-)  # fmt: skip
-_INCIDENTAL = ("campaign_id", "motion_id", "vertical_motion_id", "warnings")
+
+_COLUMNS = tuple(c.name for c in combination.c if c.name not in NOT_DIGESTED)
 _OF_A_MAP = ("island_width", "kr_over_pga_resolved", "reentrant")
-_VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL, *_OF_A_MAP))
+_NOT_COMPARED = (
+    "natural_key", "polarity", "kind", "linear", "p2", "block", "settings", "numerics_version",
+    "campaign_id", "motion_id", "vertical_motion_id", "warnings", *_OF_A_MAP,
+)  # fmt: skip
+_OF_A_SEARCH = tuple(name for name in _COLUMNS if name not in _NOT_COMPARED)
 
-AnyRow = RowMapping | Mapping[str, Any]
-
-
-def merge_campaigns(merge: Merge) -> None:
-    """Bring campaigns in; two are one when settings, versions and start are the same."""
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    ids = merge.campaigns
-    for theirs in source.execute(select(campaign).order_by(campaign.c.id)).mappings():
-        key = {
-            name: theirs[name]
-            for name in ("settings", "numerics_version", "rbfrag_version", "started")
-        }
-        ours = target.execute(
-            select(campaign.c.id, campaign.c.finished).filter_by(**key).order_by(campaign.c.id)
-        ).first()
-        if ours is not None:
-            ledger.same["campaign"] += 1
-            ids[theirs["id"]] = ours.id
-            if ours.finished is None and theirs["finished"] is not None:
-                values = {"finished": theirs["finished"]}
-                update_rows(target, campaign, campaign.c.id == ours.id, values)
-            continue
-        ids[theirs["id"]] = insert_row(target, campaign, {**key, "finished": theirs["finished"]})
-        ledger.added["campaign"] += 1
+_COMBINATION = Rule(combination)
+_SIMULATION = Rule(simulation)
 
 
 def merge_combinations(merge: Merge) -> None:
     """Bring combinations in, each with its map and its simulations."""
-    last = 0
-    while True:
-        query = select(combination).where(combination.c.id > last).order_by(combination.c.id)
-        portion = merge.source.execute(query.limit(_AT_ONCE)).mappings().all()
-        if not portion:
-            return
-        last = portion[-1]["id"]
-        rows = [{**row, "natural_key": _key_here(merge, row)} for row in portion]
-        known = known_combinations(merge.target, (row["natural_key"] for row in rows))
-        _add(merge, [row for row in rows if row["natural_key"] not in known])
-        shared = [row for row in rows if row["natural_key"] in known]
-        if shared:
-            ids = {key: stored.id for key, stored in known.items()}
-            _compare(merge, shared, ids)
+    rows = merge.rows(combination)
+    while portion := list(islice(rows, _AT_ONCE)):
+        keys = [row["natural_key"] for row in portion]
+        known = _combinations_here(merge.target, keys).keys()
+        values = [tuple(row[name] for name in _COLUMNS) for row in portion]
+        insert_rows(merge.target, combination, _COLUMNS, values)
+        here = _combinations_here(merge.target, keys)
+        merge.added["combination"] += len(here.keys() - known)
+        _merge_results(merge, [(here[row["natural_key"]], row) for row in portion], known)
 
 
-def _add(merge: Merge, rows: Sequence[Mapping[str, Any]]) -> None:
-    if not rows:
-        return
-    target, ledger = merge.target, merge.ledger
-    values = []
-    for row in rows:
-        own = {
-            **row,
-            "campaign_id": merge.campaigns[row["campaign_id"]],
-            **_motions_here(merge, row),
-        }
-        values.append(tuple(own[name] for name in _COLUMNS))
-    insert_rows(target, combination, _COLUMNS, values)
-    ledger.added["combination"] += len(rows)
-    ids = known_combinations(target, (row["natural_key"] for row in rows))
-    here = {row["id"]: ids[row["natural_key"]].id for row in rows}
-    intervals = _moved(intervals_of(merge.source, list(here)), here)
-    insert_rows(target, outcome_interval, INTERVAL_COLUMNS, intervals)
-    ledger.added["outcome_interval"] += len(intervals)
-    points = _moved(points_of(merge.source, list(here)), here)
-    insert_rows(target, simulation, POINT_COLUMNS, points)
-    ledger.added["simulation"] += len(points)
+def _combinations_here(target: Connection, keys: Sequence[str]) -> dict[str, Row]:
+    column = combination.c.natural_key
+    rows = rows_of_keys(target, select(combination), column, keys)
+    return {row.natural_key: row._mapping for row in rows}
 
 
-def _moved(
-    theirs: Mapping[int, Sequence[tuple[Any, ...]]], here: Mapping[int, int]
-) -> list[tuple[Any, ...]]:
-    return [(here[their_id], *row) for their_id, rows in theirs.items() for row in rows]
-
-
-def _motions_here(merge: Merge, row: AnyRow) -> dict[str, int | None]:
-    names = ("motion_id", "vertical_motion_id")
-    return {name: None if row[name] is None else merge.motions[row[name]] for name in names}
-
-
-def _key_here(merge: Merge, row: AnyRow) -> str:
-    """Return the natural key that a combination there has with the samples here."""
-    inputs = (row["motion_id"], row["vertical_motion_id"])
-    if not merge.other_bits.keys() & set(inputs):
-        return str(row["natural_key"])
-    query = select(motion.c.id, motion.c.samples_sha256, motion.c.dt_s)
-    rows = merge.source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
-    shas = {one.id: merge.other_bits.get(one.id, one.samples_sha256) for one in rows}
-    (dt_s,) = {one.dt_s for one in rows if one.id == row["motion_id"]}
-    return key_of_row(row, shas[row["motion_id"]], dt_s, shas.get(row["vertical_motion_id"]))
-
-
-def _compare(merge: Merge, rows: Sequence[Mapping[str, Any]], known: Mapping[str, int]) -> None:
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    our_ids = [known[row["natural_key"]] for row in rows]
-    query = select(combination).where(combination.c.id.in_(our_ids))
-    ours_by_key = {row["natural_key"]: row for row in target.execute(query).mappings()}
-    their_ids = [row["id"] for row in rows]
-    maps = intervals_of(target, our_ids), intervals_of(source, their_ids)
-    runs = points_of(target, our_ids), points_of(source, their_ids)
-    more: list[tuple[object, ...]] = []
+def _merge_results(merge: Merge, pairs: Sequence[tuple[Row, Row]], known: Collection[str]) -> None:
+    """Bring maps and simulations in, and compare those of combinations known before."""
+    our_ids, their_ids = ([row["id"] for row in rows] for rows in zip(*pairs, strict=True))
+    our_maps = intervals_of(merge.target, our_ids)
+    their_maps = intervals_of(merge.source, their_ids)
+    our_points = points_of(merge.target, our_ids)
+    their_points = points_of(merge.source, their_ids)
     intervals: list[tuple[object, ...]] = []
-    for theirs in rows:
-        ours = ours_by_key[theirs["natural_key"]]
-        name = f"{theirs['natural_key'][:12]}…"
-        here_map, there_map = maps[0][ours["id"]], maps[1][theirs["id"]]
-        both_mapped = bool(here_map and there_map)
-        compared = (*_VALUES, *_OF_A_MAP) if both_mapped else _VALUES
-        exact = all(ours[c] == theirs[c] for c in compared) and (
-            not both_mapped or here_map == there_map
-        )
-        if not exact and not _within_error(name, ours, theirs, here_map, there_map, ledger):
-            continue
-        ledger.same["combination"] += 1
-        ledger.within_error += not exact
-        if there_map and not here_map:
-            intervals += ((ours["id"], *interval) for interval in there_map)
-            columns = {column: theirs[column] for column in _OF_A_MAP}
-            update_rows(target, combination, combination.c.id == ours["id"], columns)
-        band = None if exact else _band(ours, theirs)
-        points = (runs[0][ours["id"]], runs[1][theirs["id"]])
-        more += ((ours["id"], *point) for point in _more_points(name, *points, band, ledger))
-    insert_rows(target, outcome_interval, INTERVAL_COLUMNS, intervals)
-    insert_rows(target, simulation, POINT_COLUMNS, more, on_conflict=GRID_MEETS_POINT)
-    ledger.added["outcome_interval"] += len(intervals)
-    ledger.added["simulation"] += len(more)
+    points: list[tuple[object, ...]] = []
+    for ours, theirs in pairs:
+        our_id, their_id = ours["id"], theirs["id"]
+        maps = our_maps[our_id], their_maps[their_id]
+        band = None
+        if theirs["natural_key"] in known:
+            merge.same["combination"] += 1
+            compared = (*_OF_A_SEARCH, *_OF_A_MAP) if all(maps) else _OF_A_SEARCH
+            exact = all(ours[name] == theirs[name] for name in compared)
+            if not exact or (all(maps) and maps[0] != maps[1]):
+                if not _is_same_search(merge, ours, theirs, *maps):
+                    continue
+                merge.within_error += 1
+                band = _band(ours, theirs)
+            if maps[1] and not maps[0]:
+                values = {name: theirs[name] for name in _OF_A_MAP}
+                update_rows(merge.target, combination, combination.c.id == our_id, values)
+        if not maps[0]:
+            intervals += ((our_id, *interval) for interval in maps[1])
+        more = _more_points(merge, theirs, our_points[our_id], their_points[their_id], band)
+        points += ((our_id, *point) for point in more)
+    insert_rows(merge.target, outcome_interval, INTERVAL_COLUMNS, intervals)
+    insert_rows(merge.target, simulation, POINT_COLUMNS, points, on_conflict=GRID_MEETS_POINT)
+    merge.added["outcome_interval"] += len(intervals)
+    merge.added["simulation"] += len(points)
 
 
-def _within_error(
-    name: str,
-    ours: AnyRow,
-    theirs: AnyRow,
-    here_map: Sequence[Interval],
-    there_map: Sequence[Interval],
-    ledger: Ledger,
+def _is_same_search(
+    merge: Merge, ours: Row, theirs: Row, our_map: Sequence[Interval], their_map: Sequence[Interval]
 ) -> bool:
+    """Return whether two searches agree within the solver's error; note where they do not."""
     if ours["status"] != theirs["status"]:
-        ledger.conflict("combination", name, "status", ours["status"], theirs["status"])
+        merge.conflict(_COMBINATION, theirs, "status", ours["status"], theirs["status"])
         return False
     if ours["status"] == "found":
-        low = max(_lower(ours), _lower(theirs))
-        high = min(_upper(ours), _upper(theirs))
-        if low > high * (1.0 + BORDER_ERROR):
-            here, there = ours["kr_over_pga"], theirs["kr_over_pga"]
-            ledger.conflict("combination", name, "kr_over_pga", here, there)
+        (low, high), (low_2, high_2) = _bracket(ours), _bracket(theirs)
+        if max(low, low_2) > min(high, high_2) * (1.0 + BORDER_ERROR):
+            both = ours["kr_over_pga"], theirs["kr_over_pga"]
+            merge.conflict(_COMBINATION, theirs, "kr_over_pga", *both)
             return False
-    for bottom, top, here, there in contradictions(here_map, there_map):
+    for bottom, top, here, there in contradictions(our_map, their_map):
         column = f"the outcome from kr/PGA {bottom!r} to {top!r}"
-        ledger.conflict("combination", name, column, here, there)
+        merge.conflict(_COMBINATION, theirs, column, here, there)
         return False
     return True
 
 
-def _lower(row: AnyRow) -> float:
-    return float(row["kr_over_pga"] if row["lower"] is None else row["lower"])
+def _more_points(
+    merge: Merge,
+    row: Row,
+    ours: Sequence[Point],
+    theirs: Sequence[Point],
+    band: tuple[float, float] | None,
+) -> Iterator[Point]:
+    """Yield the simulations there that are not here; note those that contradict each other.
+
+    Args:
+        band: where runs of the other search belong to its bracket, not to the one here.
+    """
+    known = {point.kr_over_pga: point for point in ours}
+    numbered = {point.grid: point for point in ours if point.grid is not None}
+    for there in theirs:
+        k, number = there.kr_over_pga, there.grid
+        # another processor may have given a block of the grid a strength of other last bits
+        here = known.get(k) if number is None else numbered.get(number, known.get(k))
+        in_band = band is not None and band[0] <= k <= band[1]
+        if here is None:
+            if number is not None or not in_band:
+                yield there
+            continue
+        if number is not None and here.grid is None:
+            yield here._replace(grid=number)
+        slid = f"displacement_m at ky/PGA {k!r}"
+        compared: list[tuple[str, object, object]]
+        compared = [(slid, here.displacement_m, there.displacement_m)]
+        if here.outcome != there.outcome:
+            # another processor's last bits turn a sensitive outcome as other motions do
+            if not (in_band or here.sensitive or there.sensitive):
+                compared.append((f"the outcome at kr/PGA {k!r}", here.outcome, there.outcome))
+        elif here.sensitive is None:  # elsewhere the size of peaks may be chaotic
+            compared.append((f"theta_n at kr/PGA {k!r}", here.theta_n, there.theta_n))
+        for column, one, other in compared:
+            if not agree(one, other, ROTATION_ERROR):
+                merge.conflict(_SIMULATION, row, column, one, other)
 
 
-def _upper(row: AnyRow) -> float:
-    return float(row["kr_over_pga"] if row["upper"] is None else row["upper"])
+def _bracket(row: Row) -> tuple[float, float]:
+    k, lower, upper = row["kr_over_pga"], row["lower"], row["upper"]
+    return k if lower is None else lower, k if upper is None else upper
 
 
-def _band(ours: AnyRow, theirs: AnyRow) -> tuple[float, float] | None:
-    """Return where runs of the other search belong to its bracket, not to ours."""
+def _band(ours: Row, theirs: Row) -> tuple[float, float] | None:
+    """Return where runs of the other search belong to its bracket, not to the one here."""
     if ours["status"] != "found":
         return None
-    low = min(_lower(ours), _lower(theirs))
-    high = max(_upper(ours), _upper(theirs))
-    return low * (1.0 - BORDER_ERROR), high * (1.0 + BORDER_ERROR)
-
-
-def _more_points(
-    name: str,
-    here: Sequence[Point],
-    there: Sequence[Point],
-    band: tuple[float, float] | None,
-    ledger: Ledger,
-) -> list[Point]:
-    known = {point.kr_over_pga: point for point in here}
-    numbered = {point.grid: point for point in here if point.grid is not None}
-    more: list[Point] = []
-    for point in there:
-        k, number = point.kr_over_pga, point.grid
-        # another processor may have given a block of the grid a strength of other last bits
-        mine = known.get(k) if number is None else numbered.get(number, known.get(k))
-        in_band = band is not None and band[0] <= k <= band[1]
-        if mine is None:
-            if number is not None or not in_band:
-                more.append(point)
-            continue
-        if number is not None and mine.grid is None:
-            more.append(mine._replace(grid=number))
-        if _differ(point.displacement_m, mine.displacement_m):
-            column = f"displacement_m at ky/PGA {k!r}"
-            ledger.conflict("simulation", name, column, mine.displacement_m, point.displacement_m)
-        if point.outcome != mine.outcome:
-            # another processor's last bits turn a sensitive outcome as other motions do
-            if not (in_band or mine.sensitive or point.sensitive):
-                column = f"the outcome at kr/PGA {k!r}"
-                ledger.conflict("simulation", name, column, mine.outcome, point.outcome)
-        # where outcomes may be sensitive the size of peaks may be chaotic
-        elif mine.sensitive is None and _differ(point.theta_n, mine.theta_n):
-            column = f"theta_n at kr/PGA {k!r}"
-            ledger.conflict("simulation", name, column, mine.theta_n, point.theta_n)
-    return more
-
-
-def _differ(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return False
-    return not math.isclose(one, other, rel_tol=ROTATION_ERROR, abs_tol=1e-12)
-
-
-def merge_spectra(merge: Merge) -> None:
-    """Bring toppling spectra in."""
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    for theirs in source.execute(select(toppling_spectrum)).mappings():
-        values = {**theirs, "motion_id": merge.motions[theirs["motion_id"]]}
-        del values["digest"]
-        if insert_if_new(target, toppling_spectrum, values):
-            ledger.added["toppling_spectrum"] += 1
-            continue
-        ledger.same["toppling_spectrum"] += 1
-        key = {name: values[name] for name in ("motion_id", "polarity", "p2", "numerics_version")}
-        here = target.execute(select(toppling_spectrum.c.x_m_s).filter_by(**key)).scalar_one()
-        if not math.isclose(here, values["x_m_s"], rel_tol=1e-9, abs_tol=1e-15):
-            row = f"of motion {key['motion_id']} at p2 {key['p2']:g}, {key['polarity']}"
-            ledger.conflict("toppling_spectrum", row, "x_m_s", here, values["x_m_s"])
-
-
-def merge_responses(merge: Merge) -> None:
-    """Bring histories in."""
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    for their_id in list(source.scalars(select(response.c.id).order_by(response.c.id))):
-        theirs = source.execute(select(response).where(response.c.id == their_id)).mappings().one()
-        if merge.other_bits.keys() & {theirs["motion_id"], theirs["vertical_motion_id"]}:
-            ledger.notes.append(
-                f"left out: history {theirs['natural_key'][:12]}… of samples whose last bits "
-                "are other here: rbfrag simulate  makes it again"
-            )
-            continue
-        values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}
-        values |= _motions_here(merge, theirs)
-        if insert_if_new(target, response, values):
-            ledger.added["response"] += 1
-            continue
-        ledger.same["response"] += 1
-        same_key = response.c.natural_key == theirs["natural_key"]
-        ours = target.execute(select(response).where(same_key)).mappings().one()
-        name = f"{theirs['natural_key'][:12]}…"
-        here, there = ours["peak_theta_n"], theirs["peak_theta_n"]
-        if ours["outcome"] != theirs["outcome"]:
-            ledger.conflict("response", name, "outcome", ours["outcome"], theirs["outcome"])
-        elif here != there and (
-            None in (here, there) or not math.isclose(here, there, rel_tol=ROTATION_ERROR)
-        ):
-            ledger.conflict("response", name, "peak_theta_n", here, there)
-        elif any(ours[c] != theirs[c] for c in ("time_s", "theta_rad", "theta_dot_rad_s")):
-            ledger.within_error += 1
-
-
-def merge_shock_pairs(merge: Merge) -> None:
-    """Bring in what two motions do to blocks."""
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    for theirs in source.execute(select(shock_pair).order_by(shock_pair.c.id)).mappings():
-        both = {theirs["first_motion_id"], theirs["second_motion_id"]}
-        if merge.other_bits.keys() & both:
-            ledger.notes.append(
-                f"left out: pair of motions {theirs['natural_key'][:12]}… of samples whose last "
-                "bits are other here: a campaign of sequences makes it again"
-            )
-            continue
-        values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}
-        values["campaign_id"] = merge.campaigns[theirs["campaign_id"]]
-        for name in ("first_motion_id", "second_motion_id"):
-            values[name] = merge.motions[theirs[name]]
-        if insert_if_new(target, shock_pair, values):
-            ledger.added["shock_pair"] += 1
-            continue
-        ledger.same["shock_pair"] += 1
-        same_key = shock_pair.c.natural_key == theirs["natural_key"]
-        ours = target.execute(select(shock_pair).where(same_key)).mappings().one()
-        _compare_ends(f"{theirs['natural_key'][:12]}…", ours, theirs, ledger)
-
-
-def _compare_ends(name: str, ours: AnyRow, theirs: AnyRow, ledger: Ledger) -> None:
-    if ours["pairing"] != theirs["pairing"]:
-        ledger.keep("shock_pair", name, "pairing", ours["pairing"], theirs["pairing"])
-    columns = [f"{part}_{end}" for part in PARTS for end in ShockEnd._fields]
-    for column in columns:
-        here, there = ours[column], theirs[column]
-        differs = here != there
-        if isinstance(here, float) and isinstance(there, float):
-            differs = _differ(here, there)
-        if differs:
-            ledger.conflict("shock_pair", name, column, here, there)
-            return
-    ledger.within_error += any(ours[column] != theirs[column] for column in columns)
-
-
-def merge_models(merge: Merge) -> None:
-    """Bring models in; of two that differ under one name, the other's gets a number.
-
-    A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
-    free. Chosen defaults stay; a database without models of a kind takes the other's choice.
-    """
-    source, target, ledger = merge.source, merge.target, merge.ledger
-    ours = {row.name: row for row in model_rows(target)}
-    had = {row.kind for row in ours.values()}
-    chosen = set(source.scalars(select(fragility_model.c.name).where(fragility_model.c.is_default)))
-    for theirs in model_rows(source):
-        name, number = theirs.name, 1
-        while name in ours and not _same(ours[name], theirs):
-            number += 1
-            name = f"{theirs.name}-{number}"
-        if name in ours:
-            ledger.same["fragility_model"] += 1
-            continue
-        is_default = theirs.name in chosen and theirs.kind not in had
-        row = replace(theirs, name=name, is_default=is_default)
-        insert_row(target, fragility_model, encode_model(row))
-        ours[name] = row
-        ledger.added["fragility_model"] += 1
-        if name != theirs.name:
-            ledger.notes.append(
-                f"there is another model {theirs.name!r} here: theirs is stored as {name!r}"
-            )
-
-
-def _same(one: ModelRow, other: ModelRow) -> bool:
-    left, right = (
-        encode_model(replace(row, name="-", is_default=False, created="")) for row in (one, other)
-    )
-    return left == right
+    (low, high), (low_2, high_2) = _bracket(ours), _bracket(theirs)
+    return min(low, low_2) * (1.0 - BORDER_ERROR), max(high, high_2) * (1.0 + BORDER_ERROR)

@@ -13,7 +13,7 @@ FIT_AGAIN = "fit it again in its place, by rbfrag fit"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Damage:
     """One thing that is wrong, the row as the database numbers or names it, and what to do next."""
 
     table: str

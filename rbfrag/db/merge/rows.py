@@ -1,0 +1,144 @@
+"""Rows of one database among those of another: inserted, completed, or refused."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import Connection, RowMapping, Table, select
+
+from rbfrag.db.digest import NOT_DIGESTED
+from rbfrag.db.insert import insert_row, update_rows
+from rbfrag.db.keys import key_of_row
+from rbfrag.db.motions import samples_of_motions
+
+Row = RowMapping | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How rows of a table are told apart, and what becomes of those that are there.
+
+    Args:
+        keys: columns by which rows are the same, the ones tried first before others; one that
+            holds None tells nothing.
+        label: how messages name a row.
+        compared: columns that must agree, and to which relative error.
+        filled: columns that are filled in where they are missing here.
+    """
+
+    table: Table
+    keys: tuple[tuple[str, ...], ...] = (("natural_key",),)
+    label: str = "{natural_key:.12}…"
+    compared: Mapping[str, float] = field(default_factory=dict)
+    filled: tuple[str, ...] = ()
+
+
+@dataclass
+class Merge:
+    """Two databases, and what was done and stood in the way so far.
+
+    Args:
+        target: the database that is merged into, inside the caller's transaction.
+        ids: the row here of each row there, by table.
+        other_bits: whether some motion has samples of other last bits here, as another machine's
+            filter rounds; natural keys are then those with the samples here.
+    """
+
+    source: Connection
+    target: Connection
+    added: Counter[str] = field(default_factory=Counter)
+    same: Counter[str] = field(default_factory=Counter)
+    restated: int = 0
+    within_error: int = 0
+    notes: list[str] = field(default_factory=list)
+    conflicts: list[str] = field(default_factory=list)
+    ids: dict[str, dict[int, int]] = field(default_factory=lambda: defaultdict(dict))
+    other_bits: bool = False
+
+    def rows(self, table: Table) -> Iterator[Row]:
+        """Yield the rows there as they would stand here, apart from their own number."""
+        references = [(c.name, key.column.table.name) for c in table.c for key in c.foreign_keys]
+        samples = samples_of_motions(self.target) if self.other_bits else {}
+        for row in stored_rows(self.source, table):
+            values = dict(row)
+            for name, owner in references:
+                values[name] = None if row[name] is None else self.ids[owner][row[name]]
+            if self.other_bits and "natural_key" in values:
+                values["natural_key"] = key_of_row(values, samples)
+            yield values
+
+    def bring(self, rule: Rule, theirs: Row) -> int:
+        """Insert a row that is not here yet, compare and complete one that is; return its id."""
+        name, number = rule.table.name, theirs.get("id")
+        known = self.ids[name]
+        if number in known:
+            return known[number]
+        ours = self.find(rule, theirs)
+        if ours is None:
+            columns = [c.name for c in rule.table.c if c.name not in NOT_DIGESTED]
+            row_id = insert_row(self.target, rule.table, {c: theirs[c] for c in columns})
+            self.added[name] += 1
+        else:
+            row_id = ours.get("id", 0)
+            self.same[name] += 1
+            self.compare(rule, ours, theirs)
+        if number is not None:
+            known[number] = row_id
+        return row_id
+
+    def find(self, rule: Rule, theirs: Row) -> Row | None:
+        """Return the row here that is the same."""
+        for key in rule.keys:
+            values = {column: theirs[column] for column in key}
+            if None in values.values():
+                continue
+            query = select(rule.table).filter_by(**values).order_by(*rule.table.primary_key.columns)
+            ours = self.target.execute(query).mappings().first()
+            if ours is not None:
+                return ours
+        return None
+
+    def compare(self, rule: Rule, ours: Row, theirs: Row) -> None:
+        """Note what contradicts, and fill in what is missing here."""
+        exact = True
+        for column, error in rule.compared.items():
+            here, there = ours[column], theirs[column]
+            unknown = column in rule.filled and None in (here, there)
+            if unknown or ours.get("guessed"):
+                continue
+            exact &= here == there
+            if not agree(here, there, error):
+                self.conflict(rule, theirs, column, here, there)
+                return
+        self.within_error += not exact
+        missing = {
+            column: theirs[column]
+            for column in rule.filled
+            if ours[column] in (None, "") and theirs[column] not in (None, "")
+        }
+        if missing:
+            update_rows(self.target, rule.table, rule.table.c.id == ours["id"], missing)
+
+    def conflict(self, rule: Rule, row: Row, column: str, here: object, there: object) -> None:
+        """Note that two values cannot both be kept."""
+        name = rule.label.format_map(row)
+        self.conflicts.append(
+            f"{rule.table.name} {name}: {column} is {here!r} here and {there!r} there"
+        )
+
+
+def stored_rows(connection: Connection, table: Table) -> Iterator[Row]:
+    """Yield the rows of a table in the order of its key, few in memory at once."""
+    query = select(table).order_by(*table.primary_key.columns)
+    yield from connection.execute(query, execution_options={"yield_per": 16}).mappings()
+
+
+def agree(here: object, there: object, error: float) -> bool:
+    """Return whether two values are the same, to a relative error if they are numbers."""
+    if isinstance(here, float) and isinstance(there, float):
+        return math.isclose(here, there, rel_tol=error, abs_tol=1e-6 * error)
+    return here == there
