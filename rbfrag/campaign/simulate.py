@@ -314,6 +314,7 @@ def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
             kind=each.task.planned.case.kind,
             numerics_version=done.numerics_version,
             block=each.task.planned.case.block,
+            yield_g=each.task.planned.case.yield_g,
         )
         for each in new
     ]

@@ -47,6 +47,7 @@ class CombinationRecord:
         p2: the same that went into the key [1/s²].
         result: the critical value; None where none was looked for.
         block: which block it is, the same that went into the key; None where p² says all.
+        yield_g: yield acceleration of that block [g]; None where it is of blocks of any strength.
         grid: the blocks of the kind's grid, number i of it at place i; None to add them later.
     """
 
@@ -59,6 +60,7 @@ class CombinationRecord:
     settings: Mapping[str, object]
     result: CriticalResult | None
     block: Mapping[str, object] | None = None
+    yield_g: float | None = None
     grid: SearchPoints | None = None
     numerics_version: str = NUMERICS_VERSION
 
@@ -257,6 +259,7 @@ def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[objec
         "campaign_id": campaign_id,
         "linear": False,
         "p2": _number(record.p2),
+        "yield_g": _number(record.yield_g),
         "block": None if record.block is None else canonical_json(record.block),
         "settings": canonical_json(record.settings),
         **_result_values(record.result),

@@ -19,6 +19,7 @@ from sqlalchemy import (
     bindparam,
     insert,
     select,
+    tuple_,
     update,
 )
 from sqlalchemy.dialects import postgresql, sqlite
@@ -27,6 +28,7 @@ from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
 from rbfrag.errors import DatabaseError
 
 _KEYS_AT_ONCE = 500
+_ROWS_AT_ONCE = 5_000
 
 
 def insert_if_new(connection: Connection, table: Table, values: Mapping[str, object]) -> bool:
@@ -154,6 +156,46 @@ def _value_type(column_type: Any) -> ValueType:
 def utc_now() -> str:
     """Return the current UTC time in ISO 8601, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def renew_digests(connection: Connection, table: Table, before: Table | None = None) -> None:
+    """Write the digest of every row anew, of the columns that the table has.
+
+    Args:
+        before: the table that the stored digests are of. A row whose values have not its stored
+            digest was altered, and keeps it, so that it is still found. None to take all rows as
+            they are.
+    """
+    columns = [column.name for column in table.c]
+    keys = list(table.primary_key.columns)
+    if not keys:
+        raise ValueError(f"table {table.name} has no primary key")
+    change = (
+        update(table)
+        .where(*(key == bindparam(f"at_{key.name}") for key in keys))
+        .values(digest=bindparam("anew"))
+    )
+    # read by key and not by one open cursor, which writing to the same table would disturb
+    query = select(table).order_by(*keys).limit(_ROWS_AT_ONCE)
+    rows = connection.execute(query).all()
+    while rows:
+        values = [tuple(row) for row in rows]
+        sound = [True] * len(rows)
+        if before is not None:
+            had = [tuple(row._mapping[name] for name in before.c.keys()) for row in rows]  # noqa: SIM118
+            then = table_digests(before, before.c.keys(), had)
+            sound = [row.digest == digest for row, digest in zip(rows, then, strict=True)]
+        changes = [
+            {"anew": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
+            for row, digest, kept in zip(
+                rows, table_digests(table, columns, values), sound, strict=True
+            )
+            if kept
+        ]
+        if changes:
+            connection.execute(change, changes)
+        last = [rows[-1]._mapping[key.name] for key in keys]
+        rows = connection.execute(query.where(tuple_(*keys) > tuple_(*last))).all()
 
 
 def storable(text: str) -> str:

@@ -18,11 +18,8 @@ DEFAULT_NAME = "rbfrag.db"
 REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
 """The database that is shipped with rbfrag, read-only and without samples, if there is one."""
 
-REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007")
+REVISIONS = ("0007", "0008")
 """Every schema revision this rbfrag knows, oldest first."""
-
-FIRST_RELEASE = "0007"
-"""The first revision of Alembic's chain; older ones go by rbfrag.migrations.before_release."""
 
 SCHEMA_REVISION = REVISIONS[-1]
 """The revision that this rbfrag works with."""

@@ -80,7 +80,7 @@ def combination_table(
     vertical: Vertical = "without",
     kind: str = "toppling",
     rotation_deg: float | None = None,
-    numerics_version: str = NUMERICS_VERSION,
+    numerics_version: str | None = None,
     doubtful_pgd: bool = False,
 ) -> CombinationTable:
     """Return the combinations of a kind, with critical values and their motions' intensity.
@@ -90,7 +90,8 @@ def combination_table(
     smaller natural key). Of blocks that slide it is that of the first motion, whose grid carries
     the displacements. Versions of the numerics never mix.
 
-    Options are those of :class:`rbfrag.db.rows.Selection`.
+    Options are those of :class:`rbfrag.db.rows.Selection`, and `numerics_version`; None for the
+    newest of which there are such combinations.
 
     Returns:
         Columns of equal length, sorted by natural key: equal databases give equal tables.
@@ -102,7 +103,6 @@ def combination_table(
         raise InputError(f"vertical must be without, with or both, not {vertical!r}")
     query = _combination_query().where(
         combination.c.kind == kind,
-        combination.c.numerics_version == numerics_version,
         combination.c.linear.is_(False),
     )
     if vertical != "both":
@@ -114,6 +114,11 @@ def combination_table(
             suite_motion,
             and_(suite_motion.c.motion_id == motion.c.id, suite_motion.c.suite_id == suite_id),
         )
+    version = combination.c.numerics_version
+    if numerics_version is None:
+        versions = connection.scalars(query.with_only_columns(version).distinct())
+        numerics_version = max(versions, key=_age, default=NUMERICS_VERSION)
+    query = query.where(version == numerics_version)
     order = (combination.c.search_limit, combination.c.natural_key)
     settings_of = cache(lambda text: stored_json(text, dict, "settings of a combination"))
     rows: dict[tuple[Any, ...], Any] = {}
@@ -143,8 +148,10 @@ def combination_table(
     pgd_m = floats("pgd_m")
     if not doubtful_pgd:
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
-    numbers = ("p2", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s")
-    others = ("event_id", "polarity", "status", "natural_key", "block")
+    numbers = (
+        "p2", "yield_g", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s",
+    )  # fmt: skip
+    others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
         combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
@@ -297,10 +304,16 @@ def _pgd_in_doubt(row: RowMapping) -> bool:
     return not PGD_IN_DOUBT.isdisjoint(stored_json(row["flags"], list, where))
 
 
+def _age(numerics_version: str) -> tuple[int, str]:
+    """Return what sorts versions of the numerics, the newest last: they count up."""
+    return len(numerics_version), numerics_version
+
+
 def _combination_query() -> Select[Any]:
     own = (
         "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
-        "settings", "status", "search_limit", "kr_over_pga", "kr", "y_m_s",
+        "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga", "kr",
+        "y_m_s",
     )  # fmt: skip
     of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *SPECTRAL_COLUMNS, "flags")
     return select(

@@ -128,7 +128,8 @@ class CombinationTable:
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
     is in doubt, unless it was asked for; spectral accelerations where they were not computed.
-    `block` is JSON text, None where p² says all.
+    `block` is JSON text, None where p² says all; `yield_g` is NaN where that names no strength.
+    `numerics_version` is the same in all rows.
     """
 
     combination_id: NDArray[np.int64]
@@ -148,6 +149,8 @@ class CombinationTable:
     tm_s: NDArray[np.float64]
     natural_key: NDArray[np.object_]
     block: NDArray[np.object_]
+    yield_g: NDArray[np.float64]
+    numerics_version: NDArray[np.object_]
     sa03_g: NDArray[np.float64]
     sa10_g: NDArray[np.float64]
     sa20_g: NDArray[np.float64]

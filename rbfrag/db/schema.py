@@ -291,6 +291,13 @@ combination = _table(
         "the plane that it slides on, or the factor on Housner's restitution of one that rocks; "
         "missing for toppling",
     ),
+    _optional(
+        "yield_g",
+        Double,
+        "yield acceleration of that block where 1 + k_v = 1; missing where the combination is of "
+        "blocks of any strength",
+        "g",
+    ),
     _column("settings", Text, "JSON: what else decided the answer, part of the natural key"),
     _column("numerics_version", Text, _NUMERICS),
     _column(
@@ -347,6 +354,7 @@ combination = _table(
     CheckConstraint(STATUS, name="status"),
     CheckConstraint("p2 > 0 AND search_limit > 0 AND n_runs >= 0 AND y_m_s > 0", name="ranges"),
     CheckConstraint("p2 IS NOT NULL OR block IS NOT NULL", name="block"),
+    CheckConstraint("yield_g > 0", name="yield_g"),
     CheckConstraint("status = 'not_searched' OR search_limit IS NOT NULL", name="search_limit"),
     CheckConstraint(FOUND_HAS_VALUE, name="found_has_value"),
     CheckConstraint(

@@ -20,7 +20,6 @@ import rbfrag.migrations
 from rbfrag.db.connect import database_label, raw_sqlite, unchecked_engine
 from rbfrag.db.location import (
     APPLICATION_ID,
-    FIRST_RELEASE,
     REVISIONS,
     SCHEMA_REVISION,
     VERSION_TABLE,
@@ -35,7 +34,6 @@ from rbfrag.errors import (
     DatabaseReadOnlyError,
     NotADatabaseError,
 )
-from rbfrag.migrations.before_release import renew_tables
 
 _LOCK = APPLICATION_ID  # any number that is ours: two upgrades of one server take turns
 
@@ -80,15 +78,11 @@ def migrate(engine: Engine) -> None:
         folder = Path(rbfrag.migrations.__file__).parent
         config.set_main_option("script_location", str(folder).replace("%", "%%"))
         config.attributes["connection"] = connection
-        before = _revision_of_ours(connection)
-        if before is None:
+        if _revision_of_ours(connection) is None:
             metadata.create_all(connection, checkfirst=False)
-        elif before < FIRST_RELEASE:
-            renew_tables(connection)
+            command.stamp(config, "head", purge=True)
         else:
             command.upgrade(config, "head")
-        if before is None or before < FIRST_RELEASE:
-            command.stamp(config, "head", purge=True)
         if connection.dialect.name == "sqlite":
             connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
             _require_sound_references(connection)

@@ -232,7 +232,10 @@ def vertical(
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         without = combination_table(connection, suite=suite)
-        with_it = combination_table(connection, suite=suite, vertical="with")
+        version = next(iter(without.numerics_version), None)
+        with_it = combination_table(
+            connection, suite=suite, vertical="with", numerics_version=version
+        )
     pairs = vertical_pairs(without, with_it)
     return plot_vertical(pairs, out)
 

@@ -23,6 +23,7 @@ from benchmarks.claims.vertical import vertical_is_irrelevant
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
 from rbfrag.plots.critical_strength import lobe_line, vertical_pairs
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
 G = 9.80665
@@ -63,6 +64,8 @@ def table(seed: int = 1, *, slope: float = 0.72, scatter: float = 0.2) -> Combin
         tm_s=tm,
         natural_key=np.array([str(next(number)) for _ in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        yield_g=np.full(n, np.nan),
+        numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(n),
     )
 

@@ -19,11 +19,11 @@ from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import open_database, opened_database
+from rbfrag.db.insert import renew_digests
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
-from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.respond import respond
 from rbfrag.solver.sequence import STARTS_ANEW
@@ -181,7 +181,7 @@ def test_merged_databases_hold_both(
     ):
         with opened_database(database) as engine, engine.begin() as connection:
             connection.execute(update(schema.shock_pair).values(**values))
-            fill_digests(connection, schema.shock_pair)
+            renew_digests(connection, schema.shock_pair)
         if accepted:
             assert merge_databases(database, db=tmp_path / "new.db").added == {}
         else:

@@ -18,7 +18,7 @@ from rbfrag.db.campaigns import start_campaign
 from rbfrag.db.check.database import check_database
 from rbfrag.db.check.maps import contradictions
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.insert import insert_if_new, insert_row, update_rows
+from rbfrag.db.insert import insert_if_new, insert_row, renew_digests, update_rows
 from rbfrag.db.keys import response_key
 from rbfrag.db.merge.databases import MergeReport, merge_databases
 from rbfrag.db.model_file import ModelRow
@@ -32,7 +32,6 @@ from rbfrag.errors import (
     InputError,
     MergeConflictError,
 )
-from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
@@ -68,7 +67,7 @@ def _change(engine: Engine, *statements: Any) -> None:
         for statement in statements:
             connection.execute(statement)
         for table in schema.metadata.tables.values():
-            fill_digests(connection, table)  # of what is said now
+            renew_digests(connection, table)  # of what is said now
 
 
 class TestTogether:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,31 +11,23 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
+from alembic.operations import Operations
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, func, inspect, select, text
+from sqlalchemy import Connection, Engine, MetaData, Table, create_engine, inspect, select, text
 
-import rbfrag.db.upgrade
+import rbfrag.db.insert
 import rbfrag.migrations
-from benchmarks.database_content import table_rows_by_natural_key
 from benchmarks.reference_set import SPARED_INDEX
-from rbfrag.db.campaigns import start_campaign
+from rbfrag.campaign.kinds.slumping import FAMILY
+from rbfrag.campaign.simulate import simulate
 from rbfrag.db.check.database import check_database
 from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.insert import update_rows
-from rbfrag.db.location import FIRST_RELEASE, REFERENCE, REVISIONS, SCHEMA_REVISION, VERSION_TABLE
-from rbfrag.db.model_file import ModelRow
-from rbfrag.db.models import load_model, save_model
-from rbfrag.db.motions import (
-    LATER_MEASURES,
-    MEASURES,
-    add_motion,
-    load_motion,
-    measures_of,
-    motion_rows,
-)
+from rbfrag.db.insert import renew_digests
+from rbfrag.db.location import REFERENCE, REVISIONS, SCHEMA_REVISION, VERSION_TABLE
+from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.schema import combination, metadata, motion, simulation
+from rbfrag.db.schema import combination, metadata
 from rbfrag.db.upgrade import migrate, upgrade_database
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -60,10 +51,11 @@ def _described(engine: Engine) -> dict[str, Any]:
             without_rowid = set(connection.scalars(query))
     return {
         table: {
-            "columns": [
+            # a column that came later stands last
+            "columns": sorted(
                 (c["name"], str(c["type"]), c["nullable"], c["default"])
                 for c in inspector.get_columns(table)
-            ],
+            ),
             "pk": inspector.get_pk_constraint(table),
             "fk": sorted(map(repr, inspector.get_foreign_keys(table))),
             "unique": sorted(map(repr, inspector.get_unique_constraints(table))),
@@ -109,49 +101,20 @@ def test_the_shipped_reference_has_every_constraint(tmp_path: Path) -> None:
 def test_known_revisions_are_those_of_the_migrations() -> None:
     scripts = ScriptDirectory.from_config(_config())
     chain = [script.revision for script in scripts.walk_revisions()]
-    assert tuple(reversed(chain)) == REVISIONS[REVISIONS.index(FIRST_RELEASE) :]
+    assert tuple(reversed(chain)) == REVISIONS
     assert scripts.get_heads() == [SCHEMA_REVISION]
 
 
-CAME: dict[str, dict[str, Sequence[str]]] = {
-    "0002": {"motion": ("source_sha256", "processing_applied", "start_time")},
-    "0003": {
-        "combination": ("block",),
-        "simulation": ("displacement_m",),
-        "fragility_model": ("kind",),
-    },
-    "0004": {**dict.fromkeys(metadata.tables, ("digest",)), "simulation": ("grid", "digest")},
-    "0005": {
-        "motion": LATER_MEASURES,
-        "fragility_model": ("form", "leave_out_steps", "dependence"),
-    },
-    "0006": {"simulation": ("sensitive",)},
-    "0007": {"shock_pair": ()},
-}
-"""Tables and columns that came with each schema."""
-
-
-def _made_old(engine: Engine, revision: str) -> None:
-    """Leave of a database the columns of an older schema, without constraints, which none asks."""
-    later = [tables for each, tables in CAME.items() if each > revision]
-    kept = {
-        table.name: [
-            column.name
-            for column in table.c
-            if not any(column.name in tables.get(table.name, ()) for tables in later)
-        ]
-        for table in metadata.sorted_tables
-    }
+def _made_old(engine: Engine) -> None:
+    """Take from a database what came with 0008."""
     with engine.begin() as connection:
-        for table, columns in kept.items():
-            listed = ", ".join(columns)
-            connection.execute(text(f"CREATE TABLE old_{table} AS SELECT {listed} FROM {table}"))
-        for table in reversed(kept):
-            connection.execute(text(f"DROP TABLE {table}"))
-        for table in kept:
-            connection.execute(text(f"ALTER TABLE old_{table} RENAME TO {table}"))
-        connection.execute(text("DROP TABLE shock_pair"))
-        connection.execute(text(f"UPDATE {VERSION_TABLE} SET version_num = '{revision}'"))
+        with Operations(MigrationContext.configure(connection)).batch_alter_table(
+            "combination"
+        ) as batch:
+            batch.drop_constraint("ck_combination_yield_g", type_="check")
+            batch.drop_column("yield_g")
+        renew_digests(connection, Table("combination", MetaData(), autoload_with=connection))
+        connection.execute(text(f"UPDATE {VERSION_TABLE} SET version_num = '0007'"))
 
 
 @pytest.fixture
@@ -163,35 +126,64 @@ def unchecked(place: str) -> Iterator[Engine]:
     engine.dispose()
 
 
-@pytest.mark.parametrize("revision", REVISIONS[: REVISIONS.index(FIRST_RELEASE)])
-def test_an_old_database_gets_every_constraint_and_counts_on(
-    place: str, unchecked: Engine, fill: Callable[..., None], revision: str
+def _with_slumps(engine: Engine, make_motion: Callable[..., GroundMotion]) -> list[float]:
+    """Store a block that slumps and one of toppling; return the yields that are stored."""
+    with engine.begin() as connection:
+        quake = EarthquakeInfo("E")
+        add_motion(connection, make_motion(), earthquake=quake, is_vertical=False)
+    where = engine.url.render_as_string(hide_password=False)
+    simulate(where, kind="slumping", family=FAMILY[:2], rotations_deg=[None], jobs=1)
+    simulate(where, p2=[3.0], jobs=1)
+    with engine.connect() as connection:
+        return _yields(connection)
+
+
+def _yields(connection: Connection) -> list[float]:
+    query = select(combination.c.yield_g).order_by(combination.c.natural_key)
+    return list(connection.scalars(query))
+
+
+def test_blocks_of_the_first_release_get_their_yield(
+    place: str, unchecked: Engine, make_motion: Callable[..., GroundMotion]
 ) -> None:
     described = _described(unchecked)
-    with unchecked.begin() as connection:
-        fill(connection, [1, 2])
-    _made_old(unchecked, revision)
+    yields = _with_slumps(unchecked, make_motion)
+    assert sum(value is not None for value in yields) == 4
+    _made_old(unchecked)
     assert _described(unchecked) != described
-    assert upgrade_database(place) == (revision, SCHEMA_REVISION)
+    assert upgrade_database(place) == ("0007", SCHEMA_REVISION)
     assert _described(unchecked) == described
-    with opened_database(place) as again, again.begin() as connection:
+    with opened_database(place) as again, again.connect() as connection:
+        assert _yields(connection) == yields
         assert check_database(connection) == []
-        fill(connection, [1, 2, 3])
-        assert len(motion_rows(connection)) == 3
+
+
+def test_an_altered_row_is_still_found_after_an_upgrade(
+    place: str, unchecked: Engine, make_motion: Callable[..., GroundMotion]
+) -> None:
+    _with_slumps(unchecked, make_motion)
+    _made_old(unchecked)
+    with unchecked.begin() as connection:
+        connection.execute(text("UPDATE combination SET n_runs = n_runs + 1 WHERE id = 1"))
+    upgrade_database(place)
+    with opened_database(place) as again, again.connect() as connection:
+        assert [finding.row for finding in check_database(connection)] == ["1"]
 
 
 def test_an_upgrade_that_fails_is_undone(
-    unchecked: Engine, fill: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+    place: str,
+    unchecked: Engine,
+    make_motion: Callable[..., GroundMotion],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with unchecked.begin() as connection:
-        fill(connection, [1])
-    _made_old(unchecked, "0002")
+    _with_slumps(unchecked, make_motion)
+    _made_old(unchecked)
     before = _described(unchecked)
 
-    def killed(*_: object, **__: object) -> None:
+    def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(rbfrag.db.upgrade.command, "stamp", killed)
+    monkeypatch.setattr(rbfrag.db.insert, "table_digests", killed)
     with pytest.raises(KeyboardInterrupt):
         migrate(unchecked)
     assert _described(unchecked) == before
@@ -206,107 +198,3 @@ def test_upgrade_prints_nothing(place: str, capfd: pytest.CaptureFixture[str]) -
     open_database(place, create=True).dispose()
     upgrade_database(place)
     assert capfd.readouterr() == ("", "")
-
-
-def test_motions_of_the_first_schema_keep_their_samples(
-    place: str, unchecked: Engine, make_motion: Callable[..., GroundMotion]
-) -> None:
-    given = make_motion(component="090")
-    with unchecked.begin() as connection:
-        quake = EarthquakeInfo("E")
-        motion_id, _ = add_motion(connection, given, earthquake=quake, is_vertical=False, suite="S")
-    _made_old(unchecked, "0001")
-    assert upgrade_database(place) == ("0001", SCHEMA_REVISION)
-    with opened_database(place) as again, again.connect() as connection:
-        back = load_motion(connection, motion_id)
-        (row,) = motion_rows(connection, suite="S")
-    assert back.sha256 == given.sha256 == row.source_sha256
-    assert (back.processing_applied, back.start_time) == (None, None)
-
-
-def test_results_of_the_second_schema_stay_as_they_are(
-    place: str, unchecked: Engine, fill: Callable[..., None], model: ModelRow
-) -> None:
-    tables = ("combination", "simulation", "fragility_model")
-
-    def content(connection: Connection) -> list[list[tuple[object, ...]]]:
-        return [list(table_rows_by_natural_key(connection, table)) for table in tables]
-
-    with unchecked.begin() as connection:
-        fill(connection, [1, 2, 3])
-        save_model(connection, replace(model, form=1, leave_out_steps=None, dependence=None))
-        before = content(connection)
-    _made_old(unchecked, "0002")
-    assert upgrade_database(place) == ("0002", SCHEMA_REVISION)
-    with opened_database(place) as again, again.connect() as connection:
-        assert content(connection) == before
-        assert load_model(connection).kind == "toppling"
-    assert all(before)
-
-
-def test_maps_are_no_part_of_keys_any_more(
-    place: str, unchecked: Engine, make_motion: Any, make_result: Any, store_result: Any
-) -> None:
-    given = make_motion()
-    plain = {"search_limit": 0.01}
-    with unchecked.begin() as connection:
-        quake = EarthquakeInfo("E")
-        motion_id, _ = add_motion(connection, given, earthquake=quake, is_vertical=False)
-        campaign = start_campaign(connection, {})
-        for p2, widths in ((3.0, {0.3: 1e-3, 0.2: 1e-6}), (1.0, {0.1: 1e-3})):
-            for width, depth in widths.items():
-                result = make_result(given.pga_g, p2=p2, island_width=width)
-                settings = {**plain, "map": "full", "map_depth": depth}
-                store_result(connection, campaign, given, motion_id, result, settings=settings)
-    _made_old(unchecked, "0003")
-    assert upgrade_database(place) == ("0003", SCHEMA_REVISION)
-    with opened_database(place) as again, again.begin() as connection:
-        assert check_database(connection) == []
-        rows = connection.execute(select(combination).order_by(combination.c.p2)).all()
-        # of two maps of one search the finer one
-        assert [row.island_width for row in rows] == [0.1, 0.2]
-        assert {row.settings for row in rows} == {'{"search_limit":0.01}'}
-        assert len({row.combination_id for row in connection.execute(select(simulation))}) == 2
-        # a search without a map finds itself stored
-        again_key = store_result(
-            connection, campaign, given, motion_id, make_result(given.pga_g), settings=plain
-        )
-        assert again_key in {row.natural_key for row in rows}
-        assert connection.scalar(select(func.count()).select_from(combination)) == 2
-
-
-def test_outcomes_of_the_fifth_schema_are_not_known_to_be_sensitive(
-    place: str, unchecked: Engine, fill: Callable[..., None]
-) -> None:
-    with unchecked.begin() as connection:
-        fill(connection, [1, 2])
-        update_rows(connection, simulation, simulation.c.kr_over_pga > 0.0, {"sensitive": True})
-    _made_old(unchecked, "0005")
-    assert upgrade_database(place) == ("0005", SCHEMA_REVISION)
-    with opened_database(place) as again, again.connect() as connection:
-        assert check_database(connection) == []
-        assert set(connection.scalars(select(simulation.c.sensitive))) == {None}
-
-
-def test_measures_of_the_fourth_schema_are_computed_where_the_samples_are(
-    place: str, unchecked: Engine, make_motion: Callable[..., GroundMotion], model: ModelRow
-) -> None:
-    given, other = make_motion(), make_motion(2)
-    with unchecked.begin() as connection:
-        quake = EarthquakeInfo("E")
-        for each in (given, other):
-            add_motion(connection, each, earthquake=quake, is_vertical=False)
-        _, without = motion_rows(connection)
-        update_rows(connection, motion, motion.c.id == without.id, {"samples": None})
-        save_model(connection, model)
-    _made_old(unchecked, "0004")
-    assert upgrade_database(place) == ("0004", SCHEMA_REVISION)
-    with opened_database(place) as again, again.connect() as connection:
-        assert check_database(connection) == []
-        kept, empty = motion_rows(connection)
-        old = load_model(connection)
-    assert {name: getattr(kept, name) for name in MEASURES} == measures_of(given)
-    assert {getattr(empty, name) for name in LATER_MEASURES} == {None}
-    assert kept.sa10_g is not None
-    assert kept.sa10_g > 0.0
-    assert (old.form, old.leave_out_steps, old.dependence) == (1, None, None)

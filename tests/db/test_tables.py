@@ -96,7 +96,7 @@ class TestFrames:
             **dict.fromkeys(("linear", "certified"), "bool"),
             "vertical_motion_id": "Int64",
             **dict.fromkeys(
-                ("p2", "search_limit", "kr_over_pga", "lower", "upper", "kr", "y_m_s",
+                ("p2", "yield_g", "search_limit", "kr_over_pga", "lower", "upper", "kr", "y_m_s",
                  "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved"),
                 "float64",
             ),

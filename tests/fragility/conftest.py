@@ -10,6 +10,7 @@ import pytest
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.fragility.portfolio_draws import SHARED
 from tests.synthetic import unknown_spectrum
 
@@ -66,6 +67,8 @@ def critical_values(
         tm_s=tm,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        yield_g=np.full(n, np.nan),
+        numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(n),
     )
 

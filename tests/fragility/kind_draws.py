@@ -11,6 +11,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import LEAST_DISPLACEMENT_M, FitSource
 from rbfrag.fragility.methods import arrays, method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
 TRUE = {
@@ -58,9 +59,9 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
     found = failing < ks / limit
     pga = np.exp(rng.normal(-1.5, 0.6, n))
     ratio = np.where(found, ks / failing, np.nan)
-    table = _table(event, pga, pulse * pga * STANDARD_GRAVITY_M_S2, found, ratio, ps2, limit)
+    table = _table(event, pga, pulse * pga * STANDARD_GRAVITY_M_S2, found, ratio, ps2, limit, ks)
     nothing = np.empty((n, 0))
-    return FitSource(table, np.full(n, np.nan), nothing, nothing, strength_g=ks)
+    return FitSource(table, np.full(n, np.nan), nothing, nothing)
 
 
 def _table(
@@ -71,6 +72,7 @@ def _table(
     k_over_pga: NDArray[np.float64],
     p2: NDArray[np.float64],
     limit: NDArray[np.float64] | None = None,
+    yield_g: NDArray[np.float64] | None = None,
 ) -> CombinationTable:
     n = event.size
     none = np.full(n, np.nan)
@@ -92,5 +94,7 @@ def _table(
         tm_s=none,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        yield_g=none if yield_g is None else yield_g,
+        numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(n),
     )

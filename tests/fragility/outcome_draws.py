@@ -7,6 +7,7 @@ import numpy as np
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_grid
 from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
 G = 9.80665
@@ -87,6 +88,8 @@ def drawn_outcomes(
         tm_s=tm,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        yield_g=np.full(n, np.nan),
+        numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(n),
     )
     return FitSource(table, xp, kr_over_pga_of_grid(p2, pgv, pga), topples)

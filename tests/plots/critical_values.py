@@ -7,6 +7,7 @@ import numpy as np
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
 N = 400
@@ -40,6 +41,8 @@ def critical_values(n: int = N) -> CombinationTable:
         tm_s=tm,
         natural_key=np.arange(n).astype(str).astype(object),
         block=np.full(n, None, dtype=object),
+        yield_g=np.full(n, np.nan),
+        numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(n),
     )
 

@@ -10,6 +10,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import fit as fit_module
 from rbfrag.plots.fit import plot_fit
+from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
 N = 400
@@ -40,6 +41,8 @@ def table():
         tm_s=np.full(N, 0.5),
         natural_key=np.arange(N).astype(str).astype(object),
         block=np.full(N, None, dtype=object),
+        yield_g=np.full(N, np.nan),
+        numerics_version=np.full(N, NUMERICS_VERSION, dtype=object),
         **unknown_spectrum(N),
     )
 

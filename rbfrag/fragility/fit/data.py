@@ -11,14 +11,13 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable, Selection
-from rbfrag.errors import FitError, InputError
+from rbfrag.errors import FitError
 from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
@@ -62,8 +61,6 @@ class FitSource:
         k_over_pga: strengths of the blocks of the outcome grid, shape (n, m).
         failed: what they do, same shape: 1 fails, 0 does not, NaN not known.
         displacement_m: how far they slide [m], same shape; None where they do not.
-        strength_g: yield acceleration of the stored block [g], shape (n,); None where the
-            combination is about blocks of any strength.
         recording: number of the recording that each combination's motion is of, shape (n,); None
             where that is not known.
         sensitive: whether outcomes of the grid are other ones for the motion times 1 ± 1e-6, shape
@@ -76,7 +73,6 @@ class FitSource:
     k_over_pga: FloatArray
     failed: FloatArray
     displacement_m: FloatArray | None = None
-    strength_g: FloatArray | None = None
     recording: NDArray[np.int64] | None = None
     sensitive: FloatArray | None = None
     of_block: Mapping[str, FloatArray] = field(default_factory=dict)
@@ -144,7 +140,9 @@ def read_source(
 
     kind_read = kind or block.kind
     table = combination_table(connection, kind=kind_read, **selection)
-    spectra = spectrum_values(connection)
+    spectra = {}
+    for version in np.unique(table.numerics_version.astype(str)).tolist():
+        spectra = spectrum_values(connection, numerics_version=version)
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
     grid = outcome_grid(connection, table.combination_id)
     recordings = recordings_of_motions(connection)
@@ -154,7 +152,6 @@ def read_source(
         grid.k_over_pga,
         grid.outcome,
         grid.displacement_m,
-        np.array([_yield_g(kind_read, text or "{}") for text in table.block], dtype=np.float64),
         np.array([recordings[motion] for motion in table.motion_id.tolist()], dtype=np.int64),
         grid.sensitive if np.isfinite(grid.sensitive).any() else None,
         {
@@ -164,39 +161,13 @@ def read_source(
     )
     if grid.outcome.shape[1] == 0 and block.strength == "kr":
         k, failed = _nothing_known(table)
-        return replace(source, k_over_pga=k, failed=failed, displacement_m=None, strength_g=None)
+        return replace(source, k_over_pga=k, failed=failed, displacement_m=None)
     return source
 
 
 def _nothing_known(table: CombinationTable) -> tuple[FloatArray, FloatArray]:
     k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
     return k, np.full(k.shape, np.nan)
-
-
-@cache
-def _yield_g(kind: str, block: str) -> float:
-    """Return k of a stored block at rest [g]; NaN where it stands for blocks of any strength."""
-    from rbfrag.solver.block.geometry import Block
-    from rbfrag.solver.mechanism import shaken_mechanism
-    from rbfrag.solver.models import model_of_kind
-
-    try:
-        parameters = json.loads(block)
-        if "s1_m" not in parameters:
-            return float("nan")
-        shape = Block.from_fractures(
-            parameters["s1_m"], parameters["s2_m"], parameters["gamma_deg"]
-        )
-        return shaken_mechanism(
-            model_of_kind(kind),
-            shape,
-            beta_deg=parameters["beta_deg"],
-            phi_deg=parameters["phi_deg"],
-        ).yield_g
-    except (ValueError, KeyError, InputError) as error:
-        raise FitError(
-            f"a stored block is none of kind {kind} ({error}): run  rbfrag db check"
-        ) from None
 
 
 def _number_of(block: str | None, name: str) -> float:
@@ -536,8 +507,9 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     where the model would end before: P is that of failing at this shaking or at weaker.
     """
     table = source.table
-    assert source.strength_g is not None
-    strength = source.strength_g
+    strength = table.yield_g
+    if not np.isfinite(strength).all():
+        raise FitError("a stored block has no yield acceleration: run  rbfrag db check")
     observed = table.status == "found"
     known = (observed | (table.status == "below_limit")) & (table.pgv_m_s > 0.0)
     ratio = np.where(observed, table.kr_over_pga, table.search_limit)

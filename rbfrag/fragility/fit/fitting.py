@@ -22,6 +22,7 @@ from rbfrag.fragility.fit.result import MethodResult
 from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.methods import Method, method_named, methods
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.solver.results import NUMERICS_VERSION
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -182,7 +183,7 @@ def fit_source(
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
             "scores": result.scores,
-            "warnings": [*_data_warnings(data), *result.warnings, *unknown],
+            "warnings": [*_older(table), *_data_warnings(data), *result.warnings, *unknown],
             "n_total": data.n_total,
             "n_found": int((table.status == "found").sum()),
             "n_below_limit": int((table.status == "below_limit").sum()),
@@ -269,6 +270,16 @@ def _dependence(
         "replicates": estimate.replicates,
         "seed": estimate.seed,
     }, []
+
+
+def _older(table: CombinationTable) -> list[str]:
+    """Return what is said of results that the present numerics have not made."""
+    return [
+        f"the results are of version {version} of the numerics, and this rbfrag computes by "
+        f"version {NUMERICS_VERSION}: simulate again to have its own"
+        for version in dict.fromkeys(table.numerics_version.tolist())
+        if version != NUMERICS_VERSION
+    ]
 
 
 def _data_warnings(data: FitData) -> list[str]:

@@ -1,7 +1,6 @@
 """The schema of the first release, which later migrations follow.
 
-A new database is made from :mod:`rbfrag.db.schema`; one from before the first release is brought
-here by :mod:`rbfrag.migrations.before_release`.
+A new database is made from :mod:`rbfrag.db.schema`.
 
 Revision: 0007
 """
