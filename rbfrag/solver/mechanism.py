@@ -4,7 +4,7 @@ block's mechanism at rest."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,8 @@ class MechanismKind(Kind):
     """A kind that states a mechanism; the engine for one degree of freedom runs it.
 
     Attributes:
-        one_phase: whether the model ends with the first phase of its mechanism.
+        one_phase: whether searches and campaigns end with the first phase of its mechanism: what
+            they know of its blocks holds while their contacts do.
         yield_name: symbol of its yield acceleration.
     """
 
@@ -449,6 +450,10 @@ class ShakenMechanism:
     remarks: tuple[str, ...]
     site: BlockOnPlanes
 
+    def run(self, excited: Excitation) -> WholeRun:
+        """Follow the block under an excitation."""
+        return whole_run(self.mechanism, self.site, excited)
+
 
 def shaken_mechanism(
     model: Kind,
@@ -481,6 +486,7 @@ def shaken_mechanism(
         )
     site = BlockOnPlanes.of(block, judged, judged.mode, {})
     mechanism = model.mechanism(site)
+    mechanism = replace(mechanism, goes_on=mechanism.goes_on and not model.one_phase)
     equation = mechanism.first.forward
     return ShakenMechanism(
         kind=model.kind,

@@ -19,7 +19,6 @@ import numpy as np
 from rbfrag.campaign.kind import Case, CaseRequest, CaseResult, Measures, Sequences, each_once
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.kind import BlockOnPlanes, Shaking
 from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.models import model_of_kind
@@ -160,7 +159,7 @@ class SlumpingCampaign(Sequences):
                 searched = critical_scales(shaking, shaken, rotations, rules)
             ratios = self.grid(cases[numbers[0]], shaking.motion)[: None if request.grid else 0]
             scales = [shaken.yield_g / (k * excited.pga_g) for k in ratios.tolist()]
-            ends = [follow(shaken.mechanism, excited.scaled(scale)) for scale in scales]
+            ends = [shaken.run(excited.scaled(scale)) for scale in scales]
             for i, rotation, result in zip(numbers, rotations, searched, strict=True):
                 fails = rotation_rad(rotation, shaken)
                 runs = [scaled_run(*each, fails) for each in zip(ends, scales, strict=True)]

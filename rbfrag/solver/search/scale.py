@@ -5,7 +5,8 @@ toppling block do. What is searched is therefore the factor on the record, for o
 outcome need not be monotone in it: a stronger record may drive the block back in time. The search
 goes up from the scale at which the block first moves, which is known in closed form, in equal
 ratios, and closes in on the first scale that is not safe. What lies between two scales that were
-looked at is not proven.
+looked at is not proven. Where runs end closer to failure than their error, as those do that go on
+step by step, the bracket reaches from the last safe scale to the first that fails.
 """
 
 from __future__ import annotations
@@ -22,9 +23,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
+from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, WholeRun, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
@@ -241,13 +241,18 @@ def critical_scales(
     pga_g = excited.pga_g
     scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
     starts = first_motion(excited, shaken.yield_g)
-    # the answers differ in the rotation that counts as failure, not in the motion of the block
-    run_at = cache(lambda scale: follow(shaken.mechanism, excited.scaled(scale)))
-    answers = []
-    for rotation_deg, fails_rad in zip(rotations_deg, failures_rad, strict=True):
 
-        def run(scale: float, fails_rad: float = fails_rad) -> ScaledRun:
-            return scaled_run(run_at(scale), scale, fails_rad)
+    @cache
+    def runs_at(scale: float) -> list[ScaledRun]:
+        # the answers differ in the rotation that counts as failure, not in the motion of the block
+        run = shaken.run(excited.scaled(scale))
+        return [scaled_run(run, scale, fails_rad) for fails_rad in failures_rad]
+
+    answers = []
+    for i, rotation_deg in enumerate(rotations_deg):
+
+        def run(scale: float, i: int = i) -> ScaledRun:
+            return runs_at(scale)[i]
 
         start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
         if starts is None or starts >= scale_limit:
@@ -296,24 +301,21 @@ def critical_rad(shaken: ShakenMechanism) -> float:
     return highest if math.isfinite(highest) else 0.5 * math.pi
 
 
-def scaled_run(run: MechanismRun, scale: float, fails_rad: float) -> ScaledRun:
+def scaled_run(run: WholeRun, scale: float, fails_rad: float) -> ScaledRun:
     """Return a run with its verdict: whether it reaches the rotation that counts as failure."""
-    return ScaledRun(scale, run.peak, run.outcome, _verdict(run, fails_rad), _ending(run))
-
-
-def _verdict(run: MechanismRun, fails_rad: float) -> Verdict:
+    outcome, peak = run.outcome, run.peak_rad
+    # a block that slides has no rotation
+    assert peak is not None
+    verdict: Verdict = "safe" if outcome is Outcome.STABLE else "outside"
     # a rotation that was reached counts, whatever ended the model afterwards
-    if run.outcome is Outcome.TOPPLED or run.peak - run.error >= fails_rad:
-        return "fails"
-    if run.outcome is Outcome.UNDETERMINED or run.peak + run.error >= fails_rad:
-        return "undecided"
-    return "safe" if run.outcome is Outcome.STABLE else "outside"
-
-
-def _ending(run: MechanismRun) -> str:
-    if run.outcome in (Outcome.STABLE, Outcome.TOPPLED):
-        return ""
-    return run.sentences[-1] if run.sentences else run.outcome.advice
+    if outcome is Outcome.TOPPLED or peak - run.error >= fails_rad:
+        verdict = "fails"
+    elif outcome is Outcome.UNDETERMINED or peak + run.error >= fails_rad:
+        verdict = "undecided"
+    ending = ""
+    if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
+        ending = run.sentences[-1] if run.sentences else outcome.advice
+    return ScaledRun(scale, peak, outcome, verdict, ending)
 
 
 def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: float) -> SearchPoints:
@@ -334,50 +336,90 @@ def _search(start: ScaleSearch, run: Callable[[float], ScaledRun], rules: ScanRu
     """Scan upward, close in on the first scale that is not safe, and look further."""
     assert start.starts is not None
     limit = start.scale_limit
-    runs, safe = _scan(run, start.starts, limit, rules.ratio)
+    runs, safe = _scan(run, start.starts, limit, rules.ratio, ("safe",))
     if runs[-1].verdict == "safe":
         return _result(start, runs, None, limit)
-    more, safe = _close_in(run, safe, runs[-1], rules.bracket)
+    more, safe = _close_in(run, safe, runs[-1].scale, rules.bracket, ("safe",))
     runs += more
     # closing in may have met a lower scale of another verdict than the one it began with
     first = min((each for each in runs if each.verdict != "safe"), key=lambda each: each.scale)
+    if first.verdict == "undecided":
+        first = _first_decided(run, runs, first, limit, rules)
     if first.verdict != "fails":  # the model ends before the block fails, or it is too close
-        return _result(start, runs, None, safe, first.sentence or first.outcome.advice)
+        close = first.verdict == "undecided"
+        advice = Outcome.UNDETERMINED.advice if close else first.outcome.advice
+        return _result(start, runs, None, safe, first.sentence or advice)
     runs += _look_beyond(run, first.scale, limit, rules.ratio)
     return _result(start, runs, (safe, first.scale), limit)
 
 
 def _scan(
-    run: Callable[[float], ScaledRun], starts: float, limit: float, ratio: float
+    run: Callable[[float], ScaledRun],
+    scale: float,
+    limit: float,
+    ratio: float,
+    passed: tuple[Verdict, ...],
 ) -> tuple[list[ScaledRun], float]:
-    """Go up from the scale of the first motion; return the runs and the last safe scale."""
+    """Go up until a verdict is another one; return the runs and the last scale before that."""
     runs: list[ScaledRun] = []
-    safe = starts
-    while safe < limit:
-        runs.append(run(min(safe * ratio, limit)))
-        if runs[-1].verdict != "safe":
+    while scale < limit:
+        runs.append(run(min(scale * ratio, limit)))
+        if runs[-1].verdict not in passed:
             break
-        safe = runs[-1].scale
-    return runs, safe
+        scale = runs[-1].scale
+    return runs, scale
 
 
 def _close_in(
-    run: Callable[[float], ScaledRun], safe: float, first: ScaledRun, width: float
+    run: Callable[[float], ScaledRun],
+    low: float,
+    high: float,
+    width: float,
+    passed: tuple[Verdict, ...],
 ) -> tuple[list[ScaledRun], float]:
-    """Halve the bracket between a safe scale and one that is not; return the runs and the safe
-    end. Whatever is not safe is its upper end, whether it fails or not."""
+    """Halve a bracket whose lower end has one of some verdicts and whose upper end has none.
+
+    Returns:
+        The runs, and the lower end.
+    """
     runs: list[ScaledRun] = []
-    while first.scale - safe > width * first.scale:
-        middle = 0.5 * (safe + first.scale)
+    while high - low > width * high:
+        middle = 0.5 * (low + high)
         # neighbouring floating-point numbers have no middle
-        if not safe < middle < first.scale:
+        if not low < middle < high:
             break
         runs.append(run(middle))
-        if runs[-1].verdict == "safe":
-            safe = middle
+        if runs[-1].verdict in passed:
+            low = middle
         else:
-            first = runs[-1]
-    return runs, safe
+            high = middle
+    return runs, low
+
+
+def _first_decided(
+    run: Callable[[float], ScaledRun],
+    runs: list[ScaledRun],
+    undecided: ScaledRun,
+    limit: float,
+    rules: ScanRules,
+) -> ScaledRun:
+    """Go on to the first scale that fails, past those that are too close to it; add the runs.
+
+    Returns:
+        The run there, or that which was undecided where none fails.
+    """
+    passed: tuple[Verdict, ...] = ("safe", "undecided")
+    highest = max(each.scale for each in runs)
+    if all(each.verdict in passed for each in runs):
+        runs += _scan(run, highest, limit, rules.ratio, passed)[0]
+    later = [each for each in runs if each.verdict not in passed]
+    if not later:
+        return undecided
+    high = min(each.scale for each in later)
+    low = max(each.scale for each in runs if each.scale < high)
+    closer, _ = _close_in(run, low, high, rules.bracket, passed)
+    runs += closer
+    return min((*later, *closer), key=lambda each: (each.verdict in passed, each.scale))
 
 
 def _look_beyond(

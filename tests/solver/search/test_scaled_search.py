@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -22,7 +23,14 @@ from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.reports import critical_as_dict
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import CriticalResult, Outcome
-from rbfrag.solver.search.scale import ScaleSearch, first_motion
+from rbfrag.solver.search.scale import (
+    ScaledRun,
+    ScaleSearch,
+    Verdict,
+    _search,
+    first_motion,
+    scan_rules,
+)
 from tests.synthetic import shaking as samples
 
 PLANES = {"beta_deg": 22.0, "phi_deg": 30.0}
@@ -161,21 +169,54 @@ def test_everything_that_was_looked_at_below_the_critical_scale_is_safe(
     assert found.n_runs == len(scales)
 
 
-def test_a_confined_block_is_searched_too() -> None:
-    block = Block.from_angles(-40.0, 20.0, 0.5)
+@pytest.mark.parametrize("rotation_deg", [None, 2.0])
+def test_a_confined_block_is_searched_past_its_fall_on_the_base(rotation_deg: float | None) -> None:
+    block, planes = Block.from_angles(-40.0, 20.0, 0.5), {"beta_deg": 5.0, "phi_deg": 30.0}
     found = critical(
-        shaking(),
-        block=block,
-        beta_deg=5.0,
-        phi_deg=30.0,
-        kind="confined_toppling",
-        rotation_deg=0.5,
+        shaking(), block=block, **planes, kind="confined_toppling", rotation_deg=rotation_deg
     )
-    assert found.status in ("found", "below_limit")
-    scale = found.of_kind["scale"]
-    if scale is not None:
-        answer = respond(times(shaking(), scale), block=block, beta_deg=5.0, phi_deg=30.0)
-        assert answer.outcome is Outcome.TOPPLED or (answer.peak_theta_rad or 0.0) > 0.008
+    assert found.status == "found"
+    lower, upper = found.of_kind["lower_scale"], found.of_kind["scale"]
+    # between them runs may end closer to failure than their error
+    assert upper - lower < 2e-3 * upper
+    outcomes = set()
+    for scale in (*np.geomspace(found.of_kind["starts_scale"], lower, 40)[1:], upper):
+        answer = respond(times(shaking(), scale), block=block, **planes)
+        peak = answer.peak_theta_rad
+        outcomes.add(answer.outcome)
+        fails = peak is None or (rotation_deg is not None and peak >= math.radians(rotation_deg))
+        assert fails == (scale == upper)
+    assert outcomes <= {Outcome.STABLE, Outcome.TOPPLED}
+
+
+def of_verdicts(verdict: Callable[[float], Verdict]) -> ScaleSearch:
+    """A search of a made-up block whose verdict at each scale is known; from 1 to 10."""
+    start = ScaleSearch(None, 1.0, 0.1, starts=1.0, scale_limit=10.0)
+
+    def run(scale: float) -> ScaledRun:
+        return ScaledRun(scale, 0.1, Outcome.STABLE, verdict(scale), "")
+
+    return _search(start, run, scan_rules(0.01, 1.05, 1e-6))
+
+
+def test_scales_too_close_to_failure_lie_inside_the_bracket() -> None:
+    found = of_verdicts(lambda s: "safe" if s < 2.0 else "undecided" if s < 2.2 else "fails")
+    assert (found.status, found.reentrant) == ("found", False)
+    assert found.lower == pytest.approx(2.0, rel=1e-6)
+    assert found.scale == pytest.approx(2.2, rel=1e-6)
+    assert found.lower < 2.0
+    assert found.scale >= 2.2
+    # one that is spared after all does not make those below it safe
+    spared = of_verdicts(lambda s: "undecided" if 2.0 < s < 2.3 else "safe" if s < 4.0 else "fails")
+    assert spared.lower == pytest.approx(2.0, rel=1e-6)
+    assert spared.scale == pytest.approx(4.0, rel=1e-6)
+    # nothing fails, or the model ends, above what is undecided
+    open_end = of_verdicts(lambda s: "safe" if s < 2.0 else "undecided")
+    assert (open_end.status, open_end.scale) == ("below_limit", None)
+    assert open_end.scale_limit == pytest.approx(2.0, rel=1e-6)
+    assert open_end.ended == Outcome.UNDETERMINED.advice
+    outside = of_verdicts(lambda s: "safe" if s < 2 else "undecided" if s < 2.2 else "outside")
+    assert (outside.status, outside.scale) == ("below_limit", None)
 
 
 @pytest.mark.parametrize(
