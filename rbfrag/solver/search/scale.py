@@ -60,6 +60,7 @@ class ScaledRun:
         verdict: ``safe``; ``fails``; ``outside`` where the model ended first; ``undecided`` where
             the run is closer to its end than its error.
         sentence: what ended the model, empty where nothing did.
+        lost_contact: whether the block was followed past a lost contact.
     """
 
     scale: float
@@ -67,6 +68,7 @@ class ScaledRun:
     outcome: Outcome
     verdict: Verdict
     sentence: str
+    lost_contact: bool = False
 
     def theta_n(self, critical_rad: float) -> float:
         """Return the peak over the critical rotation; NaN where the block is past recovery."""
@@ -308,14 +310,14 @@ def scaled_run(run: WholeRun, scale: float, fails_rad: float) -> ScaledRun:
     assert peak is not None
     verdict: Verdict = "safe" if outcome is Outcome.STABLE else "outside"
     # a rotation that was reached counts, whatever ended the model afterwards
-    if outcome is Outcome.TOPPLED or peak - run.error >= fails_rad:
+    if outcome is Outcome.TOPPLED or peak - run.step_error >= fails_rad:
         verdict = "fails"
-    elif outcome is Outcome.UNDETERMINED or peak + run.error >= fails_rad:
+    elif outcome is Outcome.UNDETERMINED or peak + run.step_error >= fails_rad:
         verdict = "undecided"
     ending = ""
     if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
         ending = run.sentences[-1] if run.sentences else outcome.advice
-    return ScaledRun(scale, peak, outcome, verdict, ending)
+    return ScaledRun(scale, peak, outcome, verdict, ending, run.free is not None)
 
 
 def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: float) -> SearchPoints:
@@ -452,6 +454,11 @@ def _result(
         )
     if any(each.verdict == "undecided" for each in runs):
         warnings.append("some runs end closer to failure than their error: they count as not safe")
+    if any(each.lost_contact for each in runs):
+        warnings.append(
+            "past a lost contact the block is taken to fall on its planes without rebound, which "
+            "rigid contact does not decide: another impact may bring it down at another scale"
+        )
     lower, scale = bracket or (None, None)
     return replace(
         start,
