@@ -128,6 +128,14 @@ class WholeRun:
         return self._last.pose
 
     @property
+    def ending(self) -> str:
+        """What happened at the end; empty where there is nothing to say."""
+        if self.free is not None:
+            return self.free.sentence
+        assert self.run is not None
+        return self.run.ending
+
+    @property
     def started_s(self) -> float | None:
         """First motion [s]."""
         of_free = None if self.free is None else self.free.started_s

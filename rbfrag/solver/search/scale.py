@@ -316,7 +316,7 @@ def scaled_run(run: WholeRun, scale: float, fails_rad: float) -> ScaledRun:
         verdict = "undecided"
     ending = ""
     if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
-        ending = run.sentences[-1] if run.sentences else outcome.advice
+        ending = run.ending or outcome.advice
     return ScaledRun(scale, peak, outcome, verdict, ending, run.free is not None)
 
 
