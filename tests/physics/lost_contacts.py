@@ -96,11 +96,17 @@ def random_motion(random: np.random.Generator) -> GroundMotion:
     return GroundMotion(acceleration_g, DT_S)
 
 
-def lost_contacts(seed: int) -> Iterator[LostContact]:
-    """Draw blocks and motions, and yield those that lose a contact and come to rest again."""
+def lost_contacts(
+    seed: int, motions: Iterator[GroundMotion] | None = None
+) -> Iterator[LostContact]:
+    """Draw blocks and motions, and yield those that lose a contact and come to rest again.
+
+    Args:
+        motions: those that shake them, one block each; None for random pulses.
+    """
     random = np.random.default_rng(seed)
     while True:
-        motion = random_motion(random)
+        motion = random_motion(random) if motions is None else next(motions)
         alpha1, alpha3 = random.uniform(12.0, 45.0), random.uniform(50.0, 78.0)
         block = Block.from_angles(alpha1, alpha3, float(np.exp(random.uniform(-1.2, 1.1))))
         beta, phi = random.uniform(0.0, 20.0), random.uniform(25.0, 42.0)

@@ -1,0 +1,73 @@
+"""Blocks that lose a contact, beside a free block on stiff springs that knows no mechanism.
+
+Half are those of the draws of tests/physics/lost_contacts.py; the others are under pulses of the
+recorded motions that are at hand, if there are any. What rigid contact leaves open in impacts is in
+the error estimate.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+
+from benchmarks.hard_cases import Row
+from rbfrag.bench.cases import find_records
+from rbfrag.motions.ground_motion import GroundMotion
+from tests.physics.lost_contacts import SORTS, LostContact, lost_contacts
+
+COUNT = 50
+SEED = 1998
+
+AROUND_PEAK_S = 4.0
+
+
+def of_records(random: np.random.Generator) -> Iterator[GroundMotion]:
+    """Some seconds about the peak of recorded motions, scaled to 0.5 to 1.5 g."""
+    motions = find_records().motions
+    while True:
+        motion = motions[int(random.integers(len(motions)))]
+        dt_s = motion.dt_s
+        if dt_s is None or not motion.pga_g > 0.0:
+            continue
+        peak = int(np.argmax(np.abs(motion.acceleration_g)))
+        half = int(AROUND_PEAK_S / 2.0 / dt_s)
+        a = motion.acceleration_g[max(peak - half, 0) : peak + half]
+        yield GroundMotion(a * (random.uniform(0.5, 1.5) / np.abs(a).max()), dt_s)
+
+
+def rows() -> list[Row]:
+    """Run the cases."""
+    random = np.random.default_rng(SEED)
+    drawn = [
+        *islice(lost_contacts(SEED), COUNT // 2),
+        *islice(lost_contacts(SEED + 1, of_records(random)), COUNT - COUNT // 2),
+    ]
+    return [_row(sort, [each for each in drawn if each.sort == sort]) for sort in SORTS]
+
+
+def _row(sort: str, cases: list[LostContact]) -> Row:
+    wrong = within = others = 0
+    for each in cases:
+        error = each.answer.error_estimate
+        if error is None:
+            others += 1
+            continue
+        springs = each.on_springs()
+        if each.is_covered(springs, error):
+            within += 1
+            continue
+        wrong += 1
+        print(
+            f"{sort}: {each.greatest:.6f}, of springs {each.differences(springs)} less; error "
+            f"estimate {error:.1e}",
+            file=sys.stderr,
+        )
+    return Row(f"lost contact: {sort}", "free block on stiff springs", len(cases), wrong, within,
+               others)  # fmt: skip
+
+
+if __name__ == "__main__":
+    print(*rows(), sep="\n")
