@@ -110,13 +110,13 @@ class Compared(NamedTuple):
     """The yields of one model of Table 3.2 [g]: by the formulas and by the two checks.
 
     Args:
-        found: mode, state and yield by the formulas.
+        by_formulas: mode, state and yield by the formulas.
         decided: whether statics alone has one answer.
         limit_g: the greatest k that contact forces can hold.
         ramp_g: k on a slow ramp at which a block on springs starts to move; None up to `MOST_G`.
     """
 
-    found: Stability
+    by_formulas: Stability
     decided: bool
     limit_g: float
     ramp_g: float | None
@@ -124,23 +124,26 @@ class Compared(NamedTuple):
     @property
     def finite(self) -> bool:
         """Whether the formulas give a yield."""
-        return math.isfinite(self.found.yield_acceleration)
+        return math.isfinite(self.by_formulas.yield_acceleration)
 
 
 def yields(*, write: bool) -> None:
     """Compare the yields of the 1,632 models of Table 3.2, as Figs. 3.24 and 3.25 do."""
     compared = [
-        Compared(model.found, model.decided, model.limit_g(), model.ramp_g()) for model in TABLE_3_2
+        Compared(model.stability, model.decided, model.limit_g(), model.ramp_g())
+        for model in TABLE_3_2
     ]
     rows = []
     for mode in MODES:
-        of_mode = [each for each in compared if each.found.mode == mode]
+        of_mode = [each for each in compared if each.by_formulas.mode == mode]
         limit = np.abs([difference for _, difference in limit_differences(of_mode)])
         ramp = np.abs([difference for _, difference in ramp_differences(of_mode)])
         silent = [each for each in of_mode if each.ramp_g is None]
-        weak = [each for each in of_mode if each.found.yield_acceleration <= 0.0]
+        weak = [each for each in of_mode if each.by_formulas.yield_acceleration <= 0.0]
         at_once = [each for each in weak if each.ramp_g is not None and each.ramp_g < AT_ONCE_G]
-        beyond = [each for each in silent if each.found.yield_acceleration > MOST_G - BEHIND_G]
+        beyond = [
+            each for each in silent if each.by_formulas.yield_acceleration > MOST_G - BEHIND_G
+        ]
         rows.append(
             [
                 mode.replace("_", " "),
@@ -165,7 +168,7 @@ def yields(*, write: bool) -> None:
 def limit_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
     """Return yields and their differences from limit analysis where it has one answer [g]."""
     return [
-        (each.found.yield_acceleration, each.found.yield_acceleration - each.limit_g)
+        (each.by_formulas.yield_acceleration, each.by_formulas.yield_acceleration - each.limit_g)
         for each in compared
         if each.finite and each.decided
     ]
@@ -174,9 +177,9 @@ def limit_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]
 def ramp_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
     """Return yields of blocks that rest and their differences from the springs' [g]."""
     return [
-        (each.found.yield_acceleration, each.found.yield_acceleration - each.ramp_g)
+        (each.by_formulas.yield_acceleration, each.by_formulas.yield_acceleration - each.ramp_g)
         for each in compared
-        if each.finite and each.found.yield_acceleration > 0.0 and each.ramp_g is not None
+        if each.finite and each.by_formulas.yield_acceleration > 0.0 and each.ramp_g is not None
     ]
 
 
@@ -185,7 +188,7 @@ def draw_yields(compared: Sequence[Compared]) -> None:
     figure = new_figure(width_in=7.6, height_in=5.8)
     above, below = figure.subplots(2, 1, sharex=True)
     for mode in MODES:
-        of_mode = [each for each in compared if each.found.mode == mode]
+        of_mode = [each for each in compared if each.by_formulas.mode == mode]
         for axes, pairs, scale in (
             (above, limit_differences(of_mode), 1e15),
             (below, ramp_differences(of_mode), 1.0),

@@ -92,7 +92,7 @@ def of_the_rock_mass(root: Path, mode: ModeName) -> Iterator[Beside]:
     """The first blocks of a mode that are followed past it, in each record by turns."""
     mass = read_rock_mass(str(MASS)).realise(400, None)
     records = cycle([record for record in RECORDS if (root / record).is_file()])
-    found = 0
+    count = 0
     for j in np.flatnonzero(mass.of_mode(mode, "stable")):
         block = Block.from_fractures(
             float(mass.s1_m[j]), float(mass.s2_m[j]), float(mass.gamma_deg[j])
@@ -102,15 +102,15 @@ def of_the_rock_mass(root: Path, mode: ModeName) -> Iterator[Beside]:
         if record is None:
             return
         motion = read_motions(root / record)[0]
-        made = respond(
+        answer = respond(
             motion, block=block, beta_deg=planes[0], phi_deg=planes[1], phi_back_deg=planes[2]
         )
-        if not made.mode_changes:
+        if not answer.mode_changes:
             continue
-        until_s = max(made.stopped_s or 0.0, 1.0) + 2.0
+        until_s = max(answer.stopped_s or 0.0, 1.0) + 2.0
         yield beside(Path(record).name, block, planes, motion, None, until_s)
-        found += 1
-        if found == OF_EACH:
+        count += 1
+        if count == OF_EACH:
             return
 
 
@@ -173,8 +173,13 @@ def summary(cases: Sequence[Beside]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser(__doc__).parse_args(arguments)
     root = Path(chosen.records or os.environ.get(RECORDS_VARIABLE, "."))
-    made = list(pulses())
-    report("followed-pulses", markdown((HEADERS, map(row, made))), write=chosen.write, page=PAGE)
+    under_pulses = list(pulses())
+    report(
+        "followed-pulses",
+        markdown((HEADERS, map(row, under_pulses))),
+        write=chosen.write,
+        page=PAGE,
+    )
     modes: tuple[ModeName, ...] = ("slide", "slump")
     for mode in modes:
         cases = list(of_the_rock_mass(root, mode))
@@ -183,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         text = f"{markdown((HEADERS, map(row, cases)))}\n\n{summary(cases)}"
         report(f"followed-{mode}", text, write=chosen.write, page=PAGE)
     if chosen.write:
-        draw(next(each for each in made if each.name == "slump in the second"))
+        draw(next(each for each in under_pulses if each.name == "slump in the second"))
 
 
 def draw(each: Beside) -> None:

@@ -50,21 +50,30 @@ def rows() -> list[Row]:
 
 def _row(sort: str, cases: list[LostContact]) -> Row:
     wrong = within = others = 0
+    parts = []
     for each in cases:
         error = each.answer.error_estimate
         if error is None:
             others += 1
             continue
         springs = each.on_springs()
+        differences = each.differences(springs)
+        parts.append((max(map(abs, differences)) / each.greatest, error / each.greatest))
         if each.is_covered(springs, error):
             within += 1
             continue
         wrong += 1
         print(
-            f"{sort}: {each.greatest:.6f}, of springs {each.differences(springs)} less; error "
-            f"estimate {error:.1e}",
+            f"{sort}: {each.greatest:.6f}, of springs {differences} less; error estimate "
+            f"{error:.1e}",
             file=sys.stderr,
         )
+    apart, estimate = np.quantile(np.array(parts), (0.5, 0.9), axis=0).T
+    print(
+        f"{sort}: difference {apart[0]:.2%} of the peak (median), {apart[1]:.1%} (nine in ten); "
+        f"estimate {estimate[0]:.1%} and {estimate[1]:.0%}",
+        file=sys.stderr,
+    )
     return Row(f"lost contact: {sort}", "free block on stiff springs", len(cases), wrong, within,
                others)  # fmt: skip
 

@@ -77,16 +77,27 @@ class Release:
     spin_rad_s: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class FreeHistory:
-    """The motion in time; arrays of shape (n,) but for the centroid (n, 2)."""
+class Kinematics(NamedTuple):
+    """A motion in time; arrays of shape (n,) but for the centroid (n, 2).
+
+    Args:
+        time_s: times [s].
+        turned_rad: rotation, counter-clockwise [rad].
+        rate_rad_s: rate of its size [rad/s].
+        centroid_m: position of the centroid [m].
+        slip_m: displacement of the contact along the base [m].
+        slip_m_s: its velocity [m/s].
+        strength_g: driving acceleration that neither speeds the block up nor slows it down [g]; NaN
+            without a mechanism, which alone has one.
+    """
 
     time_s: FloatArray
     turned_rad: FloatArray
-    spin_rad_s: FloatArray
+    rate_rad_s: FloatArray
     centroid_m: FloatArray
     slip_m: FloatArray
     slip_m_s: FloatArray
+    strength_g: FloatArray
 
 
 class FreeError(NamedTuple):
@@ -112,7 +123,7 @@ class FreeMotion:
         slip_m: greatest displacement of the contact along the base [m].
         step_error: difference from a run of twice the step.
         steps: steps of both runs.
-        contact: the contact whose displacement is told, from the centroid [m].
+        contact: the contact whose displacement is given, from the centroid [m].
         rows: what the kernel kept of the motion.
         by_other_laws: runs the block by the laws of `OTHER_LAWS`.
     """
@@ -145,14 +156,36 @@ class FreeMotion:
         return FreeError(*(a + b for a, b in zip(self.step_error, of_laws, strict=True)))
 
     @cached_property
-    def history(self) -> FreeHistory:
+    def history(self) -> Kinematics:
         """The motion in time."""
-        return _history(self.block, self.rows, self.contact)
+        time_s, x, y, turned, vx, _, spin, _ = self.rows
+        arm_x, arm_y = self.contact
+        return Kinematics(
+            time_s.copy(),
+            turned.copy(),
+            np.where(turned < 0.0, -spin, spin),
+            np.stack([x, y], axis=1),
+            _slips(self.block, self.rows, self.contact),
+            vx - spin * (arm_x * np.sin(turned) + arm_y * np.cos(turned)),
+            np.full_like(time_s, np.nan),
+        )
 
     @cached_property
     def changes(self) -> tuple[ModeChange, ...]:
-        """What the block did."""
-        return _changes(self.rows)
+        """What the block did, one entry where it does something else than before."""
+        changes: list[ModeChange] = []
+        since, doing, last = 0.0, "", ""
+        time_s, _, _, _, vx, vy, spin, touch = self.rows
+        for now, *velocity, bits in zip(time_s, vx, vy, spin, touch, strict=True):
+            if not any(velocity):  # rest changes nothing of what it does
+                continue
+            name = _named(int(bits), velocity[2])
+            if name != doing:
+                since, doing = float(now), name
+            if doing != last and now - since >= SHORTEST_S:
+                changes.append(ModeChange(since, doing))
+                last = doing
+        return tuple(changes)
 
 
 class _Path(NamedTuple):
@@ -337,18 +370,6 @@ def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> Floa
     return slips
 
 
-def _history(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FreeHistory:
-    time_s, x, y, turned, vx, _, spin, _ = rows
-    return FreeHistory(
-        time_s=time_s.copy(),
-        turned_rad=turned.copy(),
-        spin_rad_s=spin.copy(),
-        centroid_m=np.stack([x, y], axis=1),
-        slip_m=_slips(block, rows, contact),
-        slip_m_s=vx - spin * (contact[0] * np.sin(turned) + contact[1] * np.cos(turned)),
-    )
-
-
 def _ending(run: FreeRun) -> tuple[Outcome, str]:
     if run.stop == AT_REST:
         return Outcome.STABLE, ""
@@ -369,22 +390,6 @@ ROCKS = "rocks about its toe"
 CONFINED = "topples against its back plane"
 ALONG_BACK = "slides on its back plane"
 OFF = "is off both planes"
-
-
-def _changes(rows: FloatArray) -> tuple[ModeChange, ...]:
-    """Return what the block did, one entry where it does something else than before."""
-    changes: list[ModeChange] = []
-    since, doing, last = 0.0, "", ""
-    for now, vx, vy, spin, bits in zip(rows[0], rows[4], rows[5], rows[6], rows[7], strict=True):
-        if vx == 0.0 and vy == 0.0 and spin == 0.0:  # rest changes nothing of what it does
-            continue
-        name = _named(int(bits), spin)
-        if name != doing:
-            since, doing = float(now), name
-        if doing != last and now - since >= SHORTEST_S:
-            changes.append(ModeChange(since, doing))
-            last = doing
-    return tuple(changes)
 
 
 def _named(touch: int, spin: float) -> str:

@@ -44,14 +44,14 @@ def _step(
 ) -> tuple[float, float, float]:
     """Fill u and x from u[0], x[0]; return theta(1) - theta(0), U(1), U'(1)."""
     for k in range(ORDER):
-        drive = -w0 * x[k]
+        pull = -w0 * x[k]
         if k > 0:
-            drive -= dw * x[k - 1]
+            pull -= dw * x[k - 1]
         if k == 0:
-            drive += a0
+            pull += a0
         elif k == 1:
-            drive += da
-        u[k + 1] = ph * ph * drive / (k + 1)
+            pull += da
+        u[k + 1] = ph * ph * pull / (k + 1)
         x[k + 1] = -u[k] / (k + 1)
     turned, u_end, v_end = 0.0, 0.0, 0.0
     for k in range(ORDER, -1, -1):
@@ -63,7 +63,7 @@ def _step(
 
 @kernel
 def _crossing(k0: float, k1: float, w0: float, w1: float, kr: float, tau: float) -> float:
-    """Fraction of an interval from tau on at which the drive exceeds kr; -1 where it does not."""
+    """Fraction of an interval, from tau on, at which k_h first exceeds k_r; -1 where it does not."""
     g0, g1 = k0 - w0 * kr, k1 - w1 * kr
     if g0 + (g1 - g0) * tau > 0.0:
         return tau
@@ -161,7 +161,7 @@ def _any_excursion_fails(
     p: float,
     kr: float,
 ) -> bool:
-    """Whether an excursion from rest at any rise of the drive above kr topples."""
+    """Whether an excursion from rest at any rise of the excitation above kr topples."""
     above = False
     for i in range(interval_s.size):
         if not above and interval_s[i] > 0.0:
@@ -181,17 +181,17 @@ def respond(motion: GroundMotion, *, p2: float, kr: float) -> LinearRun:
     return LinearRun(bool(toppled), peak / kr)
 
 
-def fails(drive: Excitation, p2: float, kr: float) -> bool:
-    """Whether a block that starts from rest at any rise of the drive above k_r topples."""
-    return bool(_any_excursion_fails(*_arrays(drive), math.sqrt(p2), kr))
+def fails(excited: Excitation, p2: float, kr: float) -> bool:
+    """Whether a block that starts from rest at any rise of the excitation above k_r topples."""
+    return bool(_any_excursion_fails(*_arrays(excited), math.sqrt(p2), kr))
 
 
-def largest_failing(drive: Excitation, p2: float, width: float = 1e-12) -> float:
+def largest_failing(excited: Excitation, p2: float, width: float = 1e-12) -> float:
     """Bisect, from all k_r, for the largest one with a failing excursion from rest."""
-    low, high = 0.0, drive.max_q
+    low, high = 0.0, excited.max_q
     while high - low > width * high and high > 0.0:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if fails(drive, p2, middle) else (low, middle)
+        low, high = (middle, high) if fails(excited, p2, middle) else (low, middle)
     return low
 
 
@@ -203,10 +203,10 @@ def critical_angle(
     Nothing above the largest failing excursion from rest topples. Below it blocks are tried one
     by one until one does, then the border above that one is bisected.
     """
-    drive = excitation(motion)
-    arrays, p = _arrays(drive), math.sqrt(p2)
-    top = largest_failing(drive, p2)
-    bottom = limit * drive.pga_g
+    excited = excitation(motion)
+    arrays, p = _arrays(excited), math.sqrt(p2)
+    top = largest_failing(excited, p2)
+    bottom = limit * excited.pga_g
     if top <= bottom:
         return None
     above = top * (1.0 + 1e-11)
@@ -221,5 +221,5 @@ def critical_angle(
     return None
 
 
-def _arrays(drive: Excitation) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    return drive.interval_s, drive.k_h, drive.w, drive.tail_min_q
+def _arrays(excited: Excitation) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    return excited.interval_s, excited.k_h, excited.w, excited.tail_min_q

@@ -153,12 +153,12 @@ def test_responses_scale_with_the_amplitude() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_runs_agree_with_the_reference_integrator(seed: int) -> None:
     motion = GroundMotion(shaking(seed), 0.02)
-    drive = excitation(motion)
+    excited = excitation(motion)
     toppled = 0
     for share in (0.15, 0.3, 0.6, 0.9):
-        kr = share * drive.max_q
+        kr = share * excited.max_q
         found = linear_block.respond(motion, p2=20.0, kr=kr)
-        truth = reference.integrate(drive.time_s, drive.k_h, None, p2=20.0, kr=kr, linear=True)
+        truth = reference.integrate(excited.time_s, excited.k_h, None, p2=20.0, kr=kr, linear=True)
         assert found.toppled == (truth.outcome == "toppled")
         toppled += found.toppled
         if truth.peak_rad is not None:

@@ -34,7 +34,7 @@ SLIDES = {
     "vertical": Case(33, 62, 1, 10, 35, 35, ((0.1, 0.4, 0.8), (1.5, 0.4, 0.8)), ((0.2, 0.2, 0.3),)),
 }
 LOST = {
-    "thrown off its back plane": Case(40, 75, 1, 15, 30, 35, ((0.1, 0.3, 1.3),), until=2.4),
+    "driven off its back plane": Case(40, 75, 1, 15, 30, 35, ((0.1, 0.3, 1.3),), until=2.4),
     "twice": Case(44, 73, 1, 20, 40, 40, ((0.1, 0.2, 1.3), (1.2, 0.2, 1.3)), until=2.4),
 }
 
@@ -115,8 +115,10 @@ def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
             motion, vertical=vertical, block=case.block, beta_deg=case.beta, phi_deg=case.phi,
             phi_back_deg=case.back,
         )  # fmt: skip
-        drive = excitation(motion, vertical)
-        free = free_motion(site_of(case), drive, Release(0.0, Pose(0.0, case.block.centroid, 0.0)))
+        excited = excitation(motion, vertical)
+        free = free_motion(
+            site_of(case), excited, Release(0.0, Pose(0.0, case.block.centroid, 0.0))
+        )
         assert free.outcome is Outcome.STABLE
         assert free.backward_rad == pytest.approx(exact.peak_theta_rad, rel=1e-4)
         assert free.pose.turned_rad == pytest.approx(exact.final_theta_rad, rel=1e-4)
@@ -132,18 +134,18 @@ def site_of(case: Case) -> BlockOnPlanes:
     return on_planes(case.block, case.beta, case.phi, case.back)
 
 
-def test_free_flight_and_fall() -> None:
+def test_free_fall() -> None:
     # above both planes, under no shaking: it falls as bodies do, and comes to rest on its base
     block = Block.rectangle(1.0, 1.0)
     case = Case(-45, 45, block.r3_m, 0, 35, 35, ())
-    drive = excitation(GroundMotion(np.zeros(201), DT_S))
+    excited = excitation(GroundMotion(np.zeros(201), DT_S))
     x, y = block.centroid
     start = Release(0.0, Pose(0.0, (x + 0.5, y + 0.2), 0.5))
-    free = free_motion(site_of(case), drive, start)
+    free = free_motion(site_of(case), excited, start)
     landed_s = math.sqrt(2.0 * 0.2 / 9.80665)
     assert free.landed_s == pytest.approx(landed_s, abs=1e-3)
-    flying = free.history.time_s < landed_s - 1e-3
-    height = y + 0.2 - 0.5 * 9.80665 * free.history.time_s[flying] ** 2
-    assert free.history.centroid_m[flying, 1] == pytest.approx(height, abs=5e-4)
+    falling = free.history.time_s < landed_s - 1e-3
+    height = y + 0.2 - 0.5 * 9.80665 * free.history.time_s[falling] ** 2
+    assert free.history.centroid_m[falling, 1] == pytest.approx(height, abs=5e-4)
     assert free.pose.centroid_m == pytest.approx((x + 0.5, y), abs=1e-9)
     assert free.outcome is Outcome.STABLE

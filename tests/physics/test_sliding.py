@@ -97,7 +97,7 @@ def test_down_only_and_two_ways() -> None:
     assert slid(other) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_block_thrown_off_its_base() -> None:
+def test_vertical_motion_lifts_a_block_off_its_base() -> None:
     # a steep plane and a strong push out of it: N = w cos(b) - k sin(b) vanishes
     motion = GroundMotion.from_nodes([0.0, 1.0], [0.0, 6.0])
     answer = respond(motion, ky=0.1, beta_deg=20.0)

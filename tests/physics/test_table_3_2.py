@@ -33,7 +33,7 @@ class Model:
     r3: float
 
     @property
-    def found(self) -> Stability:
+    def stability(self) -> Stability:
         return stability(self.block, beta_deg=self.beta, phi_deg=self.phi)
 
     @property
@@ -48,7 +48,7 @@ class Model:
     @property
     def decided(self) -> bool:
         """Whether statics alone has one answer: no wedge or hang-up holds more than the mode."""
-        return is_unique(self.case, self.found.mode)
+        return is_unique(self.case, self.stability.mode)
 
     def limit_g(self) -> float:
         """The greatest k that any contact forces hold; infinite where they hold every k."""
@@ -73,7 +73,7 @@ def test_the_table_has_1632_models() -> None:
 
 @pytest.mark.parametrize("model", TABLE_3_2[7::31], ids=str)
 def test_limit_analysis_holds_the_yield_and_no_more_where_it_is_decided(model: Model) -> None:
-    k, limit = model.found.yield_acceleration, model.limit_g()
+    k, limit = model.stability.yield_acceleration, model.limit_g()
     if math.isfinite(k):
         assert limit > k - 1e-10
         assert not model.decided or abs(limit - k) < 1e-10
@@ -84,7 +84,7 @@ def test_limit_analysis_holds_the_yield_and_no_more_where_it_is_decided(model: M
 
 @pytest.mark.parametrize("model", TABLE_3_2[5::151], ids=str)
 def test_a_block_on_springs_starts_to_move_at_the_yield(model: Model) -> None:
-    k, started = model.found.yield_acceleration, model.ramp_g()
+    k, started = model.stability.yield_acceleration, model.ramp_g()
     if k > MOST_G - 0.05:
         assert started is None
     elif k > 0.0:

@@ -173,8 +173,8 @@ CASES: dict[str, tuple[Mechanism, Laws, Excitation]] = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_work_balances_energy(name: str) -> None:
-    mechanism, laws, drive = CASES[name]
-    run = follow(mechanism, drive, history=True)
+    mechanism, laws, excited = CASES[name]
+    run = follow(mechanism, excited, history=True)
     assert run.started_s is not None
     travel = run.history
     assert travel is not None
@@ -192,8 +192,8 @@ def test_work_balances_energy(name: str) -> None:
     start, end = np.flatnonzero(moving), np.flatnonzero(moving) + 1
     h = h[moving]
     sense = np.sign(x[end] - x[start])
-    k0, k1 = (np.interp(time[i], drive.time_s, drive.k_h) for i in (start, end))
-    w0, w1 = (np.interp(time[i], drive.time_s, drive.w) for i in (start, end))
+    k0, k1 = (np.interp(time[i], excited.time_s, excited.k_h) for i in (start, end))
+    w0, w1 = (np.interp(time[i], excited.time_s, excited.w) for i in (start, end))
     a0, e0, *_ = laws(x[start], rate[start], k0, w0, sense)
     a1, e1, *_ = laws(x[end], rate[end], k1, w1, sense)
 
@@ -214,8 +214,8 @@ def test_work_balances_energy(name: str) -> None:
 
 
 def test_work_balances_energy_while_a_block_rocks() -> None:
-    drive = shaking(4, 0.5, 0.3)
-    motion, up = (GroundMotion(a, 0.0005) for a in (drive.k_h, drive.w - 1.0))
+    excited = shaking(4, 0.5, 0.3)
+    motion, up = (GroundMotion(a, 0.0005) for a in (excited.k_h, excited.w - 1.0))
     p2, kr = 4.0, 0.3
     answer = respond(motion, p2=p2, kr=kr, vertical=up, history=True)
     assert answer.outcome is Outcome.STABLE

@@ -21,7 +21,7 @@ SWEEPS_MAX = 400
 out what rounding put below them, which no velocity does exactly for both."""
 
 CONVERGED = 1e-10
-"""Change of velocity in a sweep, over that by gravity in a step, at which impulses are found."""
+"""Change of velocity in a sweep, over that by gravity in a step, at which they have converged."""
 
 SINGULAR = 1e-9
 """Pivot at which the linear equations are taken not to decide."""
@@ -119,7 +119,7 @@ def after_impulses(
         active: how many may touch.
         per_inertia: mass over moment of inertia about the centroid [1/m²].
         free: velocity without impulses.
-        tolerance: change of velocity in a sweep at which the impulses are found [m/s].
+        tolerance: change of velocity in a sweep at which the impulses have converged [m/s].
     """
     if active == 1:
         decided, velocity = _of_one(corners, work, per_inertia, free)

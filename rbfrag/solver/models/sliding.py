@@ -192,7 +192,7 @@ def sliding_displacements(
 
 
 def slide_m(excited: Excitation, ky: float) -> float:
-    """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
+    """Return the permanent displacement down a level plane [m]; NaN where k_v lifts it off."""
     run = follow(mechanism(level_plane(ky)), excited)
     # downslope only: where it stops is the greatest displacement, too
     return run.x if run.outcome is Outcome.STABLE else math.nan

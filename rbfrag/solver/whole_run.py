@@ -1,0 +1,350 @@
+"""A block followed to its end: by its mechanism, and step by step from where that ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.free_motion import (
+    FreeError,
+    FreeMotion,
+    Kinematics,
+    Release,
+    free_motion,
+    gap_m,
+    released,
+    touching,
+)
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
+from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
+from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.results import (
+    BlockState,
+    FloatArray,
+    ModeChange,
+    Outcome,
+    Response,
+    ResponseHistory,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class WholeRun:
+    """A block followed to its end: by its mechanism, and from where that ends step by step.
+
+    Args:
+        mechanism: the block as its model describes it.
+        start: the state that it started from; None for its first place.
+        run: what its mechanism did; None for a start that no mechanism describes.
+        free: what the block did after it; None where the mechanism goes to the end.
+    """
+
+    mechanism: Mechanism
+    site: BlockOnPlanes
+    start: BlockState | None
+    run: MechanismRun | None
+    free: FreeMotion | None
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        return self._last.outcome
+
+    @property
+    def _last(self) -> MechanismRun | FreeMotion:
+        last = self.run if self.free is None else self.free
+        assert last is not None
+        return last
+
+    @property
+    def pose(self) -> Pose:
+        """Where the block is at the end."""
+        return self._last.pose
+
+    @property
+    def ending(self) -> str:
+        """What happened at the end; empty where there is nothing to say."""
+        if self.free is not None:
+            return self.free.sentence
+        assert self.run is not None
+        return self.run.ending
+
+    @property
+    def started_s(self) -> float | None:
+        """First motion [s]."""
+        of_free = None if self.free is None else self.free.started_s
+        return of_free if self.run is None or self.run.started_s is None else self.run.started_s
+
+    @property
+    def ended_s(self) -> float | None:
+        """Last standstill, or where the model ended [s]; None for no motion."""
+        if self.free is None:
+            assert self.run is not None
+            return self.run.ended_s
+        moved = self.started_s is not None or self.outcome is Outcome.JUMP
+        return self.free.time_s if moved else None
+
+    @property
+    def peak_rad(self) -> float | None:
+        """Greatest rotation [rad]; None for a block that only slides."""
+        peak = self.run.peak if self.run is not None and self.mechanism.rotates else None
+        if self.free is None:
+            return peak
+        return max(peak or 0.0, self.free.backward_rad, self.free.forward_rad)
+
+    @property
+    def peak_displacement_m(self) -> float:
+        """Greatest displacement along the base [m]."""
+        slips = [self.run.peak_displacement_m] if self.run is not None else []
+        return max([*slips, self.free.slip_m] if self.free is not None else slips)
+
+    @property
+    def step_error(self) -> float:
+        """Bound on the error of the integration: of the peak rotation [rad], of a slide [m]."""
+        return self._error(None if self.free is None else self.free.step_error)
+
+    @property
+    def error(self) -> float | None:
+        """The same with what laws of impact and friction leave open after a lost contact.
+
+        None where some of them let the block fail and others do not.
+        """
+        if self.free is None:
+            return self.step_error
+        return None if self.free.error is None else self._error(self.free.error)
+
+    def _error(self, of_free: FreeError | None) -> float:
+        error = 0.0 if self.run is None else self.run.error
+        if of_free is None:
+            return error
+        return error + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
+
+    @property
+    def changes(self) -> tuple[ModeChange, ...]:
+        """What the block did after its first motion."""
+        changes = () if self.run is None else self.run.changes
+        free = () if self.free is None else self.free.changes
+        return (*(ModeChange(change.time_s, change.name) for change in changes), *free)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What the answer takes for granted, and where it ends."""
+        known = () if self.run is None else self.run.sentences
+        if self.free is None:
+            return known
+        # the end of its mechanism is not the end of the block any more
+        if self.run is not None and self.run.ending:
+            known = known[:-1]
+        if self.free.landed_s:
+            known = (*known, FALLS_ON_ITS_BASE.format(self.free.landed_s))
+        if self.free.error is None:
+            known = (*known, FAILS_BY_SOME_LAWS)
+        return (*known, self.free.sentence) if self.free.sentence else known
+
+    @property
+    def state(self) -> BlockState | None:
+        """Where the block is left at rest; None where it is not."""
+        pose, block = self.pose, self.site.block
+        if self.outcome is not Outcome.STABLE:
+            return None
+        position = None
+        # only the first phase can be entered at rest: what comes after it goes on step by step
+        if self.free is None and self.run is not None and self.run.phase is self.mechanism.first:
+            position = self.run.x
+        return BlockState(
+            turned_rad=pose.turned_rad,
+            centroid_m=pose.centroid_m,
+            displacement_m=pose.displacement_m,
+            gap_m=gap_m(block, pose) if block is not None else pose.displacement_m,
+            touching=touching(self.site, pose) if block is not None else ("base",),
+            position=position,
+            error=self.step_error if position else 0.0,
+        )
+
+
+FALLS_ON_ITS_BASE = (
+    "at {:.3f} s, and perhaps later, the block falls on its whole base: how far such impacts push "
+    "it depends on how its corners rebound and rub, which rigid contact does not decide, so that "
+    "the displacement may be off by up to some tens of per cent, one of millimetres by more"
+)
+
+FAILS_BY_SOME_LAWS = (
+    "whether the block fails hangs on how its corners rebound and rub in impacts, which rigid "
+    "contact does not decide: treat it as critical; there is no error estimate"
+)
+
+
+def whole_run(
+    mechanism: Mechanism,
+    site: BlockOnPlanes,
+    excited: Excitation,
+    *,
+    history: bool = False,
+    start: BlockState | None = None,
+) -> WholeRun:
+    """Follow a block to its end.
+
+    Args:
+        mechanism: the block as its model describes it.
+        history: keep the motion in time.
+        start: the state that the motion finds; None for the first place.
+    """
+    run, release = None, None
+    # a start without a coordinate is one that no mechanism describes
+    if start is None or start.position is not None:
+        at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
+        run = follow(mechanism, excited, history=history, start=at)
+        if not (mechanism.goes_on and run.outcome is Outcome.CONTACT_LOST):
+            return WholeRun(mechanism, site, start, run, None)
+        assert run.ended_s is not None
+        release = released(run.ended_s, run.phase.pose, run.x, run.rate)
+    else:
+        pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
+        release = Release(float(excited.time_s[0]), pose)
+    free = free_motion(site, excited, release, at_toe=mechanism.at_toe)
+    return WholeRun(mechanism, site, start, run, free)
+
+
+def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
+    """Return the answer about a block that was followed.
+
+    Args:
+        kind: name of its model.
+    """
+    excited = shaking.excitation
+    failed = whole.outcome is Outcome.TOPPLED
+    peak_rad = None if failed else whole.peak_rad
+    critical = whole.mechanism.critical
+    first = whole.mechanism.first.pose(0.0)
+    before_m = 0.0 if whole.start is None else whole.start.displacement_m
+    at_end = None if failed else whole.pose
+    run = whole.run
+    certain_s = None if run is None else run.certain_s
+    steps, moved = (0, 0) if run is None else (run.steps, run.samples_moved)
+    if whole.free is not None:
+        steps += whole.free.steps
+        moved += _samples(excited, whole)
+    return Response(
+        kind=kind,
+        outcome=whole.outcome,
+        peak_theta_n=None if peak_rad is None or not critical else peak_rad / critical,
+        peak_theta_rad=peak_rad,
+        critical_angle_deg=None if critical is None else math.degrees(critical),
+        started_s=whole.started_s,
+        toppled_s=(certain_s or whole.ended_s) if failed else None,
+        error_estimate=whole.error,
+        steps=steps,
+        samples_moved=moved,
+        samples_total=int(np.count_nonzero(excited.interval_s)),
+        warnings=(*shaking.warnings, *whole.sentences),
+        history=_history(whole, excited) if shaking.history else None,
+        final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
+        displacement_m=at_end.displacement_m - before_m if at_end else None,
+        peak_displacement_m=None if failed else whole.peak_displacement_m,
+        centroid_displacement_m=math.dist(at_end.centroid_m, first.centroid_m) if at_end else None,
+        stopped_s=whole.ended_s,
+        mode_changes=whole.changes,
+        state=whole.state,
+    )
+
+
+def _samples(excited: Excitation, whole: WholeRun) -> int:
+    """Return the sample intervals through which a block was followed step by step."""
+    assert whole.free is not None
+    history = whole.free.history
+    moving = history.time_s[(history.rate_rad_s != 0.0) | (history.slip_m_s != 0.0)]
+    return int(np.unique(np.searchsorted(excited.time_s, moving)).size)
+
+
+def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> Kinematics:
+    nothing = np.zeros_like(history.rate)
+    return Kinematics(
+        history.time_s,
+        np.array([pose.turned_rad for pose in history.poses]),
+        history.rate if mechanism.rotates else nothing,
+        np.array([pose.centroid_m for pose in history.poses]),
+        np.array([pose.displacement_m for pose in history.poses]),
+        nothing if mechanism.rotates else history.rate,
+        history.strength_g,
+    )
+
+
+def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
+    """Put the nodes of rest, which the kernels skip, back between those of motion."""
+    mechanism = whole.mechanism
+    parts = []
+    if whole.run is not None and whole.run.history is not None:
+        parts.append(_of_mechanism(mechanism, whole.run.history))
+    if whole.free is not None:
+        parts.append(whole.free.history)
+    trajectory = Kinematics(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    time_s = trajectory.time_s
+    rest = _nodes_of_rest(trajectory, excited)
+    order = np.argsort(np.concatenate([time_s, rest]), kind="stable")
+    at_s = np.concatenate([time_s, rest])[order]
+    last = np.searchsorted(time_s, rest, side="right") - 1
+
+    def merged(moving: FloatArray, before: float | tuple[float, float]) -> FloatArray:
+        """Return values at all times: at rest those of the motion before, or of the first place."""
+        resting = np.full((rest.size, *moving.shape[1:]), before, dtype=np.float64)
+        if moving.size:
+            known = last >= 0 if moving.ndim == 1 else (last >= 0)[:, None]
+            resting = np.where(known, moving[np.maximum(last, 0)], resting)
+        together: FloatArray = np.concatenate([moving, resting])[order]
+        return together
+
+    spin, speed = (
+        np.concatenate([values, np.zeros(rest.size)])[order]
+        for values in (trajectory.rate_rad_s, trajectory.slip_m_s)
+    )
+    at_start, strength = _at_start(whole)
+    k_h, k_v = _accelerations(excited, at_s)
+    turned = merged(trajectory.turned_rad, at_start.turned_rad)
+    return ResponseHistory(
+        time_s=at_s,
+        theta_rad=np.abs(turned),
+        theta_dot_rad_s=spin,
+        k_h=k_h,
+        k_v=k_v,
+        displacement_m=merged(trajectory.slip_m, at_start.displacement_m),
+        velocity_m_s=None if mechanism.rotates else speed,
+        centroid_m=merged(trajectory.centroid_m, at_start.centroid_m),
+        turned_rad=turned,
+        strength_g=merged(trajectory.strength_g, strength),
+    )
+
+
+def _nodes_of_rest(trajectory: Kinematics, excited: Excitation) -> FloatArray:
+    """Return the times of the nodes that were skipped [s]."""
+    time_s = trajectory.time_s
+    nodes_s = excited.time_s
+    # a block that has not come to rest has failed, or left the model: nothing follows
+    if time_s.size and (
+        time_s[-1] >= nodes_s[-1] or trajectory.rate_rad_s[-1] or trajectory.slip_m_s[-1]
+    ):
+        nodes_s = nodes_s[nodes_s < time_s[-1]]
+    return nodes_s[~np.isin(nodes_s, time_s)]
+
+
+def _at_start(whole: WholeRun) -> tuple[Pose, float]:
+    """Return where the motion finds the block, and its strength there; NaN if it is not known."""
+    state, first = whole.start, whole.mechanism.first
+    if state is None:
+        return first.pose(0.0), first.forward.threshold(0.0)
+    strength = math.nan if state.position is None else first.forward.threshold(state.position)
+    return Pose(state.turned_rad, state.centroid_m, state.displacement_m), strength
+
+
+def _accelerations(excited: Excitation, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return k_h and k_v [g] at times of which each jump has two."""
+    k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
+    k_v = np.interp(at_s, excited.time_s, excited.w - 1.0, right=0.0)
+    # of a jump, the first entry at its time shows what was before
+    for jump in np.flatnonzero(excited.interval_s == 0.0):
+        before = int(np.searchsorted(at_s, excited.time_s[jump]))
+        if before + 1 < at_s.size and at_s[before] == at_s[before + 1] == excited.time_s[jump]:
+            k_h[before], k_v[before] = excited.k_h[jump], excited.w[jump] - 1.0
+    return k_h, k_v
