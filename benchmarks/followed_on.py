@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
@@ -26,11 +27,17 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
 from rbfrag.plots.canvas import BLUE, ROCK, light_grid, new_figure, save_figure
 from rbfrag.rockmasses.file import read_rock_mass
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.shaking import DISPLACEMENT_M
+from rbfrag.solver import free_motion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.models import model_of_mode
+from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.models import model_of_mode, sliding
 from rbfrag.solver.respond import respond
-from rbfrag.solver.results import Response
+from rbfrag.solver.results import Outcome, Response
 from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.whole_run import WholeRun, whole_run
 from tests.physics.penalty import Simulated, simulate
 from tests.physics.test_against_penalty import DT_S, half_sines
 from tests.physics.test_followed_on import LOST, SLIDES, first_rest_rad, first_time
@@ -42,6 +49,8 @@ MASS = ROOT / "docs" / "examples" / "rockmass.toml"
 RECORDS = ("nga_at2_misc/Rinaldi228.AT2", "nga_at2_misc/RSN77_SFERN_PUL164.AT2")
 OF_EACH = 12
 """Blocks of the rock mass of each sort."""
+
+SLIDES_OF_MASS = 500
 
 DAMPINGS = (0.7, 0.1)
 """Parts of critical damping of the springs."""
@@ -114,6 +123,46 @@ def of_the_rock_mass(root: Path, mode: ModeName) -> Iterator[Beside]:
             return
 
 
+def slides_by_law(root: Path) -> list[list[str]]:
+    """How many slides of the rock mass fail by 5 cm, by each law of impacts."""
+    mass = read_rock_mass(str(MASS)).realise(3000, None)
+    slides = np.flatnonzero(mass.of_mode("slide", "stable"))[:SLIDES_OF_MASS]
+    rows = []
+    for record in RECORDS:
+        if not (root / record).is_file():
+            continue
+        excited = excitation(read_motions(root / record)[0])
+        failed, lost = [], 0
+        for law in (free_motion.RIGID, *free_motion.OTHER_LAWS):
+            with patch.object(free_motion, "RIGID", law):
+                runs = [_slide(mass, j, excited) for j in slides]
+            lost = sum(run.free is not None for run in runs)
+            failed.append(
+                sum(
+                    run.outcome is Outcome.TOPPLED or run.peak_displacement_m > DISPLACEMENT_M
+                    for run in runs
+                )
+            )
+        rows.append([Path(record).name, *map(str, (slides.size, lost, *failed))])
+    return rows
+
+
+def _slide(mass: Realisations, j: int, excited: Excitation) -> WholeRun:
+    site = BlockOnPlanes(
+        block=Block.from_fractures(
+            float(mass.s1_m[j]), float(mass.s2_m[j]), float(mass.gamma_deg[j])
+        ),
+        beta_rad=math.radians(mass.beta_deg[j]),
+        phi_rad=math.radians(mass.phi_deg[j]),
+        phi_back_rad=math.radians(mass.phi_back_deg[j]),
+        back_fracture=True,
+        cohesive=False,
+        yield_g=None,
+        settings={},
+    )
+    return whole_run(sliding.mechanism(site), site, excited)
+
+
 HEADERS = [
     "motion", "α1, α3, β, φ1, φ2 [deg]", "displacement [m]", "springs, damping 0.7",
     "springs, 0.1", "difference", "tips back [s]", "springs", "leans [s]", "springs",
@@ -180,6 +229,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         write=chosen.write,
         page=PAGE,
     )
+    headers = [
+        "motion", "slides", "lose a contact", "slide 5 cm", "with rebound .2", "without friction",
+    ]  # fmt: skip
+    table = markdown((headers, slides_by_law(root)))
+    report("slides-by-law", table, write=chosen.write, page=PAGE)
     modes: tuple[ModeName, ...] = ("slide", "slump")
     for mode in modes:
         cases = list(of_the_rock_mass(root, mode))

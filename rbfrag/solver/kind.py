@@ -119,7 +119,8 @@ class RunEnd:
         peak_rad: peak rotation [rad]; None for a block that slides, or that has failed.
         peak_displacement_m: greatest displacement of the contact on the base along it [m]; None
             for a block that rocks, or that has failed.
-        error: bound on the error of the peak [rad], of a sliding block [m].
+        error: bound on the error of the integration of the peak [rad], of a sliding block [m];
+            what laws of impact leave open after a lost contact is not in it.
         about_block: what the model takes for granted about this block, whatever the motion.
     """
 

@@ -63,7 +63,7 @@ def _step(
 
 @kernel
 def _crossing(k0: float, k1: float, w0: float, w1: float, kr: float, tau: float) -> float:
-    """Fraction of an interval, from tau on, at which k_h first exceeds k_r; -1 where it does not."""
+    """Fraction of an interval, from tau on, at which k_h exceeds k_r first; -1 for never."""
     g0, g1 = k0 - w0 * kr, k1 - w1 * kr
     if g0 + (g1 - g0) * tau > 0.0:
         return tau

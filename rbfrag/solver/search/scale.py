@@ -24,7 +24,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, WholeRun, shaken_mechanism
+from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
@@ -37,6 +37,7 @@ from rbfrag.solver.results import (
     SearchPoints,
     Status,
 )
+from rbfrag.solver.whole_run import WholeRun
 
 SCAN_RATIO = 1.05
 """Ratio of two scales that are looked at one after the other; its square beyond the answer."""
