@@ -29,7 +29,7 @@ from rbfrag.fragility.fit.dependence import PairTables
 from rbfrag.fragility.fit.likelihood import Binomial, maximise
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.methods import arrays
+from rbfrag.fragility.method import arrays
 
 FloatArray = NDArray[np.float64]
 

@@ -28,7 +28,8 @@ from rbfrag.fragility.fit.likelihood import most_likely
 from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import Method, method_named
+from rbfrag.fragility.method import Method
+from rbfrag.fragility.methods import method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]

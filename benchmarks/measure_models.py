@@ -23,7 +23,8 @@ from rbfrag.fragility.fit.likelihood import maximise, most_likely
 from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import Method, arrays, method_named
+from rbfrag.fragility.method import Method, arrays
+from rbfrag.fragility.methods import method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import DEFAULT_P2
 

@@ -26,7 +26,8 @@ from rbfrag.fragility.fit.fitting import Fitted, fit_source, methods_of_kind
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import LOGIT, TOPPLING_BLOCK, Method, method_named
+from rbfrag.fragility.method import LOGIT, TOPPLING_BLOCK, Method
+from rbfrag.fragility.methods import method_named
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.fragility.fit.data import FitData
-from rbfrag.fragility.methods import arrays
+from rbfrag.fragility.method import arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import Picture, new_figure, plot_path, save_figure, written_numbers

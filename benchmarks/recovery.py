@@ -22,7 +22,8 @@ from rbfrag.fragility.fit.line import Bins, iterate
 from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.methods import method_named
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 

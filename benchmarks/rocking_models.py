@@ -32,7 +32,8 @@ from rbfrag.fragility.fit.likelihood import most_likely
 from rbfrag.fragility.fit.outcomes import outcome_rows, sensitive_share
 from rbfrag.fragility.fit.scores import ScoredBlocks, brier, calibration, log_loss
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named
+from rbfrag.fragility.method import Eta, Form, Method, Numbers
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.methods.overturning import BLOCK
 from rbfrag.solver.results import DEFAULT_P2
 

@@ -35,7 +35,7 @@ from benchmarks.shake_table_runs import (
 from rbfrag.bench.tables import markdown
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
-from rbfrag.fragility.methods import LOGIT
+from rbfrag.fragility.method import LOGIT
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
 from rbfrag.solver.models.rocking import MODEL as ROCKING
 

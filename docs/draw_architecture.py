@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,10 @@ for name, module in sorted(sys.modules.items()):
 BESIDE = {"rbfrag", "errors", "files", "frames", "version", "migrations"}
 """What the figure leaves out: the public face, what everybody may import, the schema's steps."""
 
+UNNAMED = {"rbfrag", "rbfrag.bench.peers"}
+"""What imports by names that its source does not begin: the public names, which its stub lists, and
+a library that is no dependency."""
+
 Graph = Mapping[str, set[str]]
 
 
@@ -49,7 +54,13 @@ def modules(package: Path = PACKAGE) -> dict[str, Path]:
 
 
 def module_graph(package: Path = PACKAGE) -> dict[str, set[str]]:
-    """Return the modules of the package that each module imports, wherever it does so."""
+    """Return the modules of the package that each module imports, wherever it does so.
+
+    Of a name that is put together, as ``import_module(f"{__name__}.{kind}")``, all that it may be.
+
+    Raises:
+        ValueError: a name that the source does not even begin: nobody can tell what it imports.
+    """
     files = modules(package)
     graph = {}
     for name, path in files.items():
@@ -62,8 +73,34 @@ def module_graph(package: Path = PACKAGE) -> dict[str, set[str]]:
                 for alias in node.names:
                     full = f"{node.module}.{alias.name}"
                     targets.add(full if full in files else str(node.module))
+            elif isinstance(node, ast.Call) and _called(node) == "import_module":
+                start = _start_of_text(node.args[0], name)
+                if not start and name not in UNNAMED:
+                    raise ValueError(f"{name} line {node.lineno} imports what it does not name")
+                targets.update(other for other in files if start and other.startswith(start))
+        if name == "rbfrag":
+            stub = path.with_suffix(".pyi").read_text(encoding="utf-8")
+            targets.update(re.findall(r"^from (\S+) import \w+ as", stub, re.MULTILINE))
         graph[name] = {target for target in targets if target in files} - {name}
     return graph
+
+
+def _called(node: ast.Call) -> str:
+    return str(getattr(node.func, "id", getattr(node.func, "attr", "")))
+
+
+def _start_of_text(node: ast.expr, module: str) -> str:
+    """Return how a text begins, as far as the source of a module tells: empty for not at all."""
+    start = ""
+    for part in node.values if isinstance(node, ast.JoinedStr) else [node]:
+        value = part.value if isinstance(part, ast.Constant | ast.FormattedValue) else None
+        if isinstance(value, ast.Name) and value.id == "__name__":
+            start += module
+        elif isinstance(value, str):
+            start += value
+        else:
+            break
+    return start
 
 
 def circles(graph: Graph) -> list[list[str]]:

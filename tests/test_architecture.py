@@ -48,6 +48,7 @@ KIND_FILES = (
     "solver/models/",
     "solver/kinds.py",
     "campaign/kinds/",
+    "fragility/method.py",
     "fragility/methods/",
     "migrations/",
 )
@@ -230,9 +231,21 @@ def test_every_imported_library_is_declared() -> None:
     assert used - set(sys.stdlib_module_names) - {"rbfrag"} <= names
 
 
-def test_no_imports_run_in_a_circle() -> None:
+def test_no_imports_run_in_a_circle(tmp_path: Path) -> None:
     script = drawing()
     assert script.circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == [["b", "c"]]
+    # names that are put together are followed, wherever in a function
+    package = tmp_path / "made"
+    (package / "kinds").mkdir(parents=True)
+    registry = "from importlib import import_module\n"
+    registry += 'def named(kind):\n    return import_module(f"{__name__}.{kind}").MODEL\n'
+    (package / "kinds" / "__init__.py").write_text(registry)
+    (package / "kinds" / "one.py").write_text("from made.kinds import named\n")
+    assert script.circles(script.module_graph(package)) == [["made.kinds", "made.kinds.one"]]
+    unnamed = registry.replace('f"{__name__}.{kind}"', "kind")
+    (package / "kinds" / "__init__.py").write_text(unnamed)
+    with pytest.raises(ValueError, match=r"made\.kinds line 3 imports what it does not name"):
+        script.module_graph(package)
     assert script.circles(script.module_graph()) == []
 
 
@@ -253,6 +266,26 @@ def test_kinds_are_named_in_their_files_only() -> None:
         and kind_names(path.read_text(encoding="utf-8"))
     }
     assert users == set()
+
+
+def words_of_names(source: str) -> set[str]:
+    """Return the words of all identifiers of a source."""
+    names = (
+        getattr(node, part, None)
+        for node in ast.walk(ast.parse(source))
+        for part in ("id", "attr", "arg", "name", "asname")
+    )
+    apart = (re.sub("([A-Z])", r"_\1", name) for name in names if isinstance(name, str))
+    return {word for name in apart for word in name.lower().split("_")}
+
+
+def test_the_solver_names_nothing_of_storage() -> None:
+    seen = words_of_names("def f(case): return CaseResult(natural_keys=x.campaign)")
+    assert seen == {"f", "case", "", "result", "natural", "keys", "x", "campaign"}
+    storage = {"case", "cases", "campaign", "campaigns", "combination", "combinations"}
+    storage |= {"natural", "database", "stored", "db"}
+    for path in (PACKAGE / "solver").rglob("*.py"):
+        assert not words_of_names(path.read_text(encoding="utf-8")) & storage, path
 
 
 def test_no_folder_holds_more_than_a_page_of_files() -> None:

@@ -18,7 +18,7 @@ from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.frames import Tabular
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.fields import AnsweringFields, V

@@ -11,7 +11,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows, Blocks, read_blocks
 from rbfrag.fragility.lookup import block_of
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.question.blocks import numbers_in

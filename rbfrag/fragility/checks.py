@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from rbfrag.fragility.domain import RATIOS, Ratio
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
-from rbfrag.fragility.methods import Numbers
+from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.methods import Numbers
+from rbfrag.fragility.method import Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 INSIDE = 0.995

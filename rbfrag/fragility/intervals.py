@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import normal_quantile
-from rbfrag.fragility.methods import Numbers
+from rbfrag.fragility.method import Numbers
 
 FEWEST_FREEDOMS = 2.0
 """No quantile is taken with fewer degrees of freedom."""

@@ -19,7 +19,7 @@ from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
-from rbfrag.fragility.methods import BlockParameters
+from rbfrag.fragility.method import BlockParameters
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 

@@ -12,7 +12,8 @@ from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_file import ModelRow, held_out_loss, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.measures import MEASURES, STATED, least_inputs, terms_from
-from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
+from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
+from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
 
 SHIPPED = "the reference that is shipped with rbfrag"

@@ -14,15 +14,8 @@ from rbfrag.fragility.dependence import Dependence, EventSpread
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
-from rbfrag.fragility.methods import (
-    TOPPLING_BLOCK,
-    Bound,
-    Form,
-    Method,
-    Numbers,
-    method_named,
-    method_names,
-)
+from rbfrag.fragility.method import TOPPLING_BLOCK, Bound, Form, Method, Numbers
+from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.fragility.unknown_outcomes import UnknownOutcomes
 
 LEAST = 1e-290

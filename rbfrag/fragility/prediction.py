@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
-from rbfrag.fragility.methods import SINGLE
+from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
 from rbfrag.solver.kinds import mode_of_kind

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.methods import Numbers, arrays
+from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 from rbfrag.fragility.unusable import unusable_in_words

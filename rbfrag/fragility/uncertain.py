@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.methods import SINGLE, BlockParameters, Bound, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal

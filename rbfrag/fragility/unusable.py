@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Remark, refusals
-from rbfrag.fragility.methods import BlockParameters, arrays
+from rbfrag.fragility.method import BlockParameters, arrays
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"
 """What becomes of such blocks where numbers of several are added."""

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from rbfrag.fragility.methods import Form
+from rbfrag.fragility.method import Form
 from rbfrag.fragility.model import FragilityModel
 
 _TERMS_A_LINE = 5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.line import Bins, bin_variances
-from rbfrag.fragility.methods import TOPPLING_BLOCK, FittedVariance
+from rbfrag.fragility.method import TOPPLING_BLOCK, FittedVariance
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import canvas
 from rbfrag.plots.equation import equation_lines

@@ -12,7 +12,7 @@ from scipy.optimize.elementwise import find_root
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import STATED
-from rbfrag.fragility.methods import SINGLE
+from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2

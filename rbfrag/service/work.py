@@ -105,7 +105,7 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 
 def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical` prints as JSON."""
-    from rbfrag.fragility.methods import TOPPLING_BLOCK
+    from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.question.blocks import has_shape, one_block
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search

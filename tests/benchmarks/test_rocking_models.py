@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.rocking_models import SHIPPED, STUDIES, Scores, line, missed
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import SINGLE
+from rbfrag.fragility.method import SINGLE
 
 
 def test_the_first_terms_are_the_shipped_form_with_zeros() -> None:

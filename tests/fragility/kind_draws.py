@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import LEAST_DISPLACEMENT_M, FitSource
-from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.methods import method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum

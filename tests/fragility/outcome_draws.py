@@ -6,7 +6,8 @@ import numpy as np
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_grid
-from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.methods import method_named
 from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 

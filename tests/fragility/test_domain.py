@@ -19,7 +19,8 @@ from rbfrag.fragility.fit.data import FitData, fit_data
 from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import SINGLE, method_named
+from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray

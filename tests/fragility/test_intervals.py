@@ -16,7 +16,8 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of, student_half_width
-from rbfrag.fragility.methods import SINGLE, arrays, methods
+from rbfrag.fragility.method import SINGLE, arrays
+from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray

@@ -8,16 +8,8 @@ from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import (
-    LOGIT,
-    LOGLOG,
-    NORMAL,
-    SINGLE,
-    arrays,
-    method_named,
-    method_names,
-    methods,
-)
+from rbfrag.fragility.method import LOGIT, LOGLOG, NORMAL, SINGLE, arrays
+from rbfrag.fragility.methods import method_named, method_names, methods
 
 GIVEN = {
     "p2": 3.0, "kr": 0.1, "ky": 0.1, "displacement_m": 0.05, "ks": 0.15, "ps2": 3.0,
@@ -89,7 +81,7 @@ def test_links_are_distribution_functions_for_numbers_and_arrays(link):
 def test_every_file_is_a_method_and_fits_by_a_function_that_is_there():
     assert set(method_names()) == {method.name for method in methods()}
     for method in methods():
-        assert callable(method.fitter())
+        assert callable(method.fit)
         ranks = [(f.rank, t) for t, f in method.forms.items()]
         assert ranks
     for name in ("oracle", "weibull"):

@@ -14,7 +14,8 @@ from rbfrag.fragility.fit.likelihood import most_likely
 from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import SINGLE, method_named
+from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 

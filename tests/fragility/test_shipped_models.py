@@ -16,7 +16,8 @@ from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_n
 from rbfrag.fragility.fit.scores import calibration, log_loss
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray

@@ -11,7 +11,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import EventSpread
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
+from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray

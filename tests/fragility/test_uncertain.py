@@ -13,7 +13,8 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
-from rbfrag.fragility.methods import SINGLE, arrays, method_named, methods
+from rbfrag.fragility.method import SINGLE, arrays
+from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray

@@ -10,7 +10,8 @@ import pytest
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import SINGLE, TOPPLING_BLOCK, method_named, method_names
+from rbfrag.fragility.method import SINGLE, TOPPLING_BLOCK
+from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.equation import equation_lines, rounded

@@ -194,7 +194,7 @@ def plot_response(
     db: options.Db = None,
 ) -> None:
     """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
-    from rbfrag.fragility.methods import TOPPLING_BLOCK
+    from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.plots import plot
 
     _, numbers, about = numbers_of(given, TOPPLING_BLOCK.kind)

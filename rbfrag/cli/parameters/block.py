@@ -113,7 +113,7 @@ class BlocksOptions(TableOptions):
         """
         if self.rockmass is None:
             return super().given_blocks(given, name=name, reads=reads, one_kind=one_kind)
-        from rbfrag.fragility.methods import TOPPLING_BLOCK
+        from rbfrag.fragility.method import TOPPLING_BLOCK
 
         if given.get("kind") not in (None, TOPPLING_BLOCK.kind):
             raise InputError(
@@ -178,7 +178,7 @@ class GivenBlocks(NamedTuple):
 
 
 def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
-    from rbfrag.fragility.methods import TOPPLING_BLOCK
+    from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.rockmasses.file import read_rock_mass
     from rbfrag.rockmasses.report import toppling_blocks as stable_topples
 

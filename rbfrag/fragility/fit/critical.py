@@ -25,7 +25,7 @@ from rbfrag.fragility.fit.likelihood import (
 from rbfrag.fragility.fit.outcomes import parameter_names
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import Form, Method, arrays
+from rbfrag.fragility.method import Form, Method, arrays
 from rbfrag.solver.results import FloatArray
 
 REPLICATES = 400

@@ -23,7 +23,7 @@ from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
 from rbfrag.fragility.measures import SPECTRAL, Term
-from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method, arrays
+from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 

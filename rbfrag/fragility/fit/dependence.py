@@ -21,7 +21,7 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.pair_tables import KINDS, PairRows, PairTable, pair_table
-from rbfrag.fragility.methods import BlockParameters
+from rbfrag.fragility.method import BlockParameters
 from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]

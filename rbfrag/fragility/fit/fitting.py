@@ -20,7 +20,8 @@ from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
 from rbfrag.fragility.measures import Term, intensity_term
-from rbfrag.fragility.methods import Method, method_named, methods
+from rbfrag.fragility.method import Method
+from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.solver.results import NUMERICS_VERSION
 
@@ -160,7 +161,7 @@ def fit_source(
     table, chosen = source.table, selection or {}
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
-    result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
+    result: MethodResult = method.fit(data, method, term, seed=seed, **options)
     dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
     of_any_strength = method.block.strength == "kr"
     law = power_law(table) if of_any_strength else None

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.methods import Link, arrays
+from rbfrag.fragility.method import Link, arrays
 from rbfrag.solver.results import FloatArray
 
 Chosen = NDArray[np.bool_]

@@ -23,8 +23,8 @@ from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import Method, arrays
-from rbfrag.fragility.methods.wls import (
+from rbfrag.fragility.method import Method, arrays
+from rbfrag.fragility.straight_line import (
     NEGATIVE_LIMIT,
     mean_m_s,
     negative_probability,

@@ -19,7 +19,7 @@ from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import Form, Method, arrays
+from rbfrag.fragility.method import Form, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 

@@ -8,7 +8,7 @@ eta = h(p) [b0 - b1 ln v + b2 ln(1 - v) + b3 l + b4 l²] with l = ln p.
 h(p) = exp(.18 l - .06 l²). (5) of docs/theory/fragility.md.
 
 Of measures that the hazard is given in, with V_T = SA g T/2π, Q_T = ln(V_T/(PGA g)) and k' of
-:func:`rbfrag.fragility.methods.log_strength`, h(p) = p^A:
+:func:`rbfrag.fragility.method.log_strength`, h(p) = p^A:
 
     pgv_kr               A = .15   b0 + b1 l + b2 l² - b3 ln v + b4 ln(1 - v) + b5 k'
     pga                  A = .22   b0 + b1 l + b2 l² - b3 ln r
@@ -26,9 +26,9 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility import methods
+from rbfrag.fragility import fits, method
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor, log_strength
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, log_strength
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -89,7 +89,7 @@ def _of_pga(a: float, *periods: str) -> Form:
     ]
     return Form(
         ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_r", *names), _with_spectrum(*periods), 0,
-        (methods.NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
+        (method.NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
         terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/r)", *terms),
         where=_OF_PGA + (r",\ Q_T = \mathrm{SA}(T)\,T/(2\pi\,\mathrm{PGA})" if periods else ""),
     )  # fmt: skip
@@ -97,7 +97,7 @@ def _of_pga(a: float, *periods: str) -> Form:
 
 _OF_PGA, _OF_VELOCITY = r"r = k_r/\mathrm{PGA}", "v = y/2x"
 _PERIOD_S = {measure: period_s for period_s, measure in SPECTRAL.items()}
-_BOUNDS = (methods.NOT_LIFTED, methods.ABOVE_TWICE_PGV)
+_BOUNDS = (method.NOT_LIFTED, method.ABOVE_TWICE_PGV)
 _OF_SIZE = SizeFactor(0.18, 0.06)
 _TERMS = ("1", r"\ln(1/r)", r"\ln(1 - r)", r"\ln(1 - v)", r"\ln z")
 _WHERE = rf"{_OF_PGA},\ {_OF_VELOCITY},\ z = p\,x/(\mathrm{{PGA}}\,g)"
@@ -105,17 +105,17 @@ _NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
 
 METHOD = Method(
     name="bounded",
-    block=methods.TOPPLING_BLOCK,
-    link=methods.LOGLOG,
+    block=method.TOPPLING_BLOCK,
+    link=method.LOGLOG,
     forms={
         "pgv": Form(
             ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
-            _pgv, 0, (methods.ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+            _pgv, 0, (method.ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
             terms=("1", r"\ln(1/v)", r"\ln(1 - v)", r"\ln p", r"\ln^2 p"), where=_OF_VELOCITY,
         ),
         "pgv_kr": Form(
             ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_share", "b_ln_1_minus_share", "b_strength"),
-            _pgv_kr, 0, (methods.ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
+            _pgv_kr, 0, (method.ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
             terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/v)", r"\ln(1 - v)", "k'"),
             where=_OF_VELOCITY + r",\ k' = \ln(1 + k_r/0.3)",
         ),
@@ -131,6 +131,6 @@ METHOD = Method(
         ),
     },
     reads="outcomes",
-    meaning=methods.OF_OUTCOME,
-    fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
+    meaning=method.OF_OUTCOME,
+    fit=fits.outcomes,
 )  # fmt: skip

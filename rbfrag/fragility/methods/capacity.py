@@ -14,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
+from rbfrag.fragility import fits
+from rbfrag.fragility.method import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 BLOCK = BlockParameters(
@@ -75,6 +76,6 @@ METHOD = Method(
     },
     reads="critical",
     meaning="probability that the block slumps past recovery, or by the rotation asked for",
-    fit="rbfrag.fragility.fit.critical:fit_censored",
+    fit=fits.censored,
     failure=_failure,
 )

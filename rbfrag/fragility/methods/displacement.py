@@ -17,7 +17,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
+from rbfrag.fragility import fits
+from rbfrag.fragility.method import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -101,7 +102,7 @@ METHOD = Method(
     },
     reads="critical",
     meaning="probability that the block slides further than the displacement",
-    fit="rbfrag.fragility.fit.critical:fit_censored",
+    fit=fits.censored,
     failure=lambda values, _: f"permanent displacement above {values['displacement_m']:g} m",
     median_of="displacement_m",
 )  # fmt: skip

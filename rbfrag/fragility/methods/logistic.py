@@ -4,7 +4,7 @@
 
 h(p) = exp(.18 l - .06 l²), l = ln p; with X(p) h(p) = p^.30, with PGD 1. (4) of
 docs/theory/fragility.md. With a spectral acceleration alone, V_T = SA g T/2π and k' of
-:func:`rbfrag.fragility.methods.log_strength`,
+:func:`rbfrag.fragility.method.log_strength`,
 
     eta = p^A [b0 + b1 l + b2 l² + b3 ln(V_T/y) + b4 ln V_T + b5 k']
 
@@ -18,8 +18,8 @@ from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility import methods
-from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor, log_strength
+from rbfrag.fragility import fits, method
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, log_strength
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -58,8 +58,8 @@ _OF_SIZE = SizeFactor(0.18, 0.06)
 
 METHOD = Method(
     name="logistic",
-    block=methods.TOPPLING_BLOCK,
-    link=methods.LOGIT,
+    block=method.TOPPLING_BLOCK,
+    link=method.LOGIT,
     forms={
         "pgv": _form(_OF_SIZE),
         "pga_tm": _form(_OF_SIZE),
@@ -71,7 +71,7 @@ METHOD = Method(
         "sa30": _of_period(-0.08),
     },
     reads="outcomes",
-    meaning=methods.OF_OUTCOME,
-    fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
+    meaning=method.OF_OUTCOME,
+    fit=fits.outcomes,
     exponent="b_ln_p",
 )

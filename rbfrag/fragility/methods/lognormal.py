@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
+from rbfrag.fragility import fits
+from rbfrag.fragility.method import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -37,6 +38,6 @@ METHOD = Method(
     forms=dict.fromkeys(("pgv", "pga_tm", "pgd_tm", "xp"), _FORM),
     reads="critical",
     meaning=OF_CRITICAL,
-    fit="rbfrag.fragility.fit.critical:fit_lognormal",
+    fit=fits.log_line,
     exponent="m_minus_1",
 )

@@ -21,8 +21,8 @@ from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import Any
 
-from rbfrag.fragility import methods
-from rbfrag.fragility.methods import BlockParameters, Bound, Eta, Form, Method, Numbers, SizeFactor
+from rbfrag.fragility import fits, method
+from rbfrag.fragility.method import BlockParameters, Bound, Eta, Form, Method, Numbers, SizeFactor
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST_RESTITUTION = 1e-6
@@ -45,7 +45,7 @@ BLOCK = BlockParameters(
     "rocking",
     "kr",
     "p2",
-    methods.NOT_LIFTED._replace(
+    method.NOT_LIFTED._replace(
         text="is not below PGA: without vertical motion the ground cannot lift this block, which "
         "cannot overturn: P = 0 by mechanics, not by the model"
     ),
@@ -101,7 +101,7 @@ _OF_VELOCITY = ("b0", "b_ln_y_over_x", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_l
 METHOD = Method(
     name="overturning",
     block=BLOCK,
-    link=methods.LOGIT,
+    link=method.LOGIT,
     forms={
         "pgv_pga": Form(
             ("b0", "b_logit_r", "b_ln_z", "b_s", "b_s_logit_r"),
@@ -116,6 +116,6 @@ METHOD = Method(
     },
     reads="outcomes",
     meaning="probability that the free-standing block overturns",
-    fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
+    fit=fits.outcomes,
     failure=lambda _, __: "overturning",
 )  # fmt: skip

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility import methods
-from rbfrag.fragility.methods import Eta, Form, Method, Numbers, SizeFactor
+from rbfrag.fragility import fits, method
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -25,16 +25,16 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
 
 METHOD = Method(
     name="record",
-    block=methods.TOPPLING_BLOCK,
-    link=methods.LOGIT,
+    block=method.TOPPLING_BLOCK,
+    link=method.LOGIT,
     forms={
         "xp": Form(
             ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0,
-            (methods.ABOVE_SPECTRUM, methods.NOT_LIFTED), size_factor=SizeFactor(0.30),
+            (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=SizeFactor(0.30),
             terms=("1", r"\ln(x/y)", r"\ln s"), where=r"s = p\,x/(\mathrm{PGA}\,g)",
         )
     },
     reads="outcomes",
-    meaning=methods.OF_OUTCOME,
-    fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
+    meaning=method.OF_OUTCOME,
+    fit=fits.outcomes,
 )  # fmt: skip

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
 from rbfrag.fragility.measures import SPECTRAL, STATED
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.words import SYMBOLS, block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard

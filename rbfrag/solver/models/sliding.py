@@ -54,7 +54,7 @@ KY_OVER_PGA = (
     0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6,
     0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
 )  # fmt: skip
-"""Strengths of the outcome grid, whose displacements are stored."""
+"""Strengths at which displacements are asked for when nothing else is said."""
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:

@@ -14,10 +14,7 @@ and reads, as all mechanisms here do,
 The dissertation's own chapter on slumping is not available; this is derived from rigid-body
 mechanics.
 
-Strength and frequency do not fix a slump: shape, friction and dip do. Campaigns shake a family that
-spans the slumping blocks of the dissertation's rock mass (its Table 3.4: base 20 and back 45
-degrees, spacings 1 and 0.6 m, friction 40 degrees) and weaker ones. Every block of it slumps and is
-stable at rest.
+Strength and frequency do not fix a slump: shape, friction and dip do.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
 It has a kernel of its own, `rbfrag.solver.integrator.single_run`, which campaigns and searches
-call by the million, and whose results are stored.
+call by the million.
 """
 
 from __future__ import annotations

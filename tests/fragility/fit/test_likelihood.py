@@ -14,7 +14,7 @@ from rbfrag.fragility.fit.likelihood import (
     maximise,
     most_likely,
 )
-from rbfrag.fragility.methods import LOGIT, LOGLOG, arrays
+from rbfrag.fragility.method import LOGIT, LOGLOG, arrays
 
 ALL = [LOGIT, LOGLOG]
 

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from rbfrag.fragility.methods import SINGLE
-from rbfrag.fragility.methods.wls import (
-    METHOD,
+from rbfrag.fragility.method import SINGLE
+from rbfrag.fragility.methods.wls import METHOD
+from rbfrag.fragility.straight_line import (
     mean_m_s,
     negative_probability,
     rise,

@@ -1,0 +1,414 @@
+"""What methods of fitting are made of. No library is loaded here.
+
+A method says P = F(eta): its parameters, eta with its slopes, the link F, what mechanics rules out
+and how it is fitted. Formulas are written once over a namespace: :data:`SINGLE` for numbers,
+:func:`arrays` for numpy arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any, Literal, NamedTuple
+
+from rbfrag.fragility.dependence import normal_quantile, normal_share
+from rbfrag.fragility.measures import Term
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+_LARGEST_EXPONENT = 709.0
+
+
+class Numbers(NamedTuple):
+    """The functions that formulas need, for numbers or for arrays.
+
+    Args:
+        ndtr: standard normal distribution function.
+        maximum: the larger of two.
+        minimum: the smaller of two.
+        sin: sine of an angle [rad].
+        cos: its cosine.
+        ndtri: its inverse.
+        step_sums: Σ (x·d)² and Σ (x·d)⁴ over the steps d of parameters that leave earthquakes
+            out, from :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
+    """
+
+    log: Callable[[Any], Any]
+    exp: Callable[[Any], Any]
+    sqrt: Callable[[Any], Any]
+    ndtr: Callable[[Any], Any]
+    maximum: Callable[[Any, Any], Any]
+    minimum: Callable[[Any, Any], Any]
+    sin: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    ndtri: Callable[[Any], Any]
+    step_sums: Callable[[Any, Sequence[Any]], tuple[Any, Any]]
+
+
+def _exp(x: float) -> float:
+    return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
+
+
+SINGLE = Numbers(
+    math.log, _exp, math.sqrt, normal_share, max, min, math.sin, math.cos,
+    normal_quantile, lambda errors, x: errors.step_sums(*x),
+)  # fmt: skip
+"""For single numbers."""
+
+
+@cache
+def arrays() -> Numbers:
+    """Return the same functions for numpy arrays."""
+    import numpy as np
+    from scipy.special import ndtr, ndtri
+
+    def step_sums(errors: Any, x: Sequence[Any]) -> tuple[Any, Any]:
+        # more terms than earthquakes: here the products are faster than the polynomials
+        steps, columns = np.array(errors.steps), np.stack(np.broadcast_arrays(*x))
+        total, fourths = np.empty((2, columns.shape[1]))
+        # so few at a time stay near the processor, and BLAS starts no threads of its own
+        for start in range(0, columns.shape[1], 512):
+            part = slice(start, start + 512)
+            squares = steps @ columns[:, part]
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=total[part])
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=fourths[part])
+        return total, fourths
+
+    return Numbers(
+        np.log, np.exp, np.sqrt, ndtr, np.maximum, np.minimum, np.sin, np.cos,
+        ndtri, step_sums,
+    )  # fmt: skip
+
+
+class Eta(NamedTuple):
+    """What a formula gives.
+
+    Args:
+        eta: the argument of the link.
+        slopes: derivatives of eta by the parameters.
+        log_sigma: logarithm of the scatter, for models with normal scatter of a critical value.
+        sigma_slopes: its derivatives by the parameters.
+    """
+
+    eta: Any
+    slopes: tuple[Any, ...]
+    log_sigma: Any = None
+    sigma_slopes: tuple[Any, ...] = ()
+
+
+class Link(NamedTuple):
+    """A function from eta to probability.
+
+    Args:
+        name: as reports call it.
+        probability: F(eta, functions).
+        density: F'(eta, functions).
+        quantile: eta of a probability between 0 and 1, from it and functions.
+        formula: P of eta as mathtext.
+    """
+
+    name: str
+    probability: Callable[[Any, Numbers], Any]
+    density: Callable[[Any, Numbers], Any]
+    quantile: Callable[[Any, Numbers], Any]
+    formula: str
+
+
+NORMAL = Link(
+    "normal",
+    lambda eta, ns: ns.ndtr(eta),
+    lambda eta, ns: ns.exp(-0.5 * eta * eta) / math.sqrt(2.0 * math.pi),
+    lambda p, ns: ns.ndtri(p),
+    r"\Phi(\eta)",
+)
+LOGIT = Link(
+    "logit",
+    lambda eta, ns: 1.0 / (1.0 + ns.exp(-eta)),
+    lambda eta, ns: ns.exp(-abs(eta)) / (1.0 + ns.exp(-abs(eta))) ** 2,
+    lambda p, ns: ns.log(p / (1.0 - p)),
+    r"1/(1 + e^{-\eta})",
+)
+LOGLOG = Link(
+    "loglog",
+    lambda eta, ns: ns.exp(-ns.exp(-eta)),
+    lambda eta, ns: ns.exp(-eta - ns.exp(-eta)),
+    lambda p, ns: -ns.log(-ns.log(p)),
+    r"\exp(-e^{-\eta})",
+)
+
+
+class Bound(NamedTuple):
+    """A case that mechanics forbids: P is 0 whatever the model says.
+
+    Args:
+        holds: whether (where) it is so, from values by name.
+        about: name of the value that it is said of.
+        text: what is said.
+    """
+
+    holds: Callable[[Mapping[str, Any]], Any]
+    about: str
+    text: str
+
+
+ABOVE_TWICE_PGV = Bound(
+    lambda v: v["y_m_s"] >= 2.0 * v["intensity_m_s"],
+    "y_m_s",
+    "is not below 2 PGV, which no excursion from rest exceeds: P = 0 by mechanics, not by the "
+    "model",
+)
+_STRONG_KR = 0.3
+"""k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
+
+
+def log_strength(v: Mapping[str, Any], ns: Numbers) -> Any:
+    """Return k' = ln(1 + k_r/0.3)."""
+    return ns.log(1.0 + v["kr"] / _STRONG_KR)
+
+
+ABOVE_SPECTRUM = Bound(
+    lambda v: v["y_m_s"] >= v["intensity_m_s"],
+    "y_m_s",
+    "is not below the toppling spectrum X(p) of the motion, which no excursion from rest exceeds: "
+    "P = 0 by mechanics, not by the model",
+)
+
+
+@dataclass(frozen=True)
+class BlockParameters:
+    """What describes a block in predictions.
+
+    Args:
+        kind: the kind of failure that they stand for where none is named.
+        strength: name of the yield acceleration coefficient among them.
+        size: name of the squared frequency parameter [1/s²] among them, if there is one.
+        at_rest: the bound that PGA below the yield acceleration is.
+        criterion: name of the criterion of failure that a model is fitted for, if there are
+            several.
+        options: names of what else a question may state.
+        stored: names of what combinations say of their block beside its size, for `adjust`.
+        fractions: those of the options that lie between 0 and 1 and whose scatter is one of
+            their value; of strength and size it is one of the logarithm.
+        adjust: changes the values by what is stated so, before anything reads them.
+        refuses: the combinations of values that no block has.
+        doubts: the combinations that make an answer doubtful.
+        presumes: what answers for its own kind take for granted of how a block stands; empty for
+            nothing.
+    """
+
+    names: tuple[str, ...]
+    kind: str
+    strength: str
+    size: str | None
+    at_rest: Bound
+    criterion: str | None = None
+    options: tuple[str, ...] = ()
+    stored: tuple[str, ...] = ()
+    fractions: tuple[str, ...] = ()
+    adjust: Callable[[dict[str, Any], Numbers], None] | None = None
+    refuses: tuple[Bound, ...] = ()
+    doubts: tuple[Bound, ...] = ()
+    presumes: str = ""
+
+    @cached_property
+    def sigmas(self) -> dict[str, str]:
+        """What a question may leave uncertain, by the name of its standard deviation."""
+        uncertain = (self.size, self.strength, *self.fractions)
+        return {f"{name}_sigma": name for name in uncertain if name is not None}
+
+    def criterion_of(self, diagnostics: Mapping[str, object]) -> float | None:
+        """Return a model's criterion of failure from what is stored; None for the usual one."""
+        value = diagnostics.get(self.criterion) if self.criterion is not None else None
+        return float(value) if isinstance(value, int | float) else None
+
+    def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return arrays with what a block has of itself where an option is NaN.
+
+        Args:
+            values: the question, arrays that numpy can broadcast.
+        """
+        import numpy as np
+
+        filled = dict(values)
+        for name in self.options:
+            if self.adjust is None or name not in values or not np.isnan(values[name]).any():
+                continue
+            own = {n: np.asarray(value) for n, value in values.items() if n != name}
+            with np.errstate(all="ignore"):
+                self.adjust(own, arrays())
+            if name in own:
+                filled[name] = np.where(np.isnan(values[name]), own[name], values[name])
+        return filled
+
+    def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
+        """Return the given values with what formulas read.
+
+        These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
+        Values that no logarithm takes are left to the caller.
+        """
+        values = dict(given)
+        if self.adjust is not None:
+            self.adjust(values, ns)
+        if self.size is not None:
+            values["p"] = p = ns.sqrt(values[self.size])
+        values["intensity_m_s"] = term.intensity_m_s(values)
+        if self.size is not None:
+            values["y_m_s"] = values[self.strength] * STANDARD_GRAVITY_M_S2 / p
+        return values
+
+
+NOT_LIFTED = Bound(
+    lambda v: v["kr"] >= v["pga_g"],
+    "kr",
+    "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
+    "mechanics, not by the model",
+)
+TOPPLING_BLOCK = BlockParameters(
+    ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
+    presumes="the block is taken to be backed by a slope; one that stands free rocks about both "
+    "edges and overturns in weaker shaking",
+)  # fmt: skip
+"""Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
+
+
+class SizeFactor(NamedTuple):
+    """What eta is multiplied by: h(p) = exp(A l - B l²), l = ln p with p in 1/s.
+
+    Without it a model is too vague for small blocks and too sure for large ones. A factor on all of
+    eta keeps P monotone in the block's strength and in the shaking, which factors on single terms
+    do not. Outside p² from 0.1 to 30 1/s² it stays at its value at the edge.
+
+    A and B are chosen, not estimated: such that the calibration slope of each block size is level
+    on earthquakes left out (docs/theory/fragility.md).
+    """
+
+    a: float
+    b: float = 0.0
+
+    @property
+    def formula(self) -> str:
+        """h as mathtext."""
+        if not self.b:
+            return rf"p^{{{self.a:g}}}"
+        return rf"\exp({self.a:g}\,\ln p - {self.b:g}\,\ln^2 p)"
+
+    def of(self, p: Any, ns: Numbers) -> Any:
+        """Return h of the frequency parameter p [1/s]."""
+        l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
+        return ns.exp((self.a - self.b * l) * l)
+
+
+_LEAST_P, _GREATEST_P = math.sqrt(0.1), math.sqrt(30.0)
+"""Ends of the sizes that A and B were chosen for [1/s]."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A method on one measure.
+
+    Args:
+        parameters: their names; the method's `exponent` stands last and may be missing.
+        formula: eta before the size factor and its slopes, from the parameters, values by name and
+            functions.
+        rank: place among the methods on this measure by falling skill on held-out earthquakes
+            (docs/evidence/model-choice.md).
+        bounds: what mechanics forbids.
+        start: where the search for the likeliest parameters begins; empty where none is needed.
+        size_factor: what eta is multiplied by; None for nothing.
+        wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
+            judged on the part of it that the other forms read and are judged on too.
+        terms: what each parameter multiplies in the sum that the formula is of, as mathtext; "1"
+            for nothing, empty for a parameter beside the sum.
+        equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
+            <+name> with their sign, <exp name>, as mathtext.
+        where: what the symbols mean, likewise.
+    """
+
+    parameters: tuple[str, ...]
+    formula: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+    rank: int
+    bounds: tuple[Bound, ...] = ()
+    start: tuple[float, ...] = ()
+    size_factor: SizeFactor | None = None
+    wide: bool = False
+    terms: tuple[str, ...] = ()
+    equation: str = "<sum>"
+    where: str = ""
+
+    def unscaled(
+        self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
+    ) -> tuple[Eta, Any]:
+        """Return eta and its slopes before the size factor, and the factor.
+
+        Args:
+            parameters: of the formula, in its order.
+            values: completed values by name.
+        """
+        formula = self.formula(parameters, values, ns)
+        return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
+
+    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
+        """Return eta and its slopes; arguments as for :meth:`unscaled`."""
+        unscaled, h = self.unscaled(parameters, values, ns)
+        slopes = tuple(h * each for each in unscaled.slopes)
+        return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
+
+
+class FittedVariance(NamedTuple):
+    """Mean and variance of the critical velocity, of a method that fits the variance in bins.
+
+    Args:
+        mean_m_s: mean from the parameters and the intensity [m/s].
+        variance_m2_s2: variance [m²/s²] from them.
+    """
+
+    mean_m_s: Callable[[Sequence[float], Any], Any]
+    variance_m2_s2: Callable[[Sequence[float], Any], Any]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method of fitting.
+
+    Args:
+        name: name in options and in the database.
+        block: what describes its blocks.
+        link: F in P = F(eta).
+        forms: its formulas by name of the measure.
+        reads: what it is fitted to: ``outcomes`` of blocks on the grid, or ``critical`` values.
+        meaning: what the probability is one of, in words.
+        fit: function that fits it, one of :mod:`rbfrag.fragility.fits`.
+        exponent: name of the parameter that is fitted where the exponent M is asked for.
+        failure: words for what a question asks the probability of, from its values and the
+            model's criterion; None: the name of the kind.
+        median_of: name of the block's parameter whose median is told beside the probability.
+        doubts: yields (holds, name of the value, text) where the model makes no sense, from
+            parameters, values and functions.
+        fitted_variance: mean and variance where the variance is fitted in bins; None elsewhere.
+    """
+
+    name: str
+    block: BlockParameters
+    link: Link
+    forms: Mapping[str, Form] = field(repr=False)
+    reads: Literal["outcomes", "critical"]
+    meaning: str
+    fit: Callable[..., Any]
+    exponent: str | None = None
+    failure: Callable[[Mapping[str, Any], float | None], str] | None = None
+    median_of: str | None = None
+    doubts: (
+        Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]
+        | None
+    ) = None
+    fitted_variance: FittedVariance | None = None
+
+
+OF_CRITICAL = (
+    "probability that the critical toppling velocity of the motion is at least the block's; "
+    "safe islands below the critical value are not taken off"
+)
+OF_OUTCOME = "probability that the block topples"
