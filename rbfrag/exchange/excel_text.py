@@ -40,7 +40,12 @@ def changed_texts(columns: Mapping[str, Any], change: Callable[[str], str]) -> d
         columns: by name; lists, arrays of numpy or of Arrow. Numbers are left alone.
         change: :func:`as_text` or :func:`as_written`.
     """
-    return {name: _changed(column, change) for name, column in columns.items()}
+    return {
+        name: [change(cell) if isinstance(cell, str) else cell for cell in cells_of(column)]
+        if _suspect(column)
+        else column
+        for name, column in columns.items()
+    }
 
 
 def formula_warnings(columns: Mapping[str, Any]) -> list[str]:
@@ -53,12 +58,6 @@ def formula_warnings(columns: Mapping[str, Any]) -> list[str]:
                     "Excel takes for a formula; excel_text writes it as text"
                 ]
     return []
-
-
-def _changed(column: Any, change: Callable[[str], str]) -> Any:
-    if not _suspect(column):
-        return column
-    return [change(cell) if isinstance(cell, str) else cell for cell in cells_of(column)]
 
 
 def _suspect(column: Any) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.exchange.block_rows import PLACE, Blocks
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
-from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
+from rbfrag.exchange.shakemap import at_places, read_shakemap
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
@@ -188,6 +188,9 @@ def shakemap(
         columns["reason"] = np.full(lon.size, "", dtype=object)
         columns = rows.with_refused(columns)
     event = shaken.event
+    name = " ".join(part for part in (event.description, event.time[:10]) if part)
+    if event.magnitude is not None:
+        name += f", M {event.magnitude:g}"
     return ShakeMapAnswer(
         columns=columns,
         failures=failures,
@@ -206,16 +209,11 @@ def shakemap(
             "seed": seed,
         },
         warnings=tuple(warnings),
-        title=f"{_name_of(event)}\n{_what(table, own)}; model {chosen.name}"
+        title=f"{name}\n{_what(table, own)}; model {chosen.name}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
         shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
     )
-
-
-def _name_of(event: ShakeMapEvent) -> str:
-    name = " ".join(part for part in (event.description, event.time[:10]) if part)
-    return name if event.magnitude is None else f"{name}, M {event.magnitude:g}"
 
 
 def _what(blocks: Mapping[str, Any], own: bool) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from xml.sax.saxutils import escape, quoteattr
 
@@ -113,7 +113,10 @@ def _function(
     limit = levels.attributes.get("noDamageLimit")
     lowest = None if limit is None else kind.factor * number_at(limit, where)
     if form == "continuous":
-        mean, sd = (_parameter(curve.attributes, key, where) for key in ("mean", "stddev"))
+        for key in ("mean", "stddev"):
+            if key not in curve.attributes:
+                raise InputError(f"{where}: {key} is missing")
+        mean, sd = (number_at(curve.attributes[key], where) for key in ("mean", "stddev"))
         if not (mean > 0.0 and sd > 0.0):
             raise InputError(
                 f"{where}: mean = {mean:g} and stddev = {sd:g}: both must be above zero"
@@ -128,12 +131,6 @@ def _function(
         poes = np.array([number_at(word, where) for word in curve.text.split()])
         return discrete_function(name, state, kind, kind.factor * x, poes, where, lowest)
     raise InputError(f"{where}: format {form!r} is neither continuous nor discrete")
-
-
-def _parameter(parameters: Mapping[str, str], key: str, where: str) -> float:
-    if key not in parameters:
-        raise InputError(f"{where}: {key} is missing")
-    return number_at(parameters[key], where)
 
 
 _FAR = 8.0

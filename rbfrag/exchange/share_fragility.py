@@ -60,7 +60,12 @@ def share_functions(
     Raises:
         InputError: shares that make no sense, or a model without an estimate of the dependence.
     """
-    _check(shares)
+    rising = all(a < b for a, b in pairwise(shares))
+    if not shares or not rising or not all(0.0 < share <= 100.0 for share in shares):
+        raise InputError(
+            f"shares {', '.join(f'{share:g}' for share in shares)}: give rising percentages above "
+            "0 and up to 100, such as 1,10,50"
+        )
     chosen = model_for(answering, ("p2", "kr", measure))
     if chosen.dependence is None:
         raise InputError(
@@ -104,15 +109,6 @@ def share_functions(
             "give the rock mass more realisations"
         )
     return BlockFunctions(functions, about_model(chosen), tuple(warnings))
-
-
-def _check(shares: Sequence[float]) -> None:
-    rising = all(a < b for a, b in pairwise(shares))
-    if not shares or not rising or not all(0.0 < share <= 100.0 for share in shares):
-        raise InputError(
-            f"shares {', '.join(f'{share:g}' for share in shares)}: give rising percentages above "
-            "0 and up to 100, such as 1,10,50"
-        )
 
 
 def _scores(probability: FloatArray) -> FloatArray:

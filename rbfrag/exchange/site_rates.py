@@ -67,7 +67,11 @@ def blocks_at_sites(
     by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
     for curves in files:
         for curve in curves:
-            by_site.setdefault(_key(curve), []).append(curve)
+            key: tuple[Any, ...] = (curve.site,)
+            if not curve.site and curve.lon is not None and curve.lat is not None:
+                # the last digits differ between files
+                key = round(curve.lon, 3), round(curve.lat, 3)
+            by_site.setdefault(key, []).append(curve)
     for curves in by_site.values():
         if len(curves) != len(files):
             raise InputError(
@@ -79,7 +83,15 @@ def blocks_at_sites(
     has_ids = wanted is not None and any(wanted)
     if wanted is None or not has_ids or not all(have):
         everywhere = [SiteBlocks(tuple(curves), columns) for curves in by_site.values()]
-        return everywhere, _not_joined(has_ids, have, len(columns["block_id"])), {}
+        remark = ""
+        if has_ids:
+            remark = "the curves do not name their sites: site_id of the blocks is not used"
+        elif len(columns["block_id"]) > 1 and len(have) > 1:
+            remark = (
+                "the blocks have no site_id: all of them are taken at each of the sites of the "
+                "curves"
+            )
+        return everywhere, (remark,) if remark else (), {}
     known, shown = set(have), f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
     missing = {
         i: f"the block stands at site {str(name)!r}, of which there is no curve; there are {shown}"
@@ -105,22 +117,6 @@ def blocks_at_sites(
             "earthquakes shake both; use  rbfrag losses  on an event set"
         )
     return sites, tuple(remarks), {} if site_chosen else missing
-
-
-def _key(curve: HazardCurve) -> tuple[Any, ...]:
-    if curve.site or curve.lon is None or curve.lat is None:
-        return (curve.site,)
-    return (round(curve.lon, 3), round(curve.lat, 3))  # the last digits differ between files
-
-
-def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, ...]:
-    if has_ids:
-        return ("the curves do not name their sites: site_id of the blocks is not used",)
-    if blocks > 1 and len(sites) > 1:
-        return (
-            "the blocks have no site_id: all of them are taken at each of the sites of the curves",
-        )
-    return ()
 
 
 def _numbers(site: SiteBlocks, *, alone: bool) -> dict[str, Any]:

@@ -6,7 +6,6 @@ import csv
 from importlib.util import find_spec
 from pathlib import Path
 
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.pulses import reversal_pulse
 
 SAMPLES_PACKAGE = "pyslammer"
@@ -57,13 +56,9 @@ def _write_pulses(folder: Path) -> list[Path]:
             pulse = reversal_pulse(0.4, ratio, period_s, 0.005)
             name = f"Pulse T={period_s:g} r={ratio:g}"
             files.append(folder / f"pulse_{period_s:g}s_{ratio:g}.csv")
-            _write(files[-1], name, pulse)
+            with files[-1].open("w", newline="", encoding="utf-8") as file:
+                file.write(f"# {name}\n# Time (s),Acceleration (g's)\n")
+                writer = csv.writer(file)
+                for i, value in enumerate(pulse.acceleration_g.tolist()):
+                    writer.writerow((f"{i * 0.005:.3f}", repr(value)))
     return files
-
-
-def _write(path: Path, name: str, motion: GroundMotion) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(f"# {name}\n# Time (s),Acceleration (g's)\n")
-        writer = csv.writer(file)
-        for i, value in enumerate(motion.acceleration_g.tolist()):
-            writer.writerow((f"{i * 0.005:.3f}", repr(value)))

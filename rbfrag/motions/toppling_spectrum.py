@@ -14,7 +14,7 @@ closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -117,19 +117,15 @@ def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatAr
     remaining, excess = np.zeros(a.size), np.empty(a.size)
     diagonals = np.ones((2, h.size), order="F")
     # one row a value of p, and one column an interval unless all are of one length
-    for i, (each, weights) in enumerate(zip(p.tolist(), _rows(h, p, equal), strict=True)):
+    rows: Iterable[tuple[FloatArray, ...]] = (
+        zip(*_weights(h[:1], p[:, None]), strict=True) if equal else (_weights(h, p_) for p_ in p)
+    )
+    for i, (each, weights) in enumerate(zip(p.tolist(), rows, strict=True)):
         _fill_remaining(remaining, a, weights, diagonals)
         np.multiply(remaining, each, out=excess)
         excess -= a  # H' = p H − a
         greatest[i] = _greatest(a, h, each, remaining, excess)
     return greatest
-
-
-def _rows(h: FloatArray, p: FloatArray, equal: bool) -> Iterator[tuple[FloatArray, ...]]:
-    if equal:
-        yield from zip(*_weights(h[:1], p[:, None]), strict=True)
-    else:
-        yield from (_weights(h, each) for each in p)
 
 
 def _fill_remaining(

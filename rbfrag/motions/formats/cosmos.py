@@ -86,7 +86,10 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         component,
         station=file.label(header, _STATION),
         event=file.label(header, _EVENT),
-        recording=_without(record, component) if record else None,
+        # NN.00725272.CI.MLAC.HNE.-- names one of three channels
+        recording=".".join(part for part in record.split(".") if part not in (component, "--"))
+        if record
+        else None,
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
         labels={"orientation_deg": azimuth, "is_vertical": vertical},
@@ -116,8 +119,3 @@ def _layout(file: RecordFile, field: HeaderField) -> tuple[int, int]:
     if layout is None:
         raise file.error("the line names no format such as (8F10.3)", field.line)
     return layout
-
-
-def _without(record: str, component: str) -> str:
-    """Record id without its channel: NN.00725272.CI.MLAC.HNE.-- names one of three."""
-    return ".".join(part for part in record.split(".") if part not in (component, "--"))

@@ -70,6 +70,8 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
 
     header = range(span.start, points.line - 1)
     channel = file.find(header, _CHANNEL, f"line 'Chan' in {name}")
+    # the line after it names the event, unless it gives no more than the time of the record
+    event = file.lines[channel.line].strip() if channel.line < header.stop else ""
     return ParsedTrace(
         values,
         dt,
@@ -77,7 +79,7 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
         count,
         component=channel.text,
         station=_station(file, file.optional(header, _STATION)),
-        event=_event(file, channel, header.stop),
+        event="" if event.lower().startswith("rcrd of") else " ".join(event.split()),
         recording=file.find(header, _RECORD, "name of the record").text,
         start=file.label(header, _START),
         is_corrected=True,
@@ -93,9 +95,3 @@ def _station(file: RecordFile, number: HeaderField | None) -> str:
         _WIDE_GAP.split(file.lines[number.line].strip())[0] if number.line < len(file.lines) else ""
     )
     return f"{number.text} {name}".strip() if not _CHANNEL.match(name) else number.text
-
-
-def _event(file: RecordFile, channel: HeaderField, stop: int) -> str:
-    """The line after the channel, unless it gives no more than the time of the record."""
-    line = file.lines[channel.line].strip() if channel.line < stop else ""
-    return "" if line.lower().startswith("rcrd of") else " ".join(line.split())

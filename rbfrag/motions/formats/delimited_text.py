@@ -112,7 +112,10 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         remark = f"times in the file start at {first_s:g} s; here they start at 0"
         if first_s == 0.0:
             remark = ""
-    event, station, component = _event_station_component(header)
+    # what a title "# Northridge 1994 - VSP-360" says
+    title = _TITLE.fullmatch(header[0][1].rstrip()) if header else None
+    names = title.group("event", "station", "component") if title else ("", "", "")
+    event, station, component = names
     yield ParsedTrace(
         samples,
         dt,
@@ -263,12 +266,6 @@ def _stated_unit(file: RecordFile, header: Header) -> HeaderField | None:
     if not stated:
         file.require_units()
     return next(iter(known or stated), None)
-
-
-def _event_station_component(header: Header) -> tuple[str, str, str]:
-    """What a title ``# Northridge 1994 - VSP-360`` says; empty texts for other titles."""
-    match = _TITLE.fullmatch(header[0][1].rstrip()) if header else None
-    return (match["event"], match["station"], match["component"]) if match else ("", "", "")
 
 
 def _spellings(header: Header) -> Iterator[tuple[int, str]]:

@@ -27,6 +27,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             fields["DATA_TYPE"].line,
         )
     dt = file.dt(fields["SAMPLING_INTERVAL_S"])
+    # BASELINE REMOVED or BASELINE NOT REMOVED, where the header says
+    baseline = fields.text("BASELINE_CORRECTION").upper().split()
     yield ParsedTrace(
         file.table(file.data(first), first + 1, 1, "acceleration")[:, 0],
         dt,
@@ -36,11 +38,5 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         station=f"{fields.text('NETWORK')}.{fields['STATION_CODE'].text}".lstrip("."),
         event=fields.text("EVENT_NAME") or fields.text("EVENT_ID"),
         start=fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD"),
-        is_corrected=_is_corrected(fields.text("BASELINE_CORRECTION")),
+        is_corrected="NOT" not in baseline if "REMOVED" in baseline else None,
     )
-
-
-def _is_corrected(baseline: str) -> bool | None:
-    """`BASELINE REMOVED` or `BASELINE NOT REMOVED`; None where the header does not say."""
-    words = baseline.upper().split()
-    return None if "REMOVED" not in words else "NOT" not in words

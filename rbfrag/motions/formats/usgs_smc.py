@@ -75,14 +75,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         component=file.find(header, _COMPONENT, "line 'component ='").text,
         station=" ".join(file.label(header, _STATION).split()),
         event=" ".join(file.label(header, _EVENT).split()),
-        is_corrected=_is_corrected(lines[0]),
+        is_corrected="UNCORRECTED" not in lines[0] if "CORRECTED" in lines[0] else None,
     )
-
-
-def _is_corrected(kind: str) -> bool | None:
-    if "UNCORRECTED" in kind:
-        return False
-    return True if "CORRECTED" in kind else None
 
 
 def _value(file: RecordFile, top: int, place: int, per_line: int, width: int) -> HeaderField:
