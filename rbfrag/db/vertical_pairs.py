@@ -25,7 +25,6 @@ class VerticalPair:
     Args:
         vertical_id: the vertical motion; None where there is none to use.
         vertical_sha256: hash of its samples, as natural keys need it.
-        vertical_pga_g: its peak acceleration [g].
         reason: why there is none; empty where there is one.
         remark: what a user should know of the pair (different lengths); mostly empty.
     """
@@ -33,7 +32,6 @@ class VerticalPair:
     motion_id: int
     vertical_id: int | None = None
     vertical_sha256: str | None = None
-    vertical_pga_g: float | None = None
     reason: str = ""
     remark: str = ""
 
@@ -148,7 +146,6 @@ def _pair(row: MotionRow, verticals: Sequence[MotionRow]) -> VerticalPair:
         row.id,
         vertical_id=vertical.id,
         vertical_sha256=vertical.sha256,
-        vertical_pga_g=vertical.pga_g,
         remark=remark,
     )
 

@@ -31,7 +31,7 @@ def of_measure(
     suffix = Path(path).suffix.lower()
     if suffix not in (".xml", ".csv"):
         raise InputError(f"{path}: fragilities are read from .xml (NRML) and .csv (pelicun)")
-    functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path).functions
+    functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path)
     curves: dict[str, Callable[[FloatArray], FloatArray]] = {
         f"{function.name}, {function.limit_state}": function.at
         for function in functions

@@ -8,7 +8,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,21 +37,6 @@ _UNITS = {
 _HEAD = ("ID", "Incomplete", "Demand-Type", "Demand-Unit", "Demand-Offset", "Demand-Directional")
 _APART = 1.5e-8
 _LIMIT = ("Family", "Theta_0", "Theta_1", "DamageStateWeights")
-
-
-@dataclass(frozen=True)
-class PelicunTable:
-    """What a table says of ground shaking, and what it says of other demands.
-
-    Args:
-        functions: functions of peak ground acceleration and velocity.
-        skipped: number of limit states of other demands (floor acceleration, drift …).
-        incomplete: names of the rows that are marked incomplete or hold no parameters.
-    """
-
-    functions: tuple[FragilityFunction, ...]
-    skipped: int
-    incomplete: tuple[str, ...]
 
 
 def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
@@ -149,8 +134,11 @@ def _check_names(names: list[str]) -> None:
             raise InputError(f"block {name!r} is there twice: give every block its own block_id")
 
 
-def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
+def read_pelicun(path: str | os.PathLike[str]) -> list[FragilityFunction]:
     """Return the functions of peak ground acceleration and velocity of a table.
+
+    Rows of other demands (floor acceleration, drift …) are passed over, and those that are marked
+    incomplete or hold no parameters.
 
     Raises:
         InputError: not such a table, or a row whose numbers make no function, with its line.
@@ -162,7 +150,6 @@ def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
         if name not in header:
             raise InputError(f"{path}, line 1: there is no column {name}: not a pelicun table")
     functions: list[FragilityFunction] = []
-    skipped, incomplete = 0, []
     for line, cells in rows:
         if not cells:
             continue
@@ -177,7 +164,6 @@ def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
         ]
         kind = _UNITS.get((row["Demand-Type"], row["Demand-Unit"]))
         if row.get("Incomplete", "0") not in ("", "0") or not states:
-            incomplete.append(row["ID"])
             continue
         of_ground = row["Demand-Type"] in ("Peak Ground Acceleration", "Peak Ground Velocity")
         if of_ground and kind is None:
@@ -185,13 +171,11 @@ def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
                 f"{path}, line {line}: {row['Demand-Type']} in {row['Demand-Unit']!r} is not "
                 "known: g, mps2; mps, cmps, inps"
             )
-        if kind is None:
-            skipped += len(states)
-            continue
-        functions += [
-            _function(row, state, kind, f"{path}, line {line}, {state}") for state in states
-        ]
-    return PelicunTable(tuple(functions), skipped, tuple(incomplete))
+        if kind is not None:
+            functions += [
+                _function(row, state, kind, f"{path}, line {line}, {state}") for state in states
+            ]
+    return functions
 
 
 def _function(

@@ -48,7 +48,7 @@ def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
         "export", "pelicun", "--p2", "3", "--kr", "0.1", "--imt", "PGA",
         "--levels", "300", "--name", "boulder", "--out", "a.csv",
     )  # fmt: skip
-    (found,) = read_pelicun("a.csv").functions
+    (found,) = read_pelicun("a.csv")
     assert (found.name, found.kind.measure) == ("boulder", "pga_g")
     x = np.linspace(0.4, 1.8, 50)
     expected = rbfrag.predict(3.0, 0.1, pga_g=x).probability
@@ -64,7 +64,7 @@ def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., 
         "--out", "a.csv",
     )  # fmt: skip
     bouncing, own = read_nrml("a.xml")
-    (alone,) = read_pelicun("a.csv").functions
+    (alone,) = read_pelicun("a.csv")
     x = np.geomspace(0.1, 3.0, 50)
     for found, block in ((bouncing, (3.0, 0.1, 0.8)), (alone, (3.0, 0.1, 0.8)), (own, (10, 0.3))):
         p2, kr, *restitution = block
@@ -114,7 +114,7 @@ def test_a_lognormal_model_is_written_as_such(shell: Shell) -> None:
     for kind, file in (("nrml", "a.xml"), ("pelicun", "a.csv")):
         told = shell.json("export", kind, *options, "--out", file)
         assert (told["lognormal"], told["largest_grid_error"]) == (1, 0.0)
-    (nrml,), (pelicun,) = read_nrml("a.xml"), read_pelicun("a.csv").functions
+    (nrml,), (pelicun,) = read_nrml("a.xml"), read_pelicun("a.csv")
     x = np.geomspace(0.1, 5.0, 200)
     expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x, model="lognormal-pgv").probability
     for found in (nrml, pelicun):
@@ -167,7 +167,7 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
     entries = json.loads(Path("fragility.json").read_text())
     assert {"A.7", "B2"} == set(entries) - {"_GeneralInformation", "References"}
     assert "p² = 3 1/s²" in entries["A.7"]["Description"]
-    assert [f.name for f in read_pelicun("fragility.csv").functions] == ["A.7", "B2"]
+    assert [f.name for f in read_pelicun("fragility.csv")] == ["A.7", "B2"]
     assert any("'A-7' is written as 'A.7'" in text for text in told["warnings"])
 
 

@@ -24,18 +24,13 @@ PGV = IntensityType("pgv_m_s", 0.01)
 
 def test_hazus_buildings(formats_dir: Path) -> None:
     found = read_pelicun(formats_dir / "simcenter_hazus_v6.1_building_fragility.csv")
-    one = next(f for f in found.functions if f.name == "LF.W1.HC" and f.limit_state == "LS1")
+    one = next(f for f in found if f.name == "LF.W1.HC" and f.limit_state == "LS1")
     assert (one.median, one.beta, one.kind.measure) == (0.26, 0.4, "pga_g")
-    assert found.skipped > 0
 
 
-def test_other_demands_are_counted_not_read(formats_dir: Path) -> None:
-    found = read_pelicun(formats_dir / "simcenter_fema_p58_component_fragility.csv")
-    assert found.functions == ()
-    assert found.skipped == 1250
-    assert len(found.incomplete) == 193
-    small = read_pelicun(formats_dir / "pelicun_damage_db_small.csv")
-    assert (small.skipped, small.incomplete) == (7, ("component.incomplete",))
+def test_other_demands_are_passed_over(formats_dir: Path) -> None:
+    for name in ("simcenter_fema_p58_component_fragility.csv", "pelicun_damage_db_small.csv"):
+        assert read_pelicun(formats_dir / name) == []
 
 
 def test_there_and_back(tmp_path: Path) -> None:
@@ -48,7 +43,7 @@ def test_there_and_back(tmp_path: Path) -> None:
     rows = list(csv.DictReader(path.read_text().splitlines()))
     for row in rows:  # as the library's rows of PGV
         assert (row["Demand-Offset"], row["Demand-Directional"]) == ("0", "0")
-    back = {f.name: f for f in read_pelicun(path).functions}
+    back = {f.name: f for f in read_pelicun(path)}
     inside = np.linspace(0.1, 2.0, 500)
     assert np.abs(back["smooth"].at(inside) - smooth.at(inside)).max() < 1e-9
     assert np.abs(back["curved"].at(inside) - curved.at(inside)).max() < 1e-5  # six digits
@@ -127,7 +122,7 @@ def test_bad_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:
         read_pelicun(path)
 
 
-def test_incomplete_rows_are_named(tmp_path: Path) -> None:
+def test_incomplete_rows_are_passed_over(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(HEAD + "a,1,Peak Ground Velocity,mps,0,0,lognormal,,,\n")
-    assert read_pelicun(path).incomplete == ("a",)
+    assert read_pelicun(path) == []
