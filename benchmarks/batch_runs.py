@@ -58,10 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     combinations = choose_combinations(records, chosen.combinations, seed=chosen.seed)
     searches, grids = [], []
     for motion, polarity, p2 in combinations:
-        drive = excitation(motion, None, polarity)
+        excited = excitation(motion, None, polarity)
         runs = np.array([case.kr for case in search_runs(motion, polarity, p2)])
-        searches.append(compare(drive, p2, runs))
-        grids.append(compare(drive, p2, np.geomspace(0.01, 0.99, MANY) * drive.pga_g))
+        searches.append(compare(excited, p2, runs))
+        grids.append(compare(excited, p2, np.geomspace(0.01, 0.99, MANY) * excited.pga_g))
     headers = [
         "runs of one call", "calls", "a step, one by one", "a step, side by side",
         "one by one over side by side, all", "median of the calls", "least", "greatest",
@@ -89,14 +89,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     report("batch-runs", f"{markdown((headers, cells))}\n\n{about}", write=chosen.write)
 
 
-def compare(drive: Excitation, p2: float, kr: np.ndarray) -> tuple[float, float, float, int]:
+def compare(excited: Excitation, p2: float, kr: np.ndarray) -> tuple[float, float, float, int]:
     """Return the least times of both ways [s], the steps, and the number of runs that differ."""
     p = np.full(kr.size, np.sqrt(p2))
     whole = [np.empty((3, kr.size), dtype=np.int64) for _ in range(2)]
     real = [np.empty((4, kr.size)) for _ in range(2)]
     ways: list[Callable[[], None]] = [
-        lambda: run_blocks(drive.nodes, kr, p, ORDER, PH_MAX, whole[0], real[0]),
-        lambda: run_batch(drive.nodes, kr, p, PH_MAX, whole[1], real[1]),
+        lambda: run_blocks(excited.nodes, kr, p, ORDER, PH_MAX, whole[0], real[0]),
+        lambda: run_batch(excited.nodes, kr, p, PH_MAX, whole[1], real[1]),
     ]
     least = [np.inf, np.inf]
     for way in ways:

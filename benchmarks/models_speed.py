@@ -40,8 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ratios: dict[str, list[float]] = {}
     times: dict[str, list[float]] = {}
     for motion in found.motions:
-        drive = excitation(motion)
-        runs = models(drive)
+        excited = excitation(motion)
+        runs = models(excited)
         moved = {name: run() for name, run in runs.items()}
         spent = dict.fromkeys(runs, math.inf)
         for _ in range(REPEATS):
@@ -71,10 +71,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     report("models-speed", text, write=chosen.write)
 
 
-def models(drive: Excitation) -> dict[str, Run]:
+def models(excited: Excitation) -> dict[str, Run]:
     """Return runs of blocks whose strength is a fifth of PGA, or a little less, by model."""
-    k = 0.2 * drive.pga_g
-    topple = runner(drive, p2=3.0)
+    k = 0.2 * excited.pga_g
+    topple = runner(excited, p2=3.0)
     stands = rocking.free_block(block_of_numbers(3.0, k, {}))
     mechanisms = {
         "sliding": sliding.mechanism(planes(None, 0.0, math.degrees(math.atan(k)))),
@@ -85,11 +85,11 @@ def models(drive: Excitation) -> dict[str, Run]:
     }
 
     def runs(mechanism: Mechanism) -> Run:
-        return lambda: follow(mechanism, drive).samples_moved
+        return lambda: follow(mechanism, excited).samples_moved
 
     return {
         "toppling": lambda: topple(k).samples_moved,
-        "rocking": lambda: simulate(drive, stands).samples_moved,
+        "rocking": lambda: simulate(excited, stands).samples_moved,
         **{name: runs(mechanism) for name, mechanism in mechanisms.items()},
     }
 

@@ -61,11 +61,11 @@ class Drawn:
 
     def reference(self) -> ReferenceRocking:
         """Run it with the independent integrator."""
-        drive = excitation(self.motion, self.vertical)
+        excited = excitation(self.motion, self.vertical)
         block = parallelogram(
             self.alpha1_deg, self.alpha3_deg, self.r3_m, self.beta_deg, self.restitution
         )
-        return integrate(drive.time_s, drive.k_h, drive.w, block, most_impacts=MOST_IMPACTS)
+        return integrate(excited.time_s, excited.k_h, excited.w, block, most_impacts=MOST_IMPACTS)
 
 
 @dataclass(frozen=True)

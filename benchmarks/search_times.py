@@ -80,14 +80,14 @@ def bracket_with_map(motion: GroundMotion, polarity: Polarity, p2: float) -> Don
 
 
 def _verdicts(motion: GroundMotion, polarity: Polarity, p2: float, *, full: bool) -> Done:
-    drive = kept_excitation(motion, None, polarity)
-    if drive.max_q <= SEARCH_LIMIT * drive.pga_g:
+    excited = kept_excitation(motion, None, polarity)
+    if excited.max_q <= SEARCH_LIMIT * excited.pga_g:
         return Done(True, 0, 0)
-    bottom = SEARCH_LIMIT * drive.pga_g
-    found = certified_map(drive, p2=p2, bottom=bottom, full=full)
+    bottom = SEARCH_LIMIT * excited.pga_g
+    found = certified_map(excited, p2=p2, bottom=bottom, full=full)
     bracket = bracket_of(found)
     undecided = found.undecided_above(bottom) if bracket is None else bracket.undecided
-    return Done(undecided <= SLIVERS * drive.pga_g, found.runs, found.steps)
+    return Done(undecided <= SLIVERS * excited.pga_g, found.runs, found.steps)
 
 
 def search(motion: GroundMotion, polarity: Polarity, p2: float) -> Done:

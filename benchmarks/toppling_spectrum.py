@@ -54,15 +54,15 @@ def bounds(records: Records, p2: Sequence[float]) -> list[list[str]]:
     for done, motion in enumerate(records.motions):
         print(f"bounds: {done}/{len(records.motions)} motions", file=sys.stderr)
         for polarity in POLARITIES:
-            drive = excitation(motion, None, polarity)
+            excited = excitation(motion, None, polarity)
             for size in p2:
                 k = bound_k(toppling_spectrum(motion, size, polarity), size)
                 if k <= 0.0:
                     continue
-                below = linear_block.fails(drive, size, k * (1.0 - EXACT))
-                wrong += not below or linear_block.fails(drive, size, k * (1.0 + EXACT))
+                below = linear_block.fails(excited, size, k * (1.0 - EXACT))
+                wrong += not below or linear_block.fails(excited, size, k * (1.0 + EXACT))
                 linear += 1
-                k_up = non_linear_bound(drive, size, k)
+                k_up = non_linear_bound(excited, size, k)
                 strengths.append(k_up)
                 apart.append(abs(math.log(k_up / k)))
     small = np.array(strengths) < CLOSE_TO_LINEAR_K
@@ -96,12 +96,12 @@ def trials(records: Records, number: int, seed: int) -> list[list[str]]:
     per_motion = -(-number // (2 * len(records.motions)))
     for motion in records.motions:
         for polarity in POLARITIES:
-            drive = excitation(motion, None, polarity)
+            excited = excitation(motion, None, polarity)
             for p2 in np.exp(rng.uniform(low, high, per_motion)).tolist():
                 k = bound_k(toppling_spectrum(motion, p2, polarity), p2)
                 if k <= 0.0:
                     continue
-                run = runner(drive, p2=p2)
+                run = runner(excited, p2=p2)
                 factor = math.exp(rng.uniform(*map(math.log, ABOVE)))
                 toppled += run(factor * k).outcome == TOPPLED
                 just_below += run(0.98 * k).outcome == TOPPLED
@@ -138,17 +138,17 @@ def bound_k(x_m_s: float, p2: float) -> float:
     return x_m_s * math.sqrt(p2) / STANDARD_GRAVITY_M_S2
 
 
-def non_linear_bound(drive: Excitation, p2: float, guess: float) -> float:
+def non_linear_bound(excited: Excitation, p2: float, guess: float) -> float:
     """Bisect for the greatest k_r of the non-linear model with a failing excursion from rest."""
     low, high = guess, guess
     step = 0.002
-    while low > 0.0 and not fails(drive, p2, low):
+    while low > 0.0 and not fails(excited, p2, low):
         high, low, step = low, low * (1.0 - step), 2.0 * step
-    while high <= drive.max_q and fails(drive, p2, high):
+    while high <= excited.max_q and fails(excited, p2, high):
         low, high, step = high, high * (1.0 + step), 2.0 * step
     while high - low > WIDTH * high:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if fails(drive, p2, middle) else (low, middle)
+        low, high = (middle, high) if fails(excited, p2, middle) else (low, middle)
     return low
 
 

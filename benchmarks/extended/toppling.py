@@ -67,7 +67,7 @@ class Truth(NamedTuple):
 
 
 def truth(
-    drive: Excitation,
+    excited: Excitation,
     *,
     p2: float,
     kr: float | Pair,
@@ -77,7 +77,7 @@ def truth(
     """Run one block over one excitation.
 
     Args:
-        drive: the excitation.
+        excited: the excitation.
         p2: frequency parameter p² [1/s²], taken as exact.
         kr: rocking acceleration coefficient; a pair for one between doubles.
         ph_max: greatest p·h of one step; with `smallest`, for tests of the reference itself.
@@ -85,7 +85,7 @@ def truth(
     """
     strength = kr if isinstance(kr, tuple) else (float(kr), 0.0)
     code, high, low, moved, steps = _run(
-        drive.interval_s, drive.k_h, drive.w, p2, strength[0], strength[1], ph_max, smallest
+        excited.interval_s, excited.k_h, excited.w, p2, strength[0], strength[1], ph_max, smallest
     )
     return Truth(OUTCOMES[code], high, low, moved, steps)
 
@@ -109,7 +109,7 @@ def _run(
     theta_c = arctangent(kr)
     c_rest = div(one, root(add(one, mul(kr, kr))))
     s_rest = mul(kr, c_rest)
-    # angle of which all later drive exceeds the tangent: beyond it nothing brings a block back
+    # angle of which all later excitation exceeds the tangent: beyond it nothing brings a block back
     border = np.zeros(n)
     least = 0.0
     for i in range(n - 1, -1, -1):
@@ -248,14 +248,14 @@ def _series(
     c[0, 0], c[0, 1] = c0
     size = abs(u0[0])
     for k in range(HIGHEST):
-        drive = (0.0, 0.0)
+        moment = (0.0, 0.0)
         if k > 0 or not fresh:  # at a crossing it vanishes by definition
-            drive = sub(mul(a, (c[k, 0], c[k, 1])), mul(w, (s[k, 0], s[k, 1])))
+            moment = sub(mul(a, (c[k, 0], c[k, 1])), mul(w, (s[k, 0], s[k, 1])))
         if k > 0:
-            drive = add(drive, mul(a_slope, (c[k - 1, 0], c[k - 1, 1])))
-            drive = sub(drive, mul(w_slope, (s[k - 1, 0], s[k - 1, 1])))
+            moment = add(moment, mul(a_slope, (c[k - 1, 0], c[k - 1, 1])))
+            moment = sub(moment, mul(w_slope, (s[k - 1, 0], s[k - 1, 1])))
         over = (k + 1.0, 0.0)
-        term = div(mul(big_p, drive), over)
+        term = div(mul(big_p, moment), over)
         u[k + 1, 0], u[k + 1, 1] = term
         size = max(size, abs(term[0]))
         if k > 4:

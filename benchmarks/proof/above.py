@@ -76,10 +76,10 @@ class Stretch(NamedTuple):
     fails: bool
 
 
-def keeps_order(drive: Excitation) -> bool:
+def keeps_order(excited: Excitation) -> bool:
     """Whether D >= 0 by the record alone: no q is followed by one below minus its inverse."""
     highest = fmpq(0)
-    for a, w in zip(drive.k_h.tolist(), drive.w.tolist(), strict=True):
+    for a, w in zip(excited.k_h.tolist(), excited.w.tolist(), strict=True):
         q = exact(a) / exact(w)
         if highest * -q > 1:
             return False
@@ -90,16 +90,16 @@ def keeps_order(drive: Excitation) -> bool:
 class Record:
     """Blocks of one size under one excitation, and exact comparisons of its samples."""
 
-    def __init__(self, drive: Excitation, p2: float) -> None:
-        self.drive, self.p2 = drive, p2
-        self.n = drive.k_h.size
+    def __init__(self, excited: Excitation, p2: float) -> None:
+        self.excited, self.p2 = excited, p2
+        self.n = excited.k_h.size
         self.steps = 0
 
     def block(self, kr: fmpq) -> Block:
-        return Block(self.drive, self.p2, kr)
+        return Block(self.excited, self.p2, kr)
 
     def q(self, node: int) -> fmpq:
-        return exact(self.drive.k_h[node]) / exact(self.drive.w[node])
+        return exact(self.excited.k_h[node]) / exact(self.excited.w[node])
 
 
 class Table:
@@ -129,10 +129,10 @@ class Table:
         if start is not None:
             before = block.steps
             try:
-                flight = block.fly(start, arb(0), arb(0), lifted=True)
-                fails = flight.event in (LOST, TOPPLES)
-                if flight.event == IMPACT:
-                    over = flight.place.interval + 1
+                trajectory = block.integrate(start, arb(0), arb(0), lifted=True)
+                fails = trajectory.event in (LOST, TOPPLES)
+                if trajectory.event == IMPACT:
+                    over = trajectory.place.interval + 1
             except NotEnclosedError:
                 fails = True
             self.record.steps += block.steps - before
@@ -229,15 +229,15 @@ def _decide(
             impacts = Impacts(Place(node, arb(0)), Place(node, arb(0)))
             continue
         # F: this stretch alone; B: where to split if that does not help
-        flight = weak.fly(earliest, arb(0), arb(0), lifted=True)
-        if flight.event in (LOST, TOPPLES):
+        trajectory = weak.integrate(earliest, arb(0), arb(0), lifted=True)
+        if trajectory.event in (LOST, TOPPLES):
             inside = peak is not None and weak.kr < peak < strong.kr
             return Decision(SPLIT, peak if inside else None)
         after = earliest.interval + 1
         while after < n and weak.sign(after) > 0:
             after += 1
-        last = not_before(later(impacts.last, flight.place), after)
-        in_air = impacts.in_air or flight.event == RETURNS
+        last = not_before(later(impacts.last, trajectory.place), after)
+        in_air = impacts.in_air or trajectory.event == RETURNS
         impacts = Impacts(Place(after, arb(0)), last, in_air)
     return Decision(SPLIT)
 
@@ -252,7 +252,7 @@ def common_start(
     """
     n = record.n
     i, at = last_impact
-    while i < n - 1 and at.is_zero() and record.drive.interval_s[i] == 0.0:
+    while i < n - 1 and at.is_zero() and record.excited.interval_s[i] == 0.0:
         i += 1
     latest, lifts = None, False
     sign = strong.sign_at(Place(i, at)) if i < n - 1 else -1
@@ -285,23 +285,23 @@ def carried_on(
     """Carry a pair of trajectories to the verdict, or to the impacts of both."""
     lower, lower_event = latest, IMPACT
     if lifted:
-        flight = strong.fly(latest, arb(0), arb(0), lifted=True)
-        lower, lower_event = flight.place, flight.event
+        trajectory = strong.integrate(latest, arb(0), arb(0), lifted=True)
+        lower, lower_event = trajectory.place, trajectory.event
         if lower_event in (LOST, TOPPLES):
             return Decision(TOPPLE), impacts
     stop = lower if lower_event == IMPACT else None
-    meeting = weak.fly(earliest, arb(0), arb(0), lifted=True, stop=stop)
+    meeting = weak.integrate(earliest, arb(0), arb(0), lifted=True, stop=stop)
     if meeting.event == RETURNS and stop is None:
         return Decision(SAFE), impacts
     if meeting.event != STOPPED:
         return Decision(SPLIT), impacts
     lifting = bool(meeting.rate >= 0) and weak.sign_at(lower) >= 0
-    flight = weak.fly(lower, meeting.theta, meeting.rate, lifted=lifting)
-    if flight.event in (LOST, TOPPLES):
+    trajectory = weak.integrate(lower, meeting.theta, meeting.rate, lifted=lifting)
+    if trajectory.event in (LOST, TOPPLES):
         return Decision(SPLIT), impacts
     floor = restart_floor(record, weak, strong, latest.interval)
     return None, Impacts(
-        not_before(lower, floor), not_before(flight.place, floor), flight.event == RETURNS
+        not_before(lower, floor), not_before(trajectory.place, floor), trajectory.event == RETURNS
     )
 
 
@@ -332,7 +332,7 @@ def later(one: Place, other: Place) -> Place:
 
 
 def nothing_above(
-    drive: Excitation,
+    excited: Excitation,
     *,
     p2: float,
     kr: float,
@@ -343,7 +343,7 @@ def nothing_above(
     """Prove that no block with a k_r from `kr` on topples.
 
     Args:
-        drive: the excitation, 1 + k_v > 0.
+        excited: the excitation, 1 + k_v > 0.
         p2: frequency parameter p² [1/s²].
         kr: the k_r, the upper end of a bracket.
         k_up: a k_r from which on no excursion from rest topples, as a search says; proven here.
@@ -351,7 +351,7 @@ def nothing_above(
         watch: told of each verdict.
     """
     started = time.process_time()
-    record = Record(drive, p2)
+    record = Record(excited, p2)
     intervals, undecided = 0, 0.0
 
     def result(reached: fmpq, reason: str = "") -> Above:
@@ -360,7 +360,7 @@ def nothing_above(
             time.process_time() - started, reason,
         )  # fmt: skip
 
-    if not keeps_order(drive):
+    if not keeps_order(excited):
         return result(exact(k_up), "D >= 0 is not certain from the record alone")
     with ctx.workprec(BITS):
         bottom, high = exact(kr), exact(max(k_up, kr))

@@ -98,16 +98,16 @@ def prove(one: Combination, seconds: float) -> Row | None:
     result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
     if result.status != "found" or result.lower is None or result.upper is None:
         return None
-    drive = one.drive()
-    lower, upper = result.lower * drive.pga_g, result.upper * drive.pga_g
-    k_up = (result.k_up_over_pga or np.nan) * drive.pga_g
+    excited = one.drive()
+    lower, upper = result.lower * excited.pga_g, result.upper * excited.pga_g
+    k_up = (result.k_up_over_pga or np.nan) * excited.pga_g
     started = time.process_time()
     ends: list[Enclosure] = [
-        enclose(drive, p2=one.p2, kr=kr)
+        enclose(excited, p2=one.p2, kr=kr)
         for kr in (lower * (1.0 - DISTANCE), lower, upper, upper * (1.0 + DISTANCE))
     ]
     took = time.process_time() - started
-    above = nothing_above(drive, p2=one.p2, kr=upper, k_up=k_up, seconds=seconds)
+    above = nothing_above(excited, p2=one.p2, kr=upper, k_up=k_up, seconds=seconds)
     return Row(
         motion=one.recording.name,
         polarity=one.polarity,

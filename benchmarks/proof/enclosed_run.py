@@ -74,11 +74,13 @@ class Enclosure:
     bits: int = 0
 
 
-def enclose(drive: Excitation, *, p2: float, kr: float, bits: tuple[int, ...] = BITS) -> Enclosure:
+def enclose(
+    excited: Excitation, *, p2: float, kr: float, bits: tuple[int, ...] = BITS
+) -> Enclosure:
     """Run one block over one excitation and say what is proven of it.
 
     Args:
-        drive: the excitation, with 1 + k_v > 0 throughout.
+        excited: the excitation, with 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²], taken as exact.
         kr: rocking acceleration coefficient, taken as exact, > 0.
         bits: precisions to try in turn.
@@ -88,13 +90,13 @@ def enclose(drive: Excitation, *, p2: float, kr: float, bits: tuple[int, ...] = 
     """
     if not (kr > 0.0 and p2 > 0.0):
         raise ValueError(f"k_r = {kr!r} and p2 = {p2!r} must be positive")
-    if not (drive.w > 0.0).all():
+    if not (excited.w > 0.0).all():
         raise ValueError("1 + k_v must be positive throughout")
     reason = ""
     for precision in bits:
         with ctx.workprec(precision):
             try:
-                return _enclosed(Block(drive, p2, exact(kr)))
+                return _enclosed(Block(excited, p2, exact(kr)))
             except NotEnclosedError as error:
                 reason = str(error)
     return Enclosure(NOT_ENCLOSED, reason=reason, bits=bits[-1])
@@ -102,20 +104,20 @@ def enclose(drive: Excitation, *, p2: float, kr: float, bits: tuple[int, ...] = 
 
 def _enclosed(block: Block) -> Enclosure:
     """Follow excursion after excursion."""
-    times = block.drive.time_s
+    times = block.excited.time_s
     impacts: list[tuple[float, float]] = []
     place: Place | None = Place(0, arb(0))
     while (place := block.next_start(place)) is not None:
-        flight = block.fly(place, arb(0), arb(0), lifted=True)
-        place = flight.place
+        trajectory = block.integrate(place, arb(0), arb(0), lifted=True)
+        place = trajectory.place
         at_s = float(times[place.interval]) + float(place.at.mid())
-        if flight.event == IMPACT:
+        if trajectory.event == IMPACT:
             impacts.append((at_s, width(place.at)))
             continue
-        outcome = STABLE if flight.event == RETURNS else TOPPLED
-        event = "past recovery" if flight.event == LOST else "energy"
+        outcome = STABLE if trajectory.event == RETURNS else TOPPLED
+        event = "past recovery" if trajectory.event == LOST else "energy"
         return Enclosure(
-            outcome, "", event, at_s, width(flight.theta), tuple(impacts), block.steps, ctx.prec
+            outcome, "", event, at_s, width(trajectory.theta), tuple(impacts), block.steps, ctx.prec
         )
     if not impacts:
         return Enclosure(STABLE, "", "rest", float(times[-1]), 0.0, (), block.steps, ctx.prec)
@@ -125,9 +127,9 @@ def _enclosed(block: Block) -> Enclosure:
     )
 
 
-def least_later_q(drive: Excitation) -> FloatArray:
+def least_later_q(excited: Excitation) -> FloatArray:
     """A number below every q from each node to the end, and not above 0; shape (n,)."""
-    below = np.minimum(np.nextafter(drive.k_h / drive.w, -np.inf), 0.0)
+    below = np.minimum(np.nextafter(excited.k_h / excited.w, -np.inf), 0.0)
     least: FloatArray = np.minimum.accumulate(below[::-1])[::-1]
     return least
 
@@ -144,7 +146,7 @@ class Place(NamedTuple):
     at: arb
 
 
-class Flight(NamedTuple):
+class Trajectory(NamedTuple):
     """How an excursion ended.
 
     Args:
@@ -167,23 +169,23 @@ class Block:
     """One block under one excitation. Balls have the precision of flint's context at each call.
 
     Args:
-        drive: the excitation, with 1 + k_v > 0.
+        excited: the excitation, with 1 + k_v > 0.
         p2: frequency parameter p² [1/s²].
         kr: rocking acceleration coefficient, a rational number.
     """
 
-    def __init__(self, drive: Excitation, p2: float, kr: fmpq) -> None:
-        self.drive = drive
+    def __init__(self, excited: Excitation, p2: float, kr: fmpq) -> None:
+        self.excited = excited
         self.kr = kr
         self.p2 = arb(float(p2))
         self.p = math.sqrt(p2)
         self.theta_c = arb(kr).atan()
-        self.least = least_later_q(drive)
+        self.least = least_later_q(excited)
         self.steps = 0
         # the sign of k_h - w k_r is known from doubles where rounding cannot change it
-        product = drive.w * float(arb(kr))
-        self.excess = drive.k_h - product
-        self.sure = np.abs(self.excess) > 1e-14 * (np.abs(drive.k_h) + product)
+        product = excited.w * float(arb(kr))
+        self.excess = excited.k_h - product
+        self.sure = np.abs(self.excess) > 1e-14 * (np.abs(excited.k_h) + product)
 
     def sign(self, node: int) -> int:
         """Sign of k_h - w k_r at a node."""
@@ -191,11 +193,11 @@ class Block:
         return (value > 0) - (value < 0)
 
     def _exact_excess(self, node: int) -> fmpq:
-        return exact(self.drive.k_h[node]) - exact(self.drive.w[node]) * self.kr
+        return exact(self.excited.k_h[node]) - exact(self.excited.w[node]) * self.kr
 
     def next_start(self, place: Place) -> Place | None:
         """First instant from a place on at which q > k_r; None where there is none."""
-        last = self.drive.k_h.size - 1
+        last = self.excited.k_h.size - 1
         i, at = place
         if i < last and not at.is_zero():
             sign = self.sign_at(place)
@@ -206,7 +208,7 @@ class Block:
                 return crossing
             i += 1
         while i < last:
-            if self.drive.interval_s[i] > 0.0:
+            if self.excited.interval_s[i] > 0.0:
                 if self.sign(i) > 0:
                     return Place(i, arb(0))
                 crossing = self._rise(i)
@@ -225,7 +227,7 @@ class Block:
         if at.is_zero():
             return self.sign(i)
         g0, g1 = self._exact_excess(i), self._exact_excess(i + 1)
-        g = arb(g0) + arb((g1 - g0) / exact(self.drive.interval_s[i])) * at
+        g = arb(g0) + arb((g1 - g0) / exact(self.excited.interval_s[i])) * at
         if g > 0:
             return 1
         if g < 0:
@@ -237,9 +239,9 @@ class Block:
         if self.sign(i) > 0 or self.sign(i + 1) <= 0:
             return None
         g0, g1 = self._exact_excess(i), self._exact_excess(i + 1)
-        return Place(i, arb(g0 / (g0 - g1) * exact(self.drive.interval_s[i])))
+        return Place(i, arb(g0 / (g0 - g1) * exact(self.excited.interval_s[i])))
 
-    def fly(
+    def integrate(
         self,
         place: Place,
         theta: arb,
@@ -247,7 +249,7 @@ class Block:
         *,
         lifted: bool,
         stop: Place | None = None,
-    ) -> Flight:
+    ) -> Trajectory:
         """Carry one excursion to its impact, its loss, the end of the record, or a place.
 
         Args:
@@ -257,18 +259,18 @@ class Block:
             lifted: theta >= 0, theta' >= 0 and q >= k_r there: no impact while q >= k_r (lift).
             stop: where to stop.
         """
-        drive = self.drive
+        excited = self.excited
         self.theta, self.rate = theta, rate
         first, begin = place
-        last = drive.k_h.size - 1
+        last = excited.k_h.size - 1
         for i in range(first, last):
             at = begin if i == first else arb(0)
             if stop is not None and stop.interval == i and stop.at.is_zero():
-                return Flight(STOPPED, stop, self.theta, self.rate)
-            if drive.interval_s[i] == 0.0:
+                return Trajectory(STOPPED, stop, self.theta, self.rate)
+            if excited.interval_s[i] == 0.0:
                 continue
             stops = stop is not None and stop.interval == i
-            length = exact(drive.interval_s[i])
+            length = exact(excited.interval_s[i])
             limit = stop.at if stops and stop is not None else arb(length)
             line = self._line(i, length)
             g0, g1 = self.sign(i), self.sign(i + 1)
@@ -289,21 +291,21 @@ class Block:
             if not lifted:
                 landing = self._integrate(line, at, limit, look=True)
                 if landing is not None:
-                    return Flight(IMPACT, Place(i, landing), self.theta, self.rate)
+                    return Trajectory(IMPACT, Place(i, landing), self.theta, self.rate)
             if stops and stop is not None:
-                return Flight(STOPPED, stop, self.theta, self.rate)
+                return Trajectory(STOPPED, stop, self.theta, self.rate)
             if self._past_recovery(self.least[i + 1]):
-                return Flight(LOST, Place(i + 1, arb(0)), self.theta, self.rate)
+                return Trajectory(LOST, Place(i + 1, arb(0)), self.theta, self.rate)
         end = Place(last, arb(0))
         if stop is not None and stop.interval >= last:
-            return Flight(STOPPED, end, self.theta, self.rate)
+            return Trajectory(STOPPED, end, self.theta, self.rate)
         event = TOPPLES if self._topples_by_energy() else RETURNS
-        return Flight(event, end, self.theta, self.rate)
+        return Trajectory(event, end, self.theta, self.rate)
 
     def _line(self, i: int, length: fmpq) -> _Line:
-        drive = self.drive
-        a0, a1 = exact(drive.k_h[i]), exact(drive.k_h[i + 1])
-        w0, w1 = exact(drive.w[i]), exact(drive.w[i + 1])
+        excited = self.excited
+        a0, a1 = exact(excited.k_h[i]), exact(excited.k_h[i + 1])
+        w0, w1 = exact(excited.w[i]), exact(excited.w[i + 1])
         return _Line(*(arb(x) for x in (a0, (a1 - a0) / length, w0, (w1 - w0) / length)))
 
     def _integrate(self, line: _Line, at: arb, target: arb, *, look: bool = False) -> arb | None:
@@ -329,11 +331,15 @@ class Block:
         reach = arb(0).union(h)
         a, w = line.a + line.da * at, line.w + line.dw * at
         # |theta''| <= p² (|k_h| + |w|): a bound of theta' over the step, and of what follows
-        drive = _most(self.p2 * (abs(a + line.da * reach) + abs(w + line.dw * reach)))
+        excited = _most(self.p2 * (abs(a + line.da * reach) + abs(w + line.dw * reach)))
         slope = _most(self.p2 * (abs(line.da) + abs(line.dw)))
         h_most = _most(h)
         degree, remainder = _remainder(
-            _most(abs(self.rate)) + drive * h_most, drive, slope, h_most, 2.0 ** (-0.9 * ctx.prec)
+            _most(abs(self.rate)) + excited * h_most,
+            excited,
+            slope,
+            h_most,
+            2.0 ** (-0.9 * ctx.prec),
         )
         rates = self._coefficients(a, w, line, degree)
         rates[degree] = arb(0, remainder)
@@ -345,10 +351,10 @@ class Block:
         sine, cosine = (self.theta_c - self.theta).sin_cos()
         u, s, c = [self.rate], [sine], [cosine]
         for k in range(degree - 1):
-            drive = a * c[k] - w * s[k]
+            excited = a * c[k] - w * s[k]
             if k:
-                drive += line.da * c[k - 1] - line.dw * s[k - 1]
-            u.append(self.p2 * drive / (k + 1))
+                excited += line.da * c[k - 1] - line.dw * s[k - 1]
+            u.append(self.p2 * excited / (k + 1))
             if k == degree - 2:
                 break
             sum_s = sum_c = arb(0)
@@ -433,7 +439,7 @@ def _root(rates: arb_poly, path: arb_poly, low: arb, high: arb) -> arb:
 
 
 def _remainder(
-    rate: float, drive: float, slope: float, h: float, enough: float
+    rate: float, excited: float, slope: float, h: float, enough: float
 ) -> tuple[int, float]:
     """Degree of a step, and a bound of that coefficient of theta' anywhere in the step.
 
@@ -441,7 +447,7 @@ def _remainder(
 
     Args:
         rate: bound of |theta'| over the step.
-        drive: bound of p² (|k_h| + |w|).
+        excited: bound of p² (|k_h| + |w|).
         slope: bound of p² (|k_h'| + |w'|).
         h: length of the step.
         enough: the degree is reached where the term of theta is below this.
@@ -449,7 +455,7 @@ def _remainder(
     u, s = [rate], [1.0]
     power = h
     for k in range(MOST_DEGREE):
-        u.append((drive * s[k] + (slope * s[k - 1] if k else 0.0)) / (k + 1))
+        u.append((excited * s[k] + (slope * s[k - 1] if k else 0.0)) / (k + 1))
         s.append(sum(u[j] * s[k - j] for j in range(k + 1)) / (k + 1))
         power *= h
         if k > 3 and u[-1] * power < enough:

@@ -44,9 +44,9 @@ class Oracle:
         par, time = heyoka.par, heyoka.time
         phi = par[5] - theta
         k_h, w = par[0] + par[1] * time, par[2] + par[3] * time
-        drive = par[4] * (k_h * heyoka.cos(phi) - w * heyoka.sin(phi))
+        excited = par[4] * (k_h * heyoka.cos(phi) - w * heyoka.sin(phi))
         down = heyoka.event_direction.negative
-        system = [(theta, rate), (rate, drive)]
+        system = [(theta, rate), (rate, excited)]
         turned: list[float] = []
 
         # a function, not a method: heyoka copies what it is given, and a method's object with it
@@ -62,23 +62,23 @@ class Oracle:
             nt_events=[heyoka.nt_event(rate, keep, direction=down)],
         )  # fmt: skip
 
-    def follow(self, drive: Excitation, *, p2: float, kr: float) -> Followed:
+    def follow(self, excited: Excitation, *, p2: float, kr: float) -> Followed:
         """Run one block over an excitation and the free motion after it."""
         end_s = FREE_PERIODS / math.sqrt(p2)
-        record = drive.time_s.size
-        drive = drive.with_rest_after(end_s, 40)
-        least = least_later_q(drive)
+        record = excited.time_s.size
+        excited = excited.with_rest_after(end_s, 40)
+        least = least_later_q(excited)
         found = Followed()
         self.turned.clear()
         state: tuple[float, float] | None = None
         lifted = False
-        for i in range(drive.interval_s.size):
-            length = float(drive.interval_s[i])
+        for i in range(excited.interval_s.size):
+            length = float(excited.interval_s[i])
             if length == 0.0:
                 continue
-            g = [float(drive.k_h[j] - drive.w[j] * kr) for j in (i, i + 1)]
+            g = [float(excited.k_h[j] - excited.w[j] * kr) for j in (i, i + 1)]
             crossing = g[0] / (g[0] - g[1]) * length if (g[0] > 0.0) != (g[1] > 0.0) else length
-            self._excite(drive, i, p2, kr)
+            self._excite(excited, i, p2, kr)
             at = 0.0
             lifted = lifted and g[0] >= 0.0
             while True:
@@ -97,7 +97,7 @@ class Oracle:
                 at, state = self._to(self.watched, at, length, state)
                 if state is not None:
                     break
-                found.impacts_s.append(float(drive.time_s[i]) + at)
+                found.impacts_s.append(float(excited.time_s[i]) + at)
             if state is not None and state[1] > 0.0:
                 phi = math.atan(kr) - state[0]
                 if phi < 0.0 and math.tan(phi) < least[i + 1]:
@@ -108,11 +108,11 @@ class Oracle:
         found.peak_rad = max(self.turned, default=0.0)
         return found
 
-    def _excite(self, drive: Excitation, i: int, p2: float, kr: float) -> None:
-        length = drive.interval_s[i]
-        slopes = [(x[i + 1] - x[i]) / length for x in (drive.k_h, drive.w)]
+    def _excite(self, excited: Excitation, i: int, p2: float, kr: float) -> None:
+        length = excited.interval_s[i]
+        slopes = [(x[i + 1] - x[i]) / length for x in (excited.k_h, excited.w)]
         for one in (self.lifting, self.watched):
-            one.pars[:] = [drive.k_h[i], slopes[0], drive.w[i], slopes[1], p2, math.atan(kr)]
+            one.pars[:] = [excited.k_h[i], slopes[0], excited.w[i], slopes[1], p2, math.atan(kr)]
 
     def _to(
         self, integrator: Any, at: float, target: float, state: tuple[float, float]
@@ -155,15 +155,15 @@ def compare(oracle: Oracle, case: BenchCase) -> Difference:
         impact_s: greatest difference of their impacts [s].
         outside_s: greatest distance of the solver's impacts from their enclosures' middle [s].
     """
-    drive = case.excitation
+    excited = case.excitation
     mine = respond(case.motion, p2=case.p2, kr=case.kr, polarity=case.polarity, history=True)
-    other = oracle.follow(drive, p2=case.p2, kr=case.kr)
-    proven = enclose(drive, p2=case.p2, kr=case.kr)
+    other = oracle.follow(excited, p2=case.p2, kr=case.kr)
+    proven = enclose(excited, p2=case.p2, kr=case.kr)
     assert mine.history is not None
     my_impacts = impacts(mine.history.time_s, mine.history.theta_rad)
     within = [time_s for time_s, _ in proven.impacts_s]
     # after the record ball arithmetic decides by energy, and looks for no impact
-    my_recorded = [time_s for time_s in my_impacts if time_s <= drive.time_s[-1]]
+    my_recorded = [time_s for time_s in my_impacts if time_s <= excited.time_s[-1]]
     peak = math.nan
     if mine.peak_theta_rad is not None:
         peak = abs(other.peak_rad / mine.peak_theta_rad - 1.0)

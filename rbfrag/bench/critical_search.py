@@ -75,9 +75,9 @@ def compare_searches(
     rng = np.random.default_rng(seed)
     names = ["critical search", "23 runs, rbfrag, side by side", "23 runs, rbfrag, one by one"]
     works: list[Callable[[tuple[BenchCase, ...]], object]] = [
-        _search,
+        lambda cases: critical(cases[0].motion, p2=cases[0].p2, polarity=cases[0].polarity),
         _runs_in_batch,
-        _runs_by_kernel,
+        lambda cases: tuple(taylor_run(case).outcome for case in cases),
     ]
     if cvode_is_installed():
         for rtol in tolerances:
@@ -142,19 +142,11 @@ def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[Be
     return tuple(runs)
 
 
-def _search(cases: tuple[BenchCase, ...]) -> object:
-    return critical(cases[0].motion, p2=cases[0].p2, polarity=cases[0].polarity)
-
-
 def _runs_in_batch(cases: tuple[BenchCase, ...]) -> tuple[str, ...]:
     runs = simulate_many(
         cases[0].excitation, p2=cases[0].p2, kr=np.array([case.kr for case in cases])
     )
     return tuple(OUTCOMES[code].value for code in runs.outcome.tolist())
-
-
-def _runs_by_kernel(cases: tuple[BenchCase, ...]) -> tuple[str, ...]:
-    return tuple(taylor_run(case).outcome for case in cases)
 
 
 def _runs_by_cvode(rtol: float) -> Callable[[tuple[BenchCase, ...]], object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.peers import (
@@ -58,25 +59,67 @@ def taylor_run(case: BenchCase, order: int = ORDER, ph_max: float = PH_MAX) -> P
     return PeerAnswer(OUTCOMES[run.outcome].value, run.peak_rad)
 
 
+def rocking_run(case: BenchCase, order: int = ORDER) -> PeerAnswer:
+    """Run one case with rbfrag's kernel of free-standing blocks."""
+    block = free_block(block_of_numbers(case.p2, case.kr, {"restitution": RESTITUTION}))
+    run = simulate_rocking(case.excitation, block, order=order)
+    return PeerAnswer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
+
+
 def methods(*, quick: bool = False) -> tuple[BenchMethod, ...]:
     """Return every method that can be run here."""
-    splits = dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
-    orders = dict.fromkeys((4, 5, 6, ORDER))
-    result = [_taylor(order, ph_max) for ph_max in splits for order in orders]
-    result += [_euler(parts) for parts in ((1, 8) if quick else (1, 8, 64))]
+    result = [
+        BenchMethod(
+            "rbfrag, unsplit" if ph_max == UNSPLIT else f"rbfrag, p·h ≤ {ph_max:g}",
+            f"order {order}",
+            partial(taylor_run, order=order, ph_max=ph_max),
+            of_use=(order, ph_max) == (ORDER, PH_MAX),
+        )
+        for ph_max in dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
+        for order in dict.fromkeys((4, 5, 6, ORDER))
+    ]
+    result += [
+        BenchMethod("forward Euler", _split(parts), partial(euler, parts=parts))
+        for parts in ((1, 8) if quick else (1, 8, 64))
+    ]
     solvers: tuple[Solver, ...] = ("RK45", "DOP853", "LSODA")
-    tolerances = (1e-6,) if quick else (1e-4, 1e-6)
-    result += [_scipy(solver, rtol) for solver in solvers for rtol in tolerances]
+    result += [
+        BenchMethod(
+            f"scipy {solver}", f"rtol {rtol:.0e}", partial(solve_ivp_run, solver=solver, rtol=rtol)
+        )
+        for solver in solvers
+        for rtol in ((1e-6,) if quick else (1e-4, 1e-6))
+    ]
     if cvode_is_installed():
-        result += [_cvode(rtol) for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))]
+        result += [
+            BenchMethod("CVODE in Python", f"rtol {rtol:.0e}", partial(cvode_run, rtol=rtol))
+            for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))
+        ]
     return tuple(result)
 
 
 def rocking_methods(*, quick: bool = False) -> tuple[BenchMethod, ...]:
     """Return the methods for free-standing blocks."""
-    result = [_rocking(order) for order in (4, 5, 6, ORDER)]
-    result += [_runge_kutta(parts) for parts in ((1, 4) if quick else (1, 4, 16))]
+    result = [
+        BenchMethod(
+            "rbfrag, rocking", f"order {order}", partial(rocking_run, order=order),
+            of_use=order == ORDER,
+        )
+        for order in (4, 5, 6, ORDER)
+    ]  # fmt: skip
+    result += [
+        BenchMethod(
+            "RK4, rocking",
+            _split(parts),
+            partial(runge_kutta, restitution=RESTITUTION, parts=parts),
+        )
+        for parts in ((1, 4) if quick else (1, 4, 16))
+    ]
     return tuple(result)
+
+
+def _split(parts: int) -> str:
+    return "dt" if parts == 1 else f"dt/{parts}"
 
 
 def rocking_reference_run(case: BenchCase) -> PeerAnswer:
@@ -87,52 +130,3 @@ def rocking_reference_run(case: BenchCase) -> PeerAnswer:
 def missing_peers() -> tuple[str, ...]:
     """Return the packages of peers that are not installed here."""
     return () if cvode_is_installed() else (CVODE_INSTALL,)
-
-
-def _taylor(order: int, ph_max: float) -> BenchMethod:
-    split = "unsplit" if ph_max == UNSPLIT else f"p·h ≤ {ph_max:g}"
-    return BenchMethod(
-        f"rbfrag, {split}",
-        f"order {order}",
-        lambda case: taylor_run(case, order, ph_max),
-        of_use=(order, ph_max) == (ORDER, PH_MAX),
-    )
-
-
-def _rocking(order: int) -> BenchMethod:
-    return BenchMethod(
-        "rbfrag, rocking",
-        f"order {order}",
-        lambda case: rocking_run(case, order),
-        of_use=order == ORDER,
-    )
-
-
-def rocking_run(case: BenchCase, order: int = ORDER) -> PeerAnswer:
-    """Run one case with rbfrag's kernel of free-standing blocks."""
-    block = free_block(block_of_numbers(case.p2, case.kr, {"restitution": RESTITUTION}))
-    run = simulate_rocking(case.excitation, block, order=order)
-    return PeerAnswer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
-
-
-def _runge_kutta(parts: int) -> BenchMethod:
-    return BenchMethod(
-        "RK4, rocking",
-        "dt" if parts == 1 else f"dt/{parts}",
-        lambda case: runge_kutta(case, RESTITUTION, parts),
-    )
-
-
-def _euler(parts: int) -> BenchMethod:
-    setting = "dt" if parts == 1 else f"dt/{parts}"
-    return BenchMethod("forward Euler", setting, lambda case: euler(case, parts))
-
-
-def _scipy(solver: Solver, rtol: float) -> BenchMethod:
-    return BenchMethod(
-        f"scipy {solver}", f"rtol {rtol:.0e}", lambda case: solve_ivp_run(case, solver, rtol)
-    )
-
-
-def _cvode(rtol: float) -> BenchMethod:
-    return BenchMethod("CVODE in Python", f"rtol {rtol:.0e}", lambda case: cvode_run(case, rtol))

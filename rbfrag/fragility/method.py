@@ -195,7 +195,7 @@ class BlockParameters:
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
-        presumes: what answers for its own kind take for granted of how a block stands; empty for
+        support: what answers for its own kind take for granted of how a block stands; empty for
             nothing.
     """
 
@@ -211,7 +211,7 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
-    presumes: str = ""
+    support: str = ""
 
     @cached_property
     def sigmas(self) -> dict[str, str]:
@@ -268,7 +268,7 @@ NOT_LIFTED = Bound(
 )
 TOPPLING_BLOCK = BlockParameters(
     ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
-    presumes="the block is taken to be backed by a slope; one that stands free rocks about both "
+    support="the block is taken to be backed by a slope; one that stands free rocks about both "
     "edges and overturns in weaker shaking",
 )  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""

@@ -84,7 +84,7 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
         f"{SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
         for name, value in values.items()
     )
-    stands = (f"{block.presumes[:1].upper()}{block.presumes[1:]}.",) if block.presumes else ()
+    stands = (f"{block.support[:1].upper()}{block.support[1:]}.",) if block.support else ()
     return (f"The block has {numbers}.", *limit, *stands)
 
 

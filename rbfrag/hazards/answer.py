@@ -290,7 +290,7 @@ def hazard(
             "between levels of the curve"
         )
 
-    def placed(values: FloatArray) -> FloatArray:
+    def among_all(values: FloatArray) -> FloatArray:
         """Return values of the blocks that can be used among those of all."""
         if one_class or sound.all():
             return values
@@ -299,20 +299,20 @@ def hazard(
         return whole
 
     return HazardAnswer(
-        **{name: placed(values) for name, values in mean.items()},
-        probability=placed(np.asarray(probability)),
+        **{name: among_all(values) for name, values in mean.items()},
+        probability=among_all(np.asarray(probability)),
         years=years,
         level=level,
         model=_listed(one.name for one in models),
         term=_listed(one.term.name for one in models),
         method=_listed(one.row.method for one in models),
         edges=widest.edges,
-        contribution=placed(contribution),
+        contribution=among_all(contribution),
         measure=curves[0].measure,
         joint=JointRate.mean(joints, shares) if joints else None,
         curve_kind="weighted branches" if weight is not None else curves[0].statistic or None,
-        branches=_branches(curves, each, weight, placed),
-        quantiles=_quantiles(parts, shares, placed) if weight is not None else {},
+        branches=_branches(curves, each, weight, among_all),
+        quantiles=_quantiles(parts, shares, among_all) if weight is not None else {},
         warnings=tuple(dict.fromkeys(warnings)),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
@@ -475,7 +475,7 @@ def _branches(
     curves: Sequence[HazardCurve],
     each: Sequence[_Rates],
     weight: FloatArray | None,
-    placed: Callable[[FloatArray], FloatArray],
+    among_all: Callable[[FloatArray], FloatArray],
 ) -> tuple[BranchRate, ...]:
     if len(curves) == 1:
         return ()
@@ -483,7 +483,7 @@ def _branches(
         BranchRate(
             curve_name(curve),
             None if weight is None or np.isnan(weight[i]) else float(weight[i]),
-            placed(rates.annual_rate),
+            among_all(rates.annual_rate),
             float(rates.annual_rate[0]) if rates.joint is None else rates.joint.annual_rate_any,
         )
         for i, (curve, rates) in enumerate(zip(curves, each, strict=True))
@@ -491,11 +491,11 @@ def _branches(
 
 
 def _quantiles(
-    parts: Sequence[_Rates], shares: FloatArray, placed: Callable[[FloatArray], FloatArray]
+    parts: Sequence[_Rates], shares: FloatArray, among_all: Callable[[FloatArray], FloatArray]
 ) -> dict[float, dict[str, Any]]:
     rates = weighted_quantiles(np.stack([part.annual_rate for part in parts]), shares, QUANTILES)
     result: dict[float, dict[str, Any]] = {
-        q: {"annual_rate": placed(row)} for q, row in zip(QUANTILES, rates, strict=True)
+        q: {"annual_rate": among_all(row)} for q, row in zip(QUANTILES, rates, strict=True)
     }
     any_rates = [None if part.joint is None else part.joint.annual_rate_any for part in parts]
     if all(one is not None for one in any_rates):

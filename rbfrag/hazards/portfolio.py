@@ -170,7 +170,7 @@ class Portfolio:
             for model in self.answering
             for text in (
                 model.term.advice,
-                model.method.block.presumes if model.kind == model.method.block.kind else "",
+                model.method.block.support if model.kind == model.method.block.kind else "",
                 *model.notes,
             )
         ]

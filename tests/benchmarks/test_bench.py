@@ -111,8 +111,8 @@ def test_the_reference_of_free_blocks_agrees_with_the_independent_integrator(
             p2=dict.fromkeys((1, -1), case.p2),
             e=dict.fromkeys((1, -1), 0.85),
         )
-        drive = case.excitation
-        other = integrate_rocking(drive.time_s, drive.k_h, drive.w, block)
+        excited = case.excitation
+        other = integrate_rocking(excited.time_s, excited.k_h, excited.w, block)
         seen.add(ours.outcome)
         assert ours.outcome == ("toppled" if other.toppled else "stable")
         if not other.toppled:

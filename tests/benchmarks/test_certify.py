@@ -66,22 +66,22 @@ PULSE = GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, 0.5, 0.0])
 def test_a_wrong_verdict_is_seen() -> None:
     result = critical(PULSE, p2=5.0)
     assert result.kr is not None
-    drive = excitation(PULSE)
+    excited = excitation(PULSE)
     low, high = 0.9 * result.kr, 1.1 * result.kr
     count = Count()
-    wrong = count.check(drive, 5.0, low, high, True, np.linspace(low, high, 10))
+    wrong = count.check(excited, 5.0, low, high, True, np.linspace(low, high, 10))
     assert len(wrong) == count.contradictions == 5
-    assert count.check(drive, 5.0, low, result.kr, True, np.linspace(low, result.kr, 10)) == []
+    assert count.check(excited, 5.0, low, result.kr, True, np.linspace(low, result.kr, 10)) == []
 
 
 def test_a_border_that_is_not_there_is_no_border() -> None:
     result = critical(PULSE, p2=5.0)
     assert result.kr is not None
-    drive = excitation(PULSE)
-    found = borders.border(drive, 5.0, result.kr, result.kr * (1.0 + 1e-9))
+    excited = excitation(PULSE)
+    found = borders.border(excited, 5.0, result.kr, result.kr * (1.0 + 1e-9))
     assert found is not None
     assert found[0] + found[1] == pytest.approx(result.kr, rel=1e-8)
-    assert borders.border(drive, 5.0, 1.1 * result.kr, 1.1 * result.kr * (1.0 + 1e-9)) is None
+    assert borders.border(excited, 5.0, 1.1 * result.kr, 1.1 * result.kr * (1.0 + 1e-9)) is None
 
 
 def test_safe_islands_are_runs_between_two_that_topple() -> None:

@@ -78,10 +78,10 @@ def record(seed: int) -> GroundMotion:
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("p2", [30.0, 3.0, 0.3])
 def test_shorter_steps_change_nothing(seed: int, p2: float) -> None:
-    drive = excitation(record(seed), record(seed + 7))
+    excited = excitation(record(seed), record(seed + 7))
     for kr in (0.05, 0.12, 0.2):
-        one = truth(drive, p2=p2, kr=kr)
-        other = truth(drive, p2=p2, kr=kr, ph_max=0.006 * p2**0.5, smallest=1e-36)
+        one = truth(excited, p2=p2, kr=kr)
+        other = truth(excited, p2=p2, kr=kr, ph_max=0.006 * p2**0.5, smallest=1e-36)
         assert other.steps > one.steps
         assert (one.outcome, one.intervals_moved) == (other.outcome, other.intervals_moved)
         if one.outcome == "stable":
@@ -93,11 +93,11 @@ def test_shorter_steps_change_nothing(seed: int, p2: float) -> None:
 @pytest.mark.parametrize("p2", [30.0, 1.0])
 def test_it_agrees_with_two_other_integrators(seed: int, p2: float) -> None:
     motion = record(seed)
-    drive = excitation(motion)
+    excited = excitation(motion)
     for kr in (0.08, 0.15, 0.24):
-        mine = truth(drive, p2=p2, kr=kr)
-        plain = integrate(drive.time_s, drive.k_h, None, p2=p2, kr=kr)
-        longer = reference(BenchCase(motion, "forward", drive, p2, kr))
+        mine = truth(excited, p2=p2, kr=kr)
+        plain = integrate(excited.time_s, excited.k_h, None, p2=p2, kr=kr)
+        longer = reference(BenchCase(motion, "forward", excited, p2, kr))
         assert mine.outcome == plain.outcome == longer.outcome
         assert mine.intervals_moved == plain.intervals_moved
         if mine.outcome == "stable":

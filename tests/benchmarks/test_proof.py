@@ -39,33 +39,33 @@ def test_both_ends_of_a_pulse(ratio: float) -> None:
     found = critical(motion, p2=2.0)
     assert found.lower is not None
     assert found.upper is not None
-    drive = excitation(motion)
+    excited = excitation(motion)
     for kr, outcome in ((found.lower, TOPPLED), (found.upper, STABLE)):
         for off in (0.0, 1e-6):
             sign = -1.0 if outcome == TOPPLED else 1.0
-            proven = enclose(drive, p2=2.0, kr=kr * drive.pga_g * (1.0 + sign * off))
+            proven = enclose(excited, p2=2.0, kr=kr * excited.pga_g * (1.0 + sign * off))
             assert proven.outcome == outcome
             assert proven.width < 1e-25
 
 
 def test_energy_under_a_constant_drive_is_enclosed() -> None:
     # theta'²/2 + p² (k_h sin phi + w cos phi) is kept
-    drive = excitation(
+    excited = excitation(
         GroundMotion.from_nodes([0.0, 1.0], [0.3, 0.3]),
         GroundMotion.from_nodes([0.0, 1.0], [-0.2, -0.2]),
     )
     with ctx.workprec(256):
-        block = Block(drive, 3.0, exact(0.25))
-        k_h, w = arb(float(drive.k_h[0])), arb(float(drive.w[0]))
+        block = Block(excited, 3.0, exact(0.25))
+        k_h, w = arb(float(excited.k_h[0])), arb(float(excited.w[0]))
 
         def energy(theta: arb, rate: arb) -> arb:
             phi = block.theta_c - theta
             return rate**2 / 2 + 3 * (k_h * phi.sin() + w * phi.cos())
 
         stop = Place(0, arb(0.75))
-        flight = block.fly(Place(0, arb(0)), arb(0), arb(0), lifted=True, stop=stop)
-        assert flight.theta > 0.05
-        kept = energy(flight.theta, flight.rate)
+        trajectory = block.integrate(Place(0, arb(0)), arb(0), arb(0), lifted=True, stop=stop)
+        assert trajectory.theta > 0.05
+        kept = energy(trajectory.theta, trajectory.rate)
         assert kept.overlaps(energy(arb(0), arb(0)))
         assert kept.rad() < 1e-40
 
@@ -74,13 +74,13 @@ def test_energy_under_a_constant_drive_is_enclosed() -> None:
 @pytest.mark.parametrize("p2", [30.0, 1.0])
 def test_outcomes_and_impacts_are_those_of_32_digits(seed: int, p2: float) -> None:
     motion = GroundMotion(shaking(seed, npts=500), 0.02)
-    drive = excitation(motion, GroundMotion(0.5 * shaking(seed + 7, npts=500), 0.02))
+    excited = excitation(motion, GroundMotion(0.5 * shaking(seed + 7, npts=500), 0.02))
     seen = set()
     for kr in (0.03, 0.08, 0.15, 0.24):
-        proven = enclose(drive, p2=p2, kr=kr)
-        assert proven.outcome == truth(drive, p2=p2, kr=kr).outcome
+        proven = enclose(excited, p2=p2, kr=kr)
+        assert proven.outcome == truth(excited, p2=p2, kr=kr).outcome
         seen.add(proven.outcome)
-        closer = enclose(drive, p2=p2, kr=kr, bits=(500,))
+        closer = enclose(excited, p2=p2, kr=kr, bits=(500,))
         assert len(closer.impacts_s) == len(proven.impacts_s)
         for (one, width), (other, less) in zip(proven.impacts_s, closer.impacts_s, strict=True):
             assert less < width < 1e-20
@@ -90,12 +90,12 @@ def test_outcomes_and_impacts_are_those_of_32_digits(seed: int, p2: float) -> No
 
 def test_few_bits_say_nothing_rather_than_something_wrong() -> None:
     motion = GroundMotion(shaking(3, npts=500), 0.02)
-    drive = excitation(motion)
+    excited = excitation(motion)
     found = critical(motion, p2=3.0)
     assert found.lower is not None
     assert found.upper is not None
     said = [
-        enclose(drive, p2=3.0, kr=kr * drive.pga_g, bits=(bits,)).outcome
+        enclose(excited, p2=3.0, kr=kr * excited.pga_g, bits=(bits,)).outcome
         for kr in (found.lower, found.upper)
         for bits in (24, 32, 40, 64, 128)
     ]
@@ -107,39 +107,39 @@ def test_few_bits_say_nothing_rather_than_something_wrong() -> None:
 
 
 def test_a_plateau_at_the_threshold_is_rest_and_an_ulp_above_is_motion() -> None:
-    drive = excitation(GroundMotion.from_nodes([0.0, 1.0, 3.0, 4.0], [0.0, 0.3, 0.3, 0.0]))
-    assert enclose(drive, p2=3.0, kr=0.3).decided_by == "rest"
-    below = enclose(drive, p2=3.0, kr=math.nextafter(0.3, 0.0))
+    excited = excitation(GroundMotion.from_nodes([0.0, 1.0, 3.0, 4.0], [0.0, 0.3, 0.3, 0.0]))
+    assert enclose(excited, p2=3.0, kr=0.3).decided_by == "rest"
+    below = enclose(excited, p2=3.0, kr=math.nextafter(0.3, 0.0))
     assert below.steps > 0
     assert (below.outcome, below.decided_by) == (STABLE, "last impact")
 
 
 def test_a_ball_that_holds_both_sides_is_refused() -> None:
     # after the record upright to within the ball: no verdict
-    drive = excitation(PULSE)
+    excited = excitation(PULSE)
     with ctx.workprec(100):
-        block = Block(drive, 5.0, exact(0.2))
+        block = Block(excited, 5.0, exact(0.2))
         end = Place(2, arb(0))
         upright = block.theta_c + arb(0, 1e-20)
         with pytest.raises(NotEnclosedError, match="energy"):
-            block.fly(end, upright, arb(0, 1e-20), lifted=False)
-        assert block.fly(end, upright, arb(1e-9), lifted=False).event == "topples"
-        assert block.fly(end, upright, arb(-1e-9), lifted=False).event == "returns"
+            block.integrate(end, upright, arb(0, 1e-20), lifted=False)
+        assert block.integrate(end, upright, arb(1e-9), lifted=False).event == "topples"
+        assert block.integrate(end, upright, arb(-1e-9), lifted=False).event == "returns"
 
 
 def test_least_later_q_is_below_every_later_q() -> None:
     motion, vertical = (GroundMotion(shaking(seed, npts=300), 0.02) for seed in (2, 9))
-    drive = excitation(motion, vertical)
-    least = least_later_q(drive)
+    excited = excitation(motion, vertical)
+    least = least_later_q(excited)
     for node in range(0, 300, 37):
-        later = min(exact(drive.k_h[j]) / exact(drive.w[j]) for j in range(node, 300))
+        later = min(exact(excited.k_h[j]) / exact(excited.w[j]) for j in range(node, 300))
         assert exact(least[node]) < min(later, 0) or (least[node] == 0.0 and later >= 0)
 
 
 def test_outside_the_model_is_refused() -> None:
-    drive = excitation(PULSE, GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, -1.5, 0.0]))
+    excited = excitation(PULSE, GroundMotion.from_nodes([0.0, 0.2, 0.4], [0.0, -1.5, 0.0]))
     with pytest.raises(ValueError, match="1 \\+ k_v"):
-        enclose(drive, p2=3.0, kr=0.1)
+        enclose(excited, p2=3.0, kr=0.1)
     with pytest.raises(ValueError, match="positive"):
         enclose(excitation(PULSE), p2=3.0, kr=0.0)
 
@@ -169,20 +169,20 @@ def test_the_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
 
 def test_no_proof_where_a_stronger_block_topples() -> None:
     motion = GroundMotion(shaking(3, npts=300), 0.02)
-    drive = excitation(motion)
+    excited = excitation(motion)
     found = critical(motion, p2=3.0)
     assert found.lower is not None
     assert found.k_up_over_pga is not None
-    k_up = found.k_up_over_pga * drive.pga_g
+    k_up = found.k_up_over_pga * excited.pga_g
     for off in (1e-2, 1e-5):
-        kr = found.lower * drive.pga_g * (1.0 - off)
-        said = above.nothing_above(drive, p2=3.0, kr=kr, k_up=k_up, seconds=60.0)
+        kr = found.lower * excited.pga_g * (1.0 - off)
+        said = above.nothing_above(excited, p2=3.0, kr=kr, k_up=k_up, seconds=60.0)
         assert not said.proven
-        assert said.reached >= found.lower * drive.pga_g
-    low = above.nothing_above(drive, p2=3.0, kr=kr, k_up=kr, seconds=60.0)
+        assert said.reached >= found.lower * excited.pga_g
+    low = above.nothing_above(excited, p2=3.0, kr=kr, k_up=kr, seconds=60.0)
     assert "from rest" in low.reason
     assert not above.nothing_above(
-        drive, p2=3.0, kr=0.99 * k_up, k_up=1.1 * k_up, seconds=0.0
+        excited, p2=3.0, kr=0.99 * k_up, k_up=1.1 * k_up, seconds=0.0
     ).proven
 
 
@@ -199,22 +199,22 @@ def test_strong_shaking_both_ways_keeps_no_order() -> None:
 def test_verdicts_hold_for_blocks_inside(seed: int) -> None:
     rng = np.random.default_rng(seed)
     motion = (noise, plateaus, ties)[seed](rng)
-    drive = excitation(motion, vertical_of(motion, rng) if seed == 0 else None)
-    assert above.keeps_order(drive)
+    excited = excitation(motion, vertical_of(motion, rng) if seed == 0 else None)
+    assert above.keeps_order(excited)
     p2 = 10.0
     seen = []
     for _ in range(16):
-        low = drive.max_q * rng.uniform(0.05, 1.0)
+        low = excited.max_q * rng.uniform(0.05, 1.0)
         high = low * (1.0 + 10.0 ** rng.uniform(-5.0, -1.0))
         with ctx.workprec(above.BITS):
-            record = above.Record(drive, p2)
+            record = above.Record(excited, p2)
             table = above.Table(record, exact(low))
             verdict = above.decide(record, exact(low), exact(high), table, 0).verdict
         seen.append(verdict)
         if verdict != above.SPLIT:
             wanted = TOPPLED if verdict == above.TOPPLE else STABLE
             for kr in (low, *rng.uniform(low, high, 4)):
-                assert truth(drive, p2=p2, kr=float(kr)).outcome == wanted
+                assert truth(excited, p2=p2, kr=float(kr)).outcome == wanted
     assert {above.SAFE, above.TOPPLE} <= set(seen)
 
 
