@@ -24,6 +24,13 @@ def print_json(document: object) -> None:
     print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
 
 
+def print_sentences(sentences: Iterable[str]) -> None:
+    """Print sentences, one a line, and an empty line."""
+    for sentence in sentences:
+        print(sentence)
+    print()
+
+
 def print_pairs(pairs: Mapping[str, object]) -> None:
     """Print names and values in two columns; None is shown as a dash."""
     width = max(map(len, pairs), default=0)
@@ -237,9 +244,7 @@ def show_prediction(
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    for sentence in (*prediction_in_words(document), *block_in_words(document["method"], given)):
-        print(sentence)
-    print()
+    print_sentences((*prediction_in_words(document), *block_in_words(document["method"], given)))
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
     else:

@@ -80,14 +80,11 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
             )  # fmt: skip
     effective = answer.events.effective_years
     if drawn and effective is not None:
+        years = f"{effective:,.0f}" if effective >= 100.0 else f"{effective:.3g}"
         lowest = 0.3 * min(curve[-1].annual_rate for curve in drawn)
         highest = 2.0 * max(curve[0].ci_high for curve in drawn)
         axes.set_ylim(min(max(lowest, _LOWEST / effective), 0.5 / effective), highest)
         axes.axhspan(
             axes.get_ylim()[0], 1.0 / effective, color="#dddddd", alpha=0.6, lw=0.0,
-            label=f"less than once in {_years(effective)} years" if first else None,
+            label=f"less than once in {years} years" if first else None,
         )  # fmt: skip
-
-
-def _years(value: float) -> str:
-    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"

@@ -11,7 +11,6 @@ import numpy as np
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
 from rbfrag.rockmasses.counts import (
-    EqualCounts,
     crossings,
     cumulative_counts,
     mode_counts,
@@ -65,7 +64,9 @@ def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Pictur
         axes.plot(crossing.pga_g, crossing.count, "o", ms=6, mfc="white", mec="black", zorder=5)
         axes.plot([crossing.pga_g] * 2, [0.0, crossing.count], color="black", lw=0.7, ls=":")
         at = (crossing.pga_g, crossing.count)
-        write_near(axes, _with_error(crossing), at, (9, -12), fontsize=9)
+        error = crossing.standard_error_g
+        text = f"{crossing.pga_g:.3f}{f' ± {error:.3f}' if math.isfinite(error) else ''} g"
+        write_near(axes, text, at, (9, -12), fontsize=9)
     axes.set_xlim(0.0, right)
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("peak ground acceleration, PGA [g]")
@@ -87,11 +88,6 @@ def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Pictur
     bars.set_ylabel("share of the blocks [%]")
     figure.suptitle(_title(realisations), fontsize=10)
     return canvas.save_figure(figure, path)
-
-
-def _with_error(crossing: EqualCounts) -> str:
-    error = crossing.standard_error_g
-    return f"{crossing.pga_g:.3f}{f' ± {error:.3f}' if math.isfinite(error) else ''} g"
 
 
 def _name_bars(axes: Axes, modes: Sequence[ModeName | None]) -> None:

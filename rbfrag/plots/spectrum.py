@@ -17,7 +17,7 @@ from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 # Told apart by people who do not see red and green alike.
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f", "#7f7f7f", "#56b4e9", "#c44e52", "#5e3c99")
@@ -83,7 +83,8 @@ def plot_spectrum(
         raise InputError("these motions topple no block of any size: there is nothing to draw")
     canvas.logarithmic(axes, (1.0, 3.0), (1.0, 2.0, 5.0))
     axes.set_xlim(low, high)
-    bottom = max(_LOWEST_PART * highest, 0.8 * _lowest(axes))
+    drawn = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
+    bottom = max(_LOWEST_PART * highest, 0.8 * float(drawn[drawn > 0.0].min()))
     axes.set_ylim(bottom, 1.25 * highest)
     axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
     axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
@@ -96,8 +97,3 @@ def plot_spectrum(
         axes.plot([], [], style, color="black", lw=1.2, label=label)
     canvas.legend_below(figure, 2)
     return canvas.save_figure(figure, out)
-
-
-def _lowest(axes: Axes) -> float:
-    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
-    return float(values[values > 0.0].min())

@@ -264,7 +264,7 @@ def numbers_of_shape(
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
     if "ps2" in facts.parameters:
-        return {"ks": k, **_of_slumps(judged, functions), **stated}
+        return {"ks": k, **numbers_of_slumps(judged, functions), **stated}
     listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
     if stands_free_of(facts, judged.backed):
         listener.remark(True, NOT_BACKED)
@@ -289,7 +289,8 @@ def numbers_of_shape(
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
 
 
-def _of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[str, Any]:
+def numbers_of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[str, Any]:
+    """Return what the model of slumping reads of shapes beside their yields, by field."""
     body = judged.body
     trigonometry: Any = math
     if not isinstance(body, Block):

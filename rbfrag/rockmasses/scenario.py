@@ -19,11 +19,11 @@ from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.question import predict
+from rbfrag.question.shapes import ModeShapes, numbers_of_slumps
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.at_rest import slump_at_rest
 from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
 
 MODELLED: tuple[ModeName, ...] = ("topple",)
@@ -222,6 +222,9 @@ def scenario(
             )
     missing = {m.mode: (m.count - m.covered.count) / realisations.n_blocks for m in modes}
     missing = {mode: share for mode, share in missing.items() if share > 0.0}
+    warnings = _warnings(missing, reason[topples], modelled)
+    if bonded := int(np.count_nonzero(reason == BONDED)):
+        warnings.append(f"{bonded} blocks without an answer: {BONDED}")
     return Scenario(
         measures=measures,
         model=getattr(answer, "model", None),
@@ -239,7 +242,7 @@ def scenario(
         event_high=event_high,
         in_domain=in_domain,
         reason=reason,
-        warnings=(*_warnings(missing, reason[topples], modelled), *_about_bonds(reason)),
+        warnings=tuple(warnings),
         other_models=others,
     )
 
@@ -261,28 +264,23 @@ def _other_modes(
     motion: dict[str, Any] = {
         name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
     }
-    blocks, k = realisations.blocks, realisations.stability.yield_acceleration
+    k, beta_deg = realisations.stability.yield_acceleration, realisations.beta_deg
     with np.errstate(all="ignore"):
-        p2, _ = slump_at_rest(
-            alpha1_deg=blocks.alpha1_deg,
-            alpha3_deg=blocks.alpha3_deg,
-            gamma_deg=realisations.gamma_deg,
-            r1_m=blocks.r1_m,
-            r3_m=blocks.r3_m,
-            beta_deg=realisations.beta_deg,
-            phi_deg=realisations.phi_deg,
-            phi_back_deg=realisations.phi_back_deg,
-            functions=array_elementwise(),
-            trigonometry=np,
-        )
+        own = numbers_of_slumps(
+            ModeShapes(
+                realisations.blocks, "slump", k, beta_deg, realisations.phi_deg,
+                realisations.phi_back_deg, False, backed=True,
+            ),
+            array_elementwise(),
+        )["ps2"]  # fmt: skip
     described = (k > 0.0) & ~realisations.bonded
     slides = realisations.of_mode("slide", "stable") & described
-    slumps = realisations.of_mode("slump", "stable") & described & np.isfinite(p2)
-    beta_deg = realisations.beta_deg[slides]
+    slumps = realisations.of_mode("slump", "stable") & described & np.isfinite(own)
+    slide = {"ky": k[slides], "beta_deg": beta_deg[slides], "displacement_m": distance}
+    slump = {"ks": k[slumps], "ps2": own[slumps], "rotation_deg": rotation_deg}
     questions: tuple[tuple[ModeName, NDArray[np.bool_], dict[str, Any]], ...] = (
-        ("slide", slides, {"ky": k[slides], "beta_deg": beta_deg, "displacement_m": distance}),
-        ("slump", slumps, {"ks": k[slumps], "ps2": p2[slumps], "rotation_deg": rotation_deg}),
-    )
+        ("slide", slides, slide), ("slump", slumps, slump),
+    )  # fmt: skip
     for mode, chosen, block in questions:
         if chosen.any():
             answers = predict(**block, **motion, level=level, db=db)
@@ -333,8 +331,3 @@ def _warnings(
     return warnings + [
         f"{count} of {total} toppling blocks: {sentence}" for sentence, count in tally.items()
     ]
-
-
-def _about_bonds(reason: NDArray[np.object_]) -> tuple[str, ...]:
-    count = int(np.count_nonzero(reason == BONDED))
-    return (f"{count} blocks without an answer: {BONDED}",) if count else ()

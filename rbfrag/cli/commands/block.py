@@ -18,7 +18,6 @@ from rbfrag.cli.parameters.block import MeshOptions
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import block_in_words
 from rbfrag.question.fields import AtRestFields, PlaneFields, ShapeFields, WholeFields
-from rbfrag.solver.stability.modes import ModeName
 
 FREE_STANDING = (
     "rbfrag predict --kind rocking  with the same options and a measure of the motion (--pgv 0.6) "
@@ -72,12 +71,14 @@ def block(
         _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, json=printing.json)
         return
     from rbfrag.question.blocks import on_planes
+    from rbfrag.solver.kinds import kind_of_mode
     from rbfrag.solver.stability.single import stability, stability_as_dict
 
     with given.named():
         body, planes, *_ = on_planes(given)
     result = stability(body, **planes)
-    if planes.get("back_fracture") is False and _rocks(result.mode):
+    unbacked = planes.get("back_fracture") is False
+    if unbacked and kind_of_mode(result.mode, back_fracture=False).free_standing:
         result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))
     if plot is not None:
         from rbfrag.plots.block import plot_block
@@ -103,13 +104,6 @@ def block(
     else:
         print_pairs({name: answer[name] for name in SHORT if answer[name] is not None})
     print_warnings(result.warnings)
-
-
-def _rocks(mode: ModeName) -> bool:
-    """Return whether a block of this mode rocks where nothing backs it."""
-    from rbfrag.solver.kinds import kind_of_mode
-
-    return kind_of_mode(mode, back_fracture=False).free_standing
 
 
 def _mesh(

@@ -9,6 +9,7 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_sentences,
     print_table,
     print_warnings,
     say_when_compiling,
@@ -247,9 +248,7 @@ def _slides(
 
 def _show_slides(document: dict[str, Any], *, verbose: bool) -> None:
     thresholds, rows = document["thresholds"], document["displacements"]
-    for sentence in slides_in_words(document):
-        print(sentence)
-    print()
+    print_sentences(slides_in_words(document))
     names = ["displacement_m", "ky_over_pga", "ky"]
     if verbose:
         print_pairs({name: document[name] for name in ("kind", "polarity", "pga_g")})

@@ -6,7 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import (
+    cell,
+    print_json,
+    print_pairs,
+    print_sentences,
+    print_table,
+    print_warnings,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.sentences import rounded
@@ -103,15 +110,13 @@ def print_report(report: FitReport, printing: options.Printing) -> None:
     if printing.json:
         print_json(report.as_dict())
         return
-    for sentence in fit_in_words(report):
-        print(sentence)
-    print()
+    print_sentences(fit_in_words(report))
     if printing.verbose:
         _print_all(report)
     else:
+        errors = {name: rounded(value) for name, value in report.standard_errors.items()}
         rows = [
-            (name, rounded(value), _rounded(report.standard_errors.get(name)))
-            for name, value in report.coefficients.items()
+            (name, rounded(value), errors.get(name)) for name, value in report.coefficients.items()
         ]
         print_table(("parameter", "value", "standard error"), rows)
     print_warnings(report.warnings)
@@ -134,10 +139,6 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
         return
     ends = f" ({rounded(around[0])} to {rounded(around[1])} by earthquakes)" if around else ""
     yield f"{data}; on those left out its log loss is {rounded(score)}{ends}, the less the better."
-
-
-def _rounded(value: float | None) -> str | None:
-    return None if value is None else rounded(value)
 
 
 def _print_all(report: FitReport) -> None:

@@ -170,10 +170,12 @@ def _print(
             document |= {f"{name}_{law}": value for name, value in bound.items()}
         counts = document.pop("annual_rate_at_least", None)
         print_pairs(document if verbose else _short(document))
-        for some in (counts, branches, rows):
-            if some:
-                print()
-                print_rows(some if verbose else [_short_row(row) for row in some])
+        for some in filter(None, (counts, branches, rows)):
+            print()
+            if not verbose:
+                for row in some:
+                    row.pop("numerical_error", None)
+            print_rows(some if verbose else [rounded_values(row) for row in some])
     else:
         del document["contributions"]
         print(rate_in_words(document))
@@ -194,11 +196,6 @@ def _short(document: dict[str, Any]) -> dict[str, Any]:
     """Return what is shown without --verbose."""
     known = {name: document[name] for name in SHORT if document.get(name) is not None}
     return rounded_values(known)
-
-
-def _short_row(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row of a table without what is shown with --verbose alone."""
-    return rounded_values({name: value for name, value in row.items() if name != "numerical_error"})
 
 
 def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:

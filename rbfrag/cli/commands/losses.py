@@ -15,6 +15,7 @@ from rbfrag.cli.output import (
     print_json,
     print_pairs,
     print_rows,
+    print_sentences,
     print_table,
     print_warnings,
     write_table,
@@ -188,9 +189,7 @@ def _print(answer: LossAnswer, *, verbose: bool) -> None:
     """Print sentences, the numbers, the curve and the rows of the blocks."""
     document: dict[str, Any] = answer.as_dict()
     warnings, rows = document.pop("warnings"), document.pop("blocks")
-    for sentence in losses_in_words(answer):
-        print(sentence)
-    print()
+    print_sentences(losses_in_words(answer))
     curves = {
         name: document.pop(name)
         for name in [*document]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rbfrag.cli.output import print_json, print_warnings
+from rbfrag.cli.output import print_json, print_sentences, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 
@@ -60,8 +60,6 @@ def report(
         rates = None if contents.rate is None else contents.rate.document
         print_json({"file": out, **contents.document, "hazard": rates})
         return
-    for sentence in contents.sentences:
-        print(sentence)
-    print()
+    print_sentences(contents.sentences)
     print(out)
     print_warnings(contents.remarks)

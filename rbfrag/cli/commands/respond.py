@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rbfrag.cli.output import (
     print_json,
     print_pairs,
+    print_sentences,
     print_table,
     print_warnings,
     say_when_compiling,
@@ -241,9 +242,7 @@ def respond(
     answer.pop("warnings")
     changes = answer.pop("mode_changes")
     parts = answer.pop("parts", [])
-    for sentence in response_in_words(answer, response.outcome.advice):
-        print(sentence)
-    print()
+    print_sentences(response_in_words(answer, response.outcome.advice))
     shown = answer if printing.verbose else {name: answer.get(name) for name in SHORT}
     print_pairs({name: value for name, value in shown.items() if value is not None})
     if parts:

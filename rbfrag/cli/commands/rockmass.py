@@ -11,6 +11,7 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_sentences,
     print_table,
     print_warnings,
     say_when_compiling,
@@ -176,9 +177,7 @@ def rockmass(
     if printing.json:
         print_json(document)
         return
-    for sentence in rock_mass_in_words(document):
-        print(sentence)
-    print()
+    print_sentences(rock_mass_in_words(document))
     _print(document, verbose=printing.verbose)
     print_warnings(document["warnings"], ("displacement_m",))
 
@@ -214,8 +213,10 @@ def _print(document: dict[str, Any], *, verbose: bool) -> None:
         ],
     )
     for crossing in document["crossings"]:
+        error = crossing["standard_error_g"]
+        within = "-" if error is None else f"{error:.2g}"
         print(
-            f"counts cross at {crossing['pga_g']:.4g} +- {_short(crossing['standard_error_g'])} g "
+            f"counts cross at {crossing['pga_g']:.4g} +- {within} g "
             f"({cell(crossing['count'])} blocks each): more {_words(crossing['below'])} below, "
             f"more {_words(crossing['above'])} above"
         )
@@ -244,10 +245,6 @@ def _print_scenario(scenario: dict[str, Any]) -> None:
 
 def _probability(answer: dict[str, Any]) -> list[Any]:
     return [answer[key] for key in ("probability", "standard_error", "ci_low", "ci_high")]
-
-
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2g}"
 
 
 def _words(mode: str) -> str:

@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
-from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
+from rbfrag.cli.output import (
+    check_files,
+    print_json,
+    print_pairs,
+    print_sentences,
+    print_warnings,
+    write_table,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
@@ -97,9 +104,7 @@ def shakemap(
     if printing.json:
         print_json(document)
         return
-    for sentence in map_in_words(document, own="lon" in several.columns):
-        print(sentence)
-    print()
+    print_sentences(map_in_words(document, own="lon" in several.columns))
     del document["warnings"]
     short = rounded_values({name: document[name] for name in SHORT})
     print_pairs(document if printing.verbose else short)

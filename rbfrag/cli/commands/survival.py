@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +11,7 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_sentences,
     print_table,
     print_warnings,
 )
@@ -107,10 +107,11 @@ def survival(
 
 def _print(answer: SurvivalAnswer, *, verbose: bool) -> None:
     """Print sentences, the numbers with their intervals, and a table of several curves."""
-    for sentence in survival_in_words(answer):
-        print(sentence)
-    print()
-    shown: Callable[[Any], Any] = cell if verbose else _rounded
+    print_sentences(survival_in_words(answer))
+
+    def shown(value: Any) -> Any:
+        return cell(value) if verbose or not isinstance(value, float) else rounded(value)
+
     ends = {
         "probability_standing": (answer.ci_low, answer.ci_high),
         "factor_5_percent": answer.factor_5_percent_ci,
@@ -133,7 +134,3 @@ def _print(answer: SurvivalAnswer, *, verbose: bool) -> None:
         others = answer.as_dict()
         print_pairs({name: others[name] for name in others if name not in PRINTED})
     print_warnings(answer.warnings)
-
-
-def _rounded(value: Any) -> Any:
-    return rounded(value) if isinstance(value, float) else value

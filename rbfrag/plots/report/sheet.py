@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import (
     new_figure,
 )
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import SYMBOL, Contents, Table
+from rbfrag.plots.report.contents import SYMBOL, Contents
 from rbfrag.plots.report.panels import panels_of
 from rbfrag.version import __version__
 
@@ -68,7 +68,8 @@ def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
-    tables_in = 0.1 + _STEP_IN * max(map(_lines_of, contents.columns()))
+    lines = (sum(1.5 + len(rows) for _, rows in tables) for tables in contents.columns())
+    tables_in = 0.1 + _STEP_IN * max(lines)
     foot_in = 0.35 + 0.13 * len(_foot_lines(contents))
     panels = panels_of(contents)
     rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
@@ -105,10 +106,6 @@ def _wrapped(text: str, letters: int) -> list[str]:
 def _foot_lines(contents: Contents) -> list[str]:
     texts = (*contents.notes(), *contents.versions)
     return [line for text in texts for line in _wrapped(text, _FINE)]
-
-
-def _lines_of(tables: Sequence[Table]) -> float:
-    return sum(1.5 + len(rows) for _, rows in tables)
 
 
 def _shown(text: str) -> str:
