@@ -31,9 +31,6 @@ from rbfrag.errors import (
     MissingExtraError,
 )
 
-BUSY_TIMEOUT_S = 30.0
-"""How long a connection waits for another process's lock [s]."""
-
 CONNECT_TIMEOUT_S = 30.0
 """How long a server may take to answer [s], unless the URL has another ``connect_timeout``."""
 
@@ -55,33 +52,27 @@ def unchecked_engine(
     *,
     read_only: bool = False,
     foreign_keys: bool = True,
-    busy_timeout_s: float = BUSY_TIMEOUT_S,
 ) -> Engine:
     """Return an engine without asking whose database it is, for checks and migrations.
 
     Args:
         place: what :func:`rbfrag.db.location.locate` returned.
         foreign_keys: False lets a migration rebuild a table that others point to (SQLite).
-        busy_timeout_s: how long to wait for another process's lock [s].
     """
     url = sqlalchemy_url(place)
     if isinstance(place, Path):
-        engine = _sqlite_engine(url, place, read_only, foreign_keys, busy_timeout_s)
+        engine = _sqlite_engine(url, place, read_only, foreign_keys)
     else:
         engine = _server_engine(url, read_only)
     event.listen(engine, "handle_error", _raise_explained)
     return engine
 
 
-def _sqlite_engine(
-    url: URL, path: Path, read_only: bool, foreign_keys: bool, busy_timeout_s: float
-) -> Engine:
+def _sqlite_engine(url: URL, path: Path, read_only: bool, foreign_keys: bool) -> Engine:
     path = path.absolute()  # the working directory may change while the engine lives
 
     def connect() -> sqlite3.Connection:
-        raw = connect_sqlite(
-            path, read_only=read_only, busy_timeout_s=busy_timeout_s, check_same_thread=False
-        )
+        raw = connect_sqlite(path, read_only=read_only, check_same_thread=False)
         if not foreign_keys:
             raw.execute("PRAGMA foreign_keys = OFF")
         return raw

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
-from rbfrag.db.connect import BUSY_TIMEOUT_S, database_label, raw_sqlite, unchecked_engine
+from rbfrag.db.connect import database_label, raw_sqlite, unchecked_engine
 from rbfrag.db.location import VERSION_TABLE, check_revision, locate
 from rbfrag.db.sqlite_file import check_sqlite_database
 from rbfrag.errors import NotADatabaseError
@@ -20,7 +20,6 @@ def open_database(
     *,
     create: bool = False,
     read_only: bool = False,
-    busy_timeout_s: float = BUSY_TIMEOUT_S,
 ) -> Engine:
     """Open a database of this rbfrag's schema.
 
@@ -34,7 +33,6 @@ def open_database(
             or else ``rbfrag.db`` in the current folder. ``postgresql://`` goes to psycopg.
         create: make the database when there is none; it appears complete or not at all.
         read_only: forbid writes; works on a file in a folder that cannot be written.
-        busy_timeout_s: how long to wait for another process's lock [s].
 
     Returns:
         An engine that raises the errors of :mod:`rbfrag.errors` for whatever happens to
@@ -50,8 +48,8 @@ def open_database(
         # Imported here: the migrations and Alembic are no business of a reader.
         from rbfrag.db.upgrade import create_if_missing
 
-        create_if_missing(place, busy_timeout_s=busy_timeout_s)
-    engine = unchecked_engine(place, read_only=read_only, busy_timeout_s=busy_timeout_s)
+        create_if_missing(place)
+    engine = unchecked_engine(place, read_only=read_only)
     try:
         # A transaction, so that what cannot be written is found out now and not after hours.
         with engine.begin() as connection:

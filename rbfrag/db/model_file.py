@@ -205,7 +205,7 @@ def _last_of_all(row: ModelRow) -> bool:
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
 
-def recommended(rows: Sequence[ModelRow], kind: str) -> ModelRow | None:
+def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | None:
     """Return the model of a kind that answers when none is named, None where there is none.
 
     That is the one that was chosen, else the one of the least log loss on earthquakes left out,

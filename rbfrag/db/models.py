@@ -59,21 +59,18 @@ def model_rows(connection: Connection) -> list[ModelRow]:
     return with_defaults([decode_model(row) for row in connection.execute(_model_query())])
 
 
-def load_model(
-    connection: Connection, name: str | None = None, *, kind: str = "toppling"
-) -> ModelRow:
+def load_model(connection: Connection, name: str | None = None) -> ModelRow:
     """Return one model.
 
     Args:
-        name: its name; None for the default of a kind
+        name: its name; None for the default of blocks that topple
             (:func:`rbfrag.db.model_file.recommended`).
-        kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.
     """
     if name is None:
-        default = recommended(model_rows(connection), kind)
+        default = recommended(model_rows(connection))
     else:
         query = _model_query().where(fragility_model.c.name == name)
         stored = connection.execute(query).one_or_none()

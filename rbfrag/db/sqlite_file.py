@@ -24,6 +24,8 @@ _MAGIC = b"SQLite format 3\x00"
 # Primary result codes; extended codes hold them in the low byte (sqlite.org/rescode.html).
 _BUSY, _LOCKED, _READONLY, _IOERR, _CORRUPT, _FULL, _CANTOPEN, _NOTADB = 5, 6, 8, 10, 11, 13, 14, 26
 
+BUSY_TIMEOUT_S = 30.0
+"""How long a connection waits for another process's lock [s]."""
 
 LONGEST_WAIT_S: ContextVar[float | None] = ContextVar("LONGEST_WAIT_S", default=None)
 """How long whoever asks waits for a database [s]; None for what each connection waits by itself."""
@@ -73,7 +75,7 @@ def require_sqlite_file(path: Path) -> None:
 
 
 def connect_sqlite(
-    path: Path, *, read_only: bool, busy_timeout_s: float = 30.0, check_same_thread: bool = True
+    path: Path, *, read_only: bool, check_same_thread: bool = True
 ) -> sqlite3.Connection:
     """Open an existing SQLite file with rbfrag's settings.
 
@@ -83,30 +85,26 @@ def connect_sqlite(
     `immutable`, which is safe as long as no -wal file with content lies beside it.
 
     Args:
-        busy_timeout_s: how long to wait for another process's lock [s].
         check_same_thread: as for :func:`sqlite3.connect`.
     """
     require_sqlite_file(path)
     try:
-        busy_timeout_s = min(busy_timeout_s, LONGEST_WAIT_S.get() or busy_timeout_s)
         try:
-            return _connect(path, "mode=rw", read_only, busy_timeout_s, check_same_thread)
+            return _connect(path, "mode=rw", read_only, check_same_thread)
         except sqlite3.Error as error:
             if not read_only or _primary_code(error) not in (_READONLY, _CANTOPEN):
                 raise
             _refuse_unreadable_log(path)
-            return _connect(path, "mode=ro&immutable=1", True, busy_timeout_s, check_same_thread)
+            return _connect(path, "mode=ro&immutable=1", True, check_same_thread)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
 
 
-def _connect(
-    path: Path, mode: str, read_only: bool, busy_timeout_s: float, check_same_thread: bool
-) -> sqlite3.Connection:
+def _connect(path: Path, mode: str, read_only: bool, check_same_thread: bool) -> sqlite3.Connection:
     connection = sqlite3.connect(
         f"{path.absolute().as_uri()}?{mode}",
         uri=True,
-        timeout=busy_timeout_s,
+        timeout=min(BUSY_TIMEOUT_S, LONGEST_WAIT_S.get() or BUSY_TIMEOUT_S),
         isolation_level=None,  # transactions are begun by hand: the module's own are half of them
         check_same_thread=check_same_thread,
     )

@@ -108,7 +108,7 @@ def _require_sound_references(connection: Connection) -> None:
         )
 
 
-def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
+def create_if_missing(place: Path | str) -> None:
     """Make the database at `place` unless something is there already.
 
     An SQLite file is built under another name in the same folder and given its own name when
@@ -117,7 +117,6 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
 
     Args:
         place: what :func:`rbfrag.db.location.locate` returned.
-        busy_timeout_s: how long to wait for another process's lock [s].
     """
     if isinstance(place, str):
         _create_on_server(place)
@@ -137,7 +136,7 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
         ) from error
     draft = _draft_file(place, folder)
     try:
-        _build(draft, busy_timeout_s)
+        _build(draft)
         _give_name(draft, place)
     except OSError as error:
         raise DatabaseError(
@@ -195,7 +194,7 @@ def _draft_file(place: Path, folder: Path) -> Path:
     return draft
 
 
-def _build(draft: Path, busy_timeout_s: float) -> None:
+def _build(draft: Path) -> None:
     try:
         raw = sqlite3.connect(draft, isolation_level=None)
         try:
@@ -205,7 +204,7 @@ def _build(draft: Path, busy_timeout_s: float) -> None:
             raw.close()
     except sqlite3.Error as error:
         raise explained_sqlite_error(error, draft) from error
-    engine = unchecked_engine(draft, foreign_keys=False, busy_timeout_s=busy_timeout_s)
+    engine = unchecked_engine(draft, foreign_keys=False)
     try:
         migrate(engine)
     finally:

@@ -24,7 +24,7 @@ from rbfrag.motions.polarity import FloatArray
 ComplexArray = NDArray[np.complex128]
 
 DAMPING = 0.05
-"""Damping ratio of the spectral accelerations that are stored."""
+"""Damping ratio ζ of the spectral accelerations."""
 
 PERIODS_S: Mapping[str, float] = {
     "sa03_g": 0.3, "sa05_g": 0.5, "sa10_g": 1.0, "sa20_g": 2.0, "sa30_g": 3.0,
@@ -61,18 +61,17 @@ def spectral_accelerations(acceleration_g: FloatArray, interval_s: FloatArray) -
 
 
 def spectral_acceleration(
-    acceleration_g: FloatArray, interval_s: FloatArray, period_s: float, damping: float = DAMPING
+    acceleration_g: FloatArray, interval_s: FloatArray, period_s: float
 ) -> float:
-    """Return the pseudo-spectral acceleration ω² max|u| [g] of one oscillator.
+    """Return the pseudo-spectral acceleration ω² max|u| [g] of one oscillator, 5 % damped.
 
     Args:
         acceleration_g: samples [g], shape (n,), n >= 1.
         interval_s: lengths of the intervals between them [s], shape (n - 1,), >= 0.
         period_s: natural period of the undamped oscillator [s].
-        damping: damping ratio ζ, above 0 and below 1.
     """
     omega = 2.0 * math.pi / period_s
-    root = omega * complex(-damping, math.sqrt(1.0 - damping * damping))
+    root = omega * complex(-DAMPING, math.sqrt(1.0 - DAMPING * DAMPING))
     scale = float(np.max(np.abs(acceleration_g)))
     if scale == 0.0:
         return 0.0

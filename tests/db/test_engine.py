@@ -266,12 +266,13 @@ class TestRefusals:
         with pytest.raises(DatabaseError, match="damaged"):
             open_database(sqlite_file)
 
-    def test_locked(self, sqlite_file: Path) -> None:
+    def test_locked(self, sqlite_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("rbfrag.db.sqlite_file.BUSY_TIMEOUT_S", 0.01)
         other = sqlite3.connect(sqlite_file, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
         try:
             with pytest.raises(DatabaseBusyError, match="locked by another process"):
-                open_database(sqlite_file, busy_timeout_s=0.01)
+                open_database(sqlite_file)
             with opened_database(sqlite_file, read_only=True) as reader:
                 assert _count(reader) == 0
         finally:
@@ -365,12 +366,13 @@ def test_a_message_never_shows_the_password() -> None:
     assert label == "postgresql://u:***@h:1/n"
 
 
-def test_two_writers_take_turns(sqlite_file: Path) -> None:
+def test_two_writers_take_turns(sqlite_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rbfrag.db.sqlite_file.BUSY_TIMEOUT_S", 0.01)
     # BEGIN IMMEDIATE: the second waits at its beginning instead of failing in its middle.
     with opened_database(sqlite_file) as engine, engine.begin() as first:
         insert_row(first, suite, {"name": "a"})
         with pytest.raises(DatabaseBusyError):
-            open_database(sqlite_file, busy_timeout_s=0.01)
+            open_database(sqlite_file)
     with opened_database(sqlite_file) as engine:
         assert _count(engine) == 1
 

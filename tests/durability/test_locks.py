@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-import rbfrag.db.engine
 from benchmarks.database_content import content_digest
 from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.simulate import CampaignProgress, simulate
@@ -28,8 +27,7 @@ __all__ = ["refuses", "shell"]
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    defaults = rbfrag.db.engine.open_database.__kwdefaults__
-    monkeypatch.setitem(defaults, "busy_timeout_s", 0.05)
+    monkeypatch.setattr("rbfrag.db.sqlite_file.BUSY_TIMEOUT_S", 0.05)
 
 
 def test_a_locked_database(
