@@ -17,7 +17,7 @@ from rbfrag.bench.timing import timed
 from rbfrag.solver.excitation import Excitation, Nodes, excitation
 from rbfrag.solver.integrator.batch import IntArray
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.single_run import HANDED, run_toppling
+from rbfrag.solver.integrator.single_run import run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
 from rbfrag.solver.results import FloatArray
@@ -38,15 +38,14 @@ def run_blocks(
     real: FloatArray,
 ) -> None:
     """Run one block after another over one record; arguments as of `run_batch`."""
-    # made once for all blocks: the coefficients of a step, and neither history nor hand-over
+    # made once for all blocks: the coefficients of a step, and no history
     u = np.empty(9)
     no_rows = np.empty((4, 0))
-    to_the_end = np.empty(0, HANDED)
     for j in range(kr.size):
         (
             whole[0, j], real[0, j], real[1, j], real[2, j], real[3, j],
             whole[1, j], whole[2, j], _,
-        ) = run_toppling(nodes, kr[j], p[j], order, ph_max, no_rows, to_the_end, u)  # fmt: skip
+        ) = run_toppling(nodes, kr[j], p[j], order, ph_max, no_rows, u)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

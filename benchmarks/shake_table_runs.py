@@ -28,8 +28,9 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver import toppling_run
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_rocking import TOPPLED
+from rbfrag.solver.integrator.state import corner
 from rbfrag.solver.results import NUMERICS_VERSION
-from rbfrag.solver.rocking_run import FreeBlock, corner, simulate
+from rbfrag.solver.rocking_run import FreeBlock, simulate
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -212,7 +213,8 @@ def run_blocks(acceleration_g: FloatArray) -> tuple[Codes, Codes]:
 
 def free_block(forward_kr: float, backward_kr: float, e: float) -> FreeBlock:
     """Return a block on level ground by its strengths; its outline is not needed."""
-    return FreeBlock(corner(forward_kr, P2, e), corner(backward_kr, P2, e), 0.0, (0.0, 0.0), 0.0)
+    p = math.sqrt(P2)
+    return FreeBlock(corner(forward_kr, p, e), corner(backward_kr, p, e), 0.0, (0.0, 0.0), 0.0)
 
 
 def overturned(codes: Codes) -> FloatArray:

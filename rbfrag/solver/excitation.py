@@ -19,16 +19,28 @@ BLOCK = 16
 
 
 class Nodes(NamedTuple):
-    """An excitation as the kernel of the single run takes it; see :class:`Excitation`."""
+    """An excitation as the kernels take it; the names are those of :class:`Excitation`.
+
+    Args:
+        time_s: node times [s], shape (n,).
+        interval_s: interval lengths [s], shape (n - 1,).
+        k_h: driving acceleration at the nodes [g], shape (n,).
+        w: 1 + k_v at the nodes, shape (n,).
+        tail_min_q: least k_h/(1 + k_v) from each node on, rest after the record included.
+        block_max_q: greatest k_h/(1 + k_v) of each block of `BLOCK` nodes.
+        block_min_q: least of it.
+        last: last node with 1 + k_v > 0: the models hold up to it, and after the record if it is
+            the last of all.
+    """
 
     time_s: FloatArray
     interval_s: FloatArray
     k_h: FloatArray
     w: FloatArray
-    q: FloatArray
     tail_min_q: FloatArray
     block_max_q: FloatArray
-    jump_node: int
+    block_min_q: FloatArray
+    last: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,28 +102,22 @@ class Excitation:
     @cached_property
     def block_max_q(self) -> FloatArray:
         """Greatest q of each block of `BLOCK` nodes."""
-        n = self.q.size
-        filled = np.full(-(-n // BLOCK) * BLOCK, -np.inf)
-        filled[:n] = self.q
-        largest: FloatArray = filled.reshape(-1, BLOCK).max(axis=1)
-        return largest
+        return np.maximum.reduceat(self.q, np.arange(0, self.q.size, BLOCK))
+
+    @cached_property
+    def block_min_q(self) -> FloatArray:
+        """Least q of each block of `BLOCK` nodes."""
+        return np.minimum.reduceat(self.q, np.arange(0, self.q.size, BLOCK))
 
     @cached_property
     def nodes(self) -> Nodes:
         """What a kernel needs of all this."""
         return Nodes(
-            self.time_s, self.interval_s, self.k_h, self.w, self.q, self.tail_min_q,
-            self.block_max_q, self.jump_node,
+            self.time_s, self.interval_s, self.k_h, self.w, self.tail_min_q,
+            self.block_max_q, self.block_min_q,
+            # nothing is integrated through a jump: the models end at the last node in contact
+            min(self.k_h.size, self.jump_node) - 1,
         )  # fmt: skip
-
-    @cached_property
-    def block_min_q(self) -> FloatArray:
-        """Least q of each block of `BLOCK` nodes."""
-        n = self.q.size
-        filled = np.full(-(-n // BLOCK) * BLOCK, np.inf)
-        filled[:n] = self.q
-        least: FloatArray = filled.reshape(-1, BLOCK).min(axis=1)
-        return least
 
     @cached_property
     def min_q(self) -> float:

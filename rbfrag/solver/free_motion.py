@@ -36,7 +36,6 @@ from rbfrag.solver.integrator.free_body import (
 )
 from rbfrag.solver.integrator.impulses import Corners, work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
-from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
@@ -309,7 +308,7 @@ def _run(
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)
-    record = record_of(excited)
+    record = excited.nodes
     size = 4 * excited.time_s.size + 200_000
     while True:
         # what is kept at one time lies together: a run touches little of the memory

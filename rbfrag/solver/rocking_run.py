@@ -9,10 +9,10 @@ import numpy as np
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.free_rocking import TOPPLED, Corner
-from rbfrag.solver.integrator.one_freedom.state import record_of
+from rbfrag.solver.integrator.free_rocking import TOPPLED
+from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.two_corners import IMPACT, RockingRun, Rules, run_rocking
+from rbfrag.solver.integrator.two_corners import IMPACT, RockingRules, RockingRun, run_rocking
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.results import FloatArray, ResponseHistory
 
@@ -56,19 +56,6 @@ class FreeBlock:
         return REST_SPEED * self.slowest_p * min(self.toe.theta_c, self.heel.theta_c)
 
 
-def corner(kr: float, p2: float, passed_on: float) -> Corner:
-    """Return a corner.
-
-    Args:
-        kr: tangent of its critical angle, above 0.
-        p2: its frequency parameter p² [1/s²].
-        passed_on: part of the speed left after an impact that ends the rotation about it.
-    """
-    # from k_r itself: by way of the angle both would be rounded twice
-    cos = 1.0 / math.sqrt(1.0 + kr * kr)
-    return Corner(kr, math.atan(kr), kr * cos, cos, math.sqrt(p2), passed_on)
-
-
 def simulate(
     excited: Excitation,
     block: FreeBlock,
@@ -85,9 +72,9 @@ def simulate(
         order: order of the step; for convergence studies.
         ph_max: greatest p·h of a step; for convergence studies.
     """
-    rules = Rules(order, ph_max, block.rest_speed, MOST_IMPACTS)
+    rules = RockingRules(order, ph_max, block.rest_speed, MOST_IMPACTS)
     return run_rocking(
-        record_of(excited), excited.tail_max_q, block.toe, block.heel, rules, rows, np.empty(9)
+        excited.nodes, excited.tail_max_q, block.toe, block.heel, rules, rows, np.empty(9)
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.integrator.single_run import HANDED, TOPPLED, Run, run_toppling
+from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.quantity import finite_or_none, positive
@@ -19,7 +19,6 @@ from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
 
-_TO_THE_END = np.empty(0, HANDED)
 _NO_HISTORY = np.empty((4, 0))
 
 MOST_STEPS = 1e8
@@ -83,9 +82,7 @@ def simulate(
 ) -> Run:
     """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
     p = math.sqrt(p2)
-    return Run(
-        *run_toppling(excited.nodes, kr, p, order, ph_max, _NO_HISTORY, _TO_THE_END, np.empty(9))
-    )
+    return Run(*run_toppling(excited.nodes, kr, p, order, ph_max, _NO_HISTORY, np.empty(9)))
 
 
 def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
@@ -93,9 +90,7 @@ def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
     nodes, p = excited.nodes, math.sqrt(p2)
 
     def run(kr: float) -> Run:
-        return Run(
-            *run_toppling(nodes, kr, p, ORDER, PH_MAX, _NO_HISTORY, _TO_THE_END, np.empty(9))
-        )
+        return Run(*run_toppling(nodes, kr, p, ORDER, PH_MAX, _NO_HISTORY, np.empty(9)))
 
     return run
 
@@ -116,7 +111,7 @@ def _history(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     longer = with_free_motion(excited, p)
     # nodes, and at most a start, a peak and an impact twice in an interval
     rows = np.empty((4, 7 * longer.time_s.size + 8))
-    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, _TO_THE_END, np.empty(9)))
+    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, np.empty(9)))
     kept = rows[:, : run.history_length]
     return node_history(excited, longer, kept, toppled=run.outcome == TOPPLED)
 

@@ -87,6 +87,24 @@ def simple_turn(
 
 
 @within
+def eventful(
+    theta: float,
+    theta_end: float,
+    u_start: float,
+    v_start: float,
+    u_end: float,
+    v_end: float,
+    peak: float,
+    drift: float,
+) -> bool:
+    """Whether a step may hold an impact or a peak that counts; see :func:`simple_turn`."""
+    return theta_end <= 0.0 or (
+        not keeps_direction(u_start, v_start, u_end, v_end)
+        and not simple_turn(theta, theta_end, u_start, v_start, u_end, v_end, peak, drift)
+    )
+
+
+@within
 def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float) -> bool:
     """Whether a block has toppled whatever comes, though its state errs by `error`.
 

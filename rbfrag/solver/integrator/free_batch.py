@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.excitation import Excitation, Nodes
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import STABLE, Corner
-from rbfrag.solver.integrator.one_freedom.state import Record, record_of
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.two_corners import Rules, run_rocking
+from rbfrag.solver.integrator.two_corners import RockingRules, run_rocking
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -36,7 +35,7 @@ class FreeRuns:
 
 @kernel
 def run_free_blocks(
-    records: tuple[Record, Record, Record],
+    excitations: tuple[Nodes, Nodes, Nodes],
     tails: tuple[FloatArray, FloatArray, FloatArray],
     corners: FloatArray,
     slowest: FloatArray,
@@ -48,7 +47,7 @@ def run_free_blocks(
     """Run one block after another, each under the motion and under two that are all but equal.
 
     Args:
-        records: the motion, and the same times a little more and a little less.
+        excitations: the motion, and the same times a little more and a little less.
         tails: greatest k_h/(1 + k_v) from each node on, of each.
         corners: numbers of both corners of each block, toe before heel, shape (n, 2, 6).
         slowest: speed after an impact below which each block rests [rad/s], shape (n,).
@@ -64,8 +63,8 @@ def run_free_blocks(
         c = corners[j]
         toe = Corner(c[0, 0], c[0, 1], c[0, 2], c[0, 3], c[0, 4], c[0, 5])
         heel = Corner(c[1, 0], c[1, 1], c[1, 2], c[1, 3], c[1, 4], c[1, 5])
-        rules = Rules(ORDER, PH_MAX, slowest[j], most_impacts)
-        run = run_rocking(records[0], tails[0], toe, heel, rules, no_rows, u)
+        rules = RockingRules(ORDER, PH_MAX, slowest[j], most_impacts)
+        run = run_rocking(excitations[0], tails[0], toe, heel, rules, no_rows, u)
         outcome[j] = run.outcome
         theta_n[j] = np.nan
         if run.outcome == STABLE:
@@ -74,7 +73,7 @@ def run_free_blocks(
         # one other outcome is enough: most sensitive blocks cost two runs, not three
         for i in (1, 2):
             if sensitive[j] == 0:
-                other = run_rocking(records[i], tails[i], toe, heel, rules, no_rows, u)
+                other = run_rocking(excitations[i], tails[i], toe, heel, rules, no_rows, u)
                 sensitive[j] = 1 if other.outcome != run.outcome else 0
 
 
@@ -95,12 +94,19 @@ def simulate_free(
         change: relative change of the motion that sensitive outcomes are told by.
     """
     more, less = excited.scaled(1.0 + change), excited.scaled(1.0 - change)
-    records = (record_of(excited), record_of(more), record_of(less))
+    excitations = (excited.nodes, more.nodes, less.nodes)
     tails = (excited.tail_max_q, more.tail_max_q, less.tail_max_q)
     runs = FreeRuns(
         np.empty(slowest.size, np.int64), np.empty(slowest.size), np.empty(slowest.size, np.int64)
     )
     run_free_blocks(
-        records, tails, corners, slowest, most_impacts, runs.outcome, runs.theta_n, runs.sensitive
+        excitations,
+        tails,
+        corners,
+        slowest,
+        most_impacts,
+        runs.outcome,
+        runs.theta_n,
+        runs.sensitive,
     )
     return runs

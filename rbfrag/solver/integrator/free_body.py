@@ -14,9 +14,9 @@ import math
 from typing import NamedTuple
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.impulses import CONVERGED, Corners, Velocity, Work, after_impulses
-from rbfrag.solver.integrator.one_freedom.state import Record
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -248,7 +248,7 @@ def stop_of(frame: Frame, at: Motion) -> int:
 
 @bare_kernel
 def run_free(
-    record: Record,
+    record: Nodes,
     corners: Corners,
     frame: Frame,
     start_s: float,

@@ -7,32 +7,12 @@ from typing import NamedTuple
 
 from rbfrag.solver.integrator.compiled import inner_kernel, within
 from rbfrag.solver.integrator.events import upright_rate
-from rbfrag.solver.integrator.one_freedom.state import Peak, higher
-from rbfrag.solver.integrator.state import State
+from rbfrag.solver.integrator.state import Corner, Peak, State, higher
 
 STABLE, TOPPLED = 0, 1
 
 IMPACTS_THAT_DECIDE = 2
 """Impacts after which speeds about each corner only fall: the product of both ratios is <= 1."""
-
-
-class Corner(NamedTuple):
-    """A corner that the block turns about.
-
-    Args:
-        kr: tangent of its critical angle: k_h that lifts the other corner where 1 + k_v = 1.
-        theta_c: critical angle [rad].
-        p: frequency parameter [1/s].
-        passed_on: part of the speed that an impact leaves, where the pivot changes from this
-            corner to the other.
-    """
-
-    kr: float
-    theta_c: float
-    sin: float
-    cos: float
-    p: float
-    passed_on: float
 
 
 class Offset(NamedTuple):

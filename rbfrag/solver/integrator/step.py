@@ -1,10 +1,13 @@
-"""What one step of a rotating block does to the error of its motion."""
+"""One step of a rotating block: where it leads, and what it does to the error of the motion."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from rbfrag.solver.integrator.compiled import within
 from rbfrag.solver.integrator.state import State, StepExcitation
-from rbfrag.solver.integrator.taylor import MACHINE_EPSILON
+from rbfrag.solver.integrator.taylor import MACHINE_EPSILON, taylor_step, turn
+from rbfrag.solver.results import FloatArray
 
 
 @within
@@ -57,3 +60,61 @@ def step_errors(
 def drift_of_step(ph: float, error: float, truncation: float, theta_end: float) -> float:
     """Return what a step adds to the error of theta: theta' errs by `error`, theta by rounding."""
     return ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
+
+
+class StepRules(NamedTuple):
+    """How an interval is cut into steps.
+
+    Args:
+        order: degree of the Taylor step: 4, 5, 6 or 8.
+        ph_max: greatest p·h of one step.
+    """
+
+    order: int
+    ph_max: float
+
+
+class StepResult(NamedTuple):
+    """What a step leads to; U = h theta', with the length of the step as unit of time.
+
+    Args:
+        theta: rotation at its end [rad].
+        turned: what it has grown by.
+        u_start: U at its start.
+        v_start: the derivative of U there.
+        u_end: U at its end.
+        v_end: the derivative of U there.
+        growth, truncation, rounding: see :func:`step_errors`.
+    """
+
+    theta: float
+    turned: float
+    u_start: float
+    v_start: float
+    u_end: float
+    v_end: float
+    growth: float
+    truncation: float
+    rounding: float
+
+
+@within
+def take_step(
+    order: int, u: FloatArray, ph: float, state: State, shaking: StepExcitation
+) -> StepResult:
+    """Take one step, and estimate its errors; `u` is filled as by `taylor_step`."""
+    u_start = ph * state.rate
+    # exact up to its truncation where k_h and k_v are straight lines: it ends at a kink
+    turned, u_end, v_end = taylor_step(order, u, u_start, ph, state.sin, state.cos, shaking)
+    highest = (u[order - 2], u[order - 1], u[order])
+    growth, truncation, rounding = step_errors(order, ph, state, shaking, turned, highest)
+    return StepResult(
+        state.theta + turned, turned, u_start, u[1], u_end, v_end, growth, truncation, rounding
+    )
+
+
+@within
+def state_after(state: State, step: StepResult, ph: float) -> State:
+    """Return the state of the block at the end of a step."""
+    s, c = turn(state.sin, state.cos, step.turned)
+    return State(step.theta, step.u_end / ph, s, c)

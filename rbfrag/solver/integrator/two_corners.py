@@ -16,19 +16,25 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
-from rbfrag.solver.integrator.events import (
-    examine_descent,
-    irrecoverable,
-    keeps_direction,
-    simple_turn,
+from rbfrag.solver.integrator.events import eventful, examine_descent, irrecoverable
+from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED, Offset, after_record
+from rbfrag.solver.integrator.rest import Thresholds, depart
+from rbfrag.solver.integrator.state import (
+    EVENT,
+    Corner,
+    Peak,
+    Place,
+    State,
+    StepExcitation,
+    excitation_over,
+    higher,
+    noted,
+    time_of_jump,
 )
-from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED, Corner, Offset, after_record
-from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
-from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
-from rbfrag.solver.integrator.state import Place, State, StepExcitation, time_of_jump
-from rbfrag.solver.integrator.step import step_errors
-from rbfrag.solver.integrator.taylor import even_parts, taylor_step, turn
+from rbfrag.solver.integrator.step import state_after, take_step
+from rbfrag.solver.integrator.taylor import even_parts
 from rbfrag.solver.results import FloatArray
 
 UNDETERMINED, JUMP = 2, 3
@@ -36,11 +42,11 @@ UNDETERMINED, JUMP = 2, 3
 PAST_BALANCE = 1.4
 """Rotation beyond the balance point at which a block has overturned [rad]."""
 
-EVENT, IMPACT = -1, -2
-"""What stands for the node of an event between nodes; of what follows an impact."""
+IMPACT = -2
+"""What stands in a history for the node of what follows an impact; see `EVENT`."""
 
 
-class Rules(NamedTuple):
+class RockingRules(NamedTuple):
     """How a run is integrated.
 
     Args:
@@ -66,7 +72,7 @@ class RockingRun(NamedTuple):
         backward: the same about the heel.
         error: estimated error of the rotation where the run ended [rad].
         started_s: first motion [s].
-        verdict_s: when overturning, or the throw, was certain [s].
+        verdict_s: when overturning, or the jump, was certain [s].
         impacts: impacts within the record.
         steps: integration steps.
         samples_moved: sample intervals in which the block moved.
@@ -86,7 +92,7 @@ class RockingRun(NamedTuple):
     history_length: int
 
 
-class Crossing(NamedTuple):
+class RockingArcEnd(NamedTuple):
     """What the rest of an interval brought.
 
     Args:
@@ -134,9 +140,9 @@ def carried(off: Offset, ph: float, stiffness: float, noise: float) -> Offset:
 
 @within
 def cross_interval(
-    record: Record,
+    nodes: Nodes,
     corner: Corner,
-    rules: Rules,
+    rules: RockingRules,
     side: int,
     place: Place,
     start: tuple[State, Offset, Peak],
@@ -144,11 +150,11 @@ def cross_interval(
     rows: FloatArray,
     filled: int,
     u: FloatArray,
-) -> Crossing:
+) -> RockingArcEnd:
     """Integrate from a place to the end of its interval, or to an impact before it.
 
     Args:
-        record: the excitation.
+        nodes: the excitation.
         corner: the corner that the block turns about.
         side: 1 for the toe, -1 for the heel.
         place: where to begin.
@@ -158,60 +164,51 @@ def cross_interval(
         filled: how many of its columns are.
         u: work, shape (9,).
     """
-    (theta, rate, s, c), off, peak = start
+    state, off, peak = start
     i, tau = place.interval, place.fraction
-    a0, a1 = side * record.k_h[i], side * record.k_h[i + 1]
-    w0, w1 = record.w[i], record.w[i + 1]
     order = rules.order
     keeps = rows.shape[1] > 0
     impact_at = -1.0
     steps = 0
-    whole = corner.p * (record.interval_s[i] * (1.0 - tau))
+    fallen = False
+    whole = corner.p * (nodes.interval_s[i] * (1.0 - tau))
     parts, part, ph = even_parts(whole, 1.0 - tau, rules.ph_max)
     for number in range(parts):
         at = tau + number * part
-        shaking = StepExcitation(
-            a0 + (a1 - a0) * at, (a1 - a0) * part, w0 + (w1 - w0) * at, (w1 - w0) * part
-        )
+        forward = excitation_over(nodes.k_h, nodes.w, i, at, part)
+        # rotation about the heel is the mirror image
+        shaking = StepExcitation(side * forward.k_h, side * forward.dk_h, forward.w, forward.dw)
+        step = take_step(order, u, ph, state, shaking)
         steps += 1
-        u_start = ph * rate
-        turned, u_end, v_end = taylor_step(order, u, u_start, ph, s, c, shaking)
-        theta_end = theta + turned
-        highest = (u[order - 2], u[order - 1], u[order])
-        _, truncation, rounding = step_errors(
-            order, ph, State(theta, rate, s, c), shaking, turned, highest
-        )
-        off = carried(off, ph, shaking.k_h * s + shaking.w * c, truncation + rounding)
+        stiffness = shaking.k_h * state.sin + shaking.w * state.cos
+        off = carried(off, ph, stiffness, step.truncation + step.rounding)
+        least = -1.0 if keeps else peak.x  # a history has all peaks
         if lifting:
             # a threshold exceeded by less than rounding may seem to pull the block back
             lifting = False
-            if theta_end <= 0.0 or u_end <= 0.0:
-                impact_at, rate = at + part, 0.0
-        elif theta_end <= 0.0 or (
-            not keeps_direction(u_start, u[1], u_end, v_end)
-            # a history has all peaks
-            and (
-                keeps or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak.x, 0.0)
+            if step.theta <= 0.0 or step.u_end <= 0.0:
+                impact_at, state = at + part, State(0.0, 0.0, corner.sin, corner.cos)
+        elif eventful(
+            state.theta, step.theta, step.u_start, step.v_start, step.u_end, step.v_end,
+            least, math.inf if keeps else 0.0,
+        ):  # fmt: skip
+            inside = examine_descent(
+                state.theta, u, order, step.theta, step.u_end, step.v_end, least
             )
-        ):
-            least = -1.0 if keeps else peak.x
-            inside = examine_descent(theta, u, order, theta_end, u_end, v_end, least)
             peak = higher(peak, inside.peak, abs(off.theta))
             if keeps and inside.peak > 0.0:
-                top_s = record.time_s[i] + (at + part * inside.peak_at) * record.interval_s[i]
+                top_s = nodes.time_s[i] + (at + part * inside.peak_at) * nodes.interval_s[i]
                 filled = noted(rows, filled, top_s, side * inside.peak, 0.0, EVENT)
             if inside.impact >= 0.0:
                 impact_at = at + part * inside.impact
-                rate = inside.rate / ph
+                state = State(0.0, inside.rate / ph, corner.sin, corner.cos)
         if impact_at >= 0.0:
             break
-        theta = theta_end
-        rate = u_end / ph
-        s, c = turn(s, c, turned)
-        if theta > corner.theta_c + PAST_BALANCE:
+        state = state_after(state, step, ph)
+        fallen = state.theta > corner.theta_c + PAST_BALANCE
+        if fallen:
             break
-    fallen = theta > corner.theta_c + PAST_BALANCE
-    return Crossing(State(theta, rate, s, c), off, peak, impact_at, fallen, steps, filled)
+    return RockingArcEnd(state, off, peak, impact_at, fallen, steps, filled)
 
 
 @inner_kernel
@@ -256,33 +253,33 @@ class Landed(NamedTuple):
 
 @inner_kernel
 def through_impact(
-    record: Record,
+    nodes: Nodes,
     place: Place,
     side: int,
     corner: Corner,
     other: Corner,
-    rules: Rules,
-    crossing: Crossing,
+    rules: RockingRules,
+    arc: RockingArcEnd,
 ) -> Landed:
     """Return what follows an impact at a place: rest, or rotation about the other corner.
 
     Args:
-        record: the excitation.
+        nodes: the excitation.
         side: the present corner, 1 or -1.
         rules: how to integrate.
-        crossing: how the block came to the impact.
+        arc: how the block came to the impact.
     """
-    rate = crossing.state.rate
+    rate = arc.state.rate
     # of theta' itself: theta'/p changes with the corner, whose p is its own
     speed = -rate * corner.p * corner.passed_on
     # also where the block is so stocky that angular momentum would turn it back
     if speed < rules.slowest:
         return Landed(0, State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0), 0.0)
     i, tau = place.interval, place.fraction
-    k_h = side * (record.k_h[i] + (record.k_h[i + 1] - record.k_h[i]) * tau)
-    w = record.w[i] + (record.w[i + 1] - record.w[i]) * tau
+    k_h = side * (nodes.k_h[i] + (nodes.k_h[i + 1] - nodes.k_h[i]) * tau)
+    w = nodes.w[i] + (nodes.w[i + 1] - nodes.w[i]) * tau
     rate_after = speed / other.p
-    off = error_after_impact(crossing.off, corner, other, rate, rate_after, k_h, w)
+    off = error_after_impact(arc.off, corner, other, rate, rate_after, k_h, w)
     return Landed(-side, State(0.0, rate_after, other.sin, other.cos), off, speed)
 
 
@@ -295,7 +292,7 @@ def noted_impact(
     return noted(rows, filled, time_s, 0.0, rate_after, IMPACT)
 
 
-class End(NamedTuple):
+class RockingEnd(NamedTuple):
     """How a run ended; see :class:`RockingRun`."""
 
     outcome: int
@@ -307,47 +304,47 @@ class End(NamedTuple):
 
 @inner_kernel
 def end_of_run(
-    record: Record,
+    nodes: Nodes,
     toe: Corner,
     heel: Corner,
-    rules: Rules,
+    rules: RockingRules,
     side: int,
     state: State,
     off: Offset,
     peaks: tuple[Peak, Peak],
     impacts: int,
-) -> End:
+) -> RockingEnd:
     """Return how a run ends that nothing decided before its last node; arguments as there."""
     forward, backward = peaks
-    last = record.last
-    if last < record.k_h.size - 1:  # the vertical motion throws the block
-        thrown_s = time_of_jump(record.time_s, record.interval_s, record.w, last)
-        return End(JUMP, 0, thrown_s, forward, backward)
+    last = nodes.last
+    if last < nodes.k_h.size - 1:  # 1 + k_v reaches zero
+        jump_s = time_of_jump(nodes.time_s, nodes.interval_s, nodes.w, last)
+        return RockingEnd(JUMP, 0, jump_s, forward, backward)
     if impacts > rules.most_impacts:
-        return End(UNDETERMINED, 0, math.nan, forward, backward)
+        return RockingEnd(UNDETERMINED, 0, math.nan, forward, backward)
     if side == 0:
-        return End(STABLE, 0, math.nan, forward, backward)
+        return RockingEnd(STABLE, 0, math.nan, forward, backward)
     free = after_record(toe, heel, side, state, off, rules.slowest)
-    verdict_s = record.time_s[last] if free.outcome == TOPPLED else math.nan
+    verdict_s = nodes.time_s[last] if free.outcome == TOPPLED else math.nan
     forward = higher(forward, free.forward.x, free.forward.error)
     backward = higher(backward, free.backward.x, free.backward.error)
-    return End(free.outcome, free.side, verdict_s, forward, backward)
+    return RockingEnd(free.outcome, free.side, verdict_s, forward, backward)
 
 
 @bare_kernel
 def run_rocking(
-    record: Record,
+    nodes: Nodes,
     tail_max_q: FloatArray,
     toe: Corner,
     heel: Corner,
-    rules: Rules,
+    rules: RockingRules,
     rows: FloatArray,
     u: FloatArray,
 ) -> RockingRun:
     """Run one block over one record.
 
     Args:
-        record: the excitation.
+        nodes: the excitation.
         tail_max_q: greatest k_h/(1 + k_v) from each node on, rest after the record included.
         toe: the corner of forward rotation.
         heel: that of backward rotation.
@@ -357,7 +354,7 @@ def run_rocking(
             goes on after the verdict until the block lies beyond recovery.
         u: work, shape (9,).
     """
-    time_s, interval_s, last = record.time_s, record.interval_s, record.last
+    time_s, interval_s, last = nodes.time_s, nodes.interval_s, nodes.last
     # theta'' at rest is that of k_h - w tan(theta_c) forward, of -(k_h + w tan(theta_c)) backward
     level = Thresholds(1.0, toe.kr, 1.0, -heel.kr, True)
     keeps = rows.shape[1] > 0
@@ -373,7 +370,7 @@ def run_rocking(
 
     while i < last and impacts <= rules.most_impacts and (keeps or math.isnan(decided_s)):
         if side == 0:
-            start = depart(record, level, Place(i, tau), barred)
+            start = depart(nodes, level, Place(i, tau), barred)
             i, tau = start.place.interval, start.place.fraction
             if start.sense == 0 or i >= last:
                 break
@@ -396,28 +393,28 @@ def run_rocking(
         if i != counted:
             counted = i
             samples += 1
-        crossing = cross_interval(
-            record, corner, rules, side, Place(i, tau),
+        arc = cross_interval(
+            nodes, corner, rules, side, Place(i, tau),
             (state, off, forward if side > 0 else backward), lifting, rows, filled, u,
         )  # fmt: skip
         lifting = False
-        steps += crossing.steps
-        filled = crossing.filled
+        steps += arc.steps
+        filled = arc.filled
         if side > 0:
-            forward = crossing.peak
+            forward = arc.peak
         else:
-            backward = crossing.peak
-        if crossing.impact_at >= 0.0:
+            backward = arc.peak
+        if arc.impact_at >= 0.0:
             # back on its base where it was lifted: rounding has undone the start
-            stuck = crossing.impact_at <= tau
-            tau = min(crossing.impact_at, 1.0)
+            stuck = arc.impact_at <= tau
+            tau = min(arc.impact_at, 1.0)
             other = heel if side > 0 else toe
-            landed = through_impact(record, Place(i, tau), side, corner, other, rules, crossing)
+            landed = through_impact(nodes, Place(i, tau), side, corner, other, rules, arc)
             # a start that is undone has no speed, and is no impact
-            if crossing.state.rate < 0.0:
+            if arc.state.rate < 0.0:
                 impacts += 1
                 now_s = time_s[i] + tau * interval_s[i]
-                rate = side * crossing.state.rate * corner.p
+                rate = side * arc.state.rate * corner.p
                 filled = noted_impact(rows, filled, now_s, rate, landed.side * landed.speed)
             barred = side if stuck and landed.side == 0 else 0
             side, state, off = landed.side, landed.state, landed.off
@@ -425,21 +422,21 @@ def run_rocking(
             if tau >= 1.0:
                 i, tau = i + 1, 0.0
             continue
-        state, off = crossing.state, crossing.off
+        state, off = arc.state, arc.off
         i, tau = i + 1, 0.0
         filled = noted(rows, filled, time_s[i], side * state.theta, side * state.rate * corner.p, i)
         # past all recovery, whatever the rest of the record does; a history shows the fall too
-        least_q = record.tail_min_q[i] if side > 0 else -tail_max_q[i]
+        least_q = nodes.tail_min_q[i] if side > 0 else -tail_max_q[i]
         lost = irrecoverable(state.rate, state.sin, state.cos, least_q, 0.0)
-        if math.isnan(decided_s) and (lost or crossing.fallen):
+        if math.isnan(decided_s) and (lost or arc.fallen):
             decided_s = time_s[i]
-        if crossing.fallen:
+        if arc.fallen:
             break
 
-    end = End(TOPPLED, side, decided_s, forward, backward)
+    end = RockingEnd(TOPPLED, side, decided_s, forward, backward)
     if math.isnan(decided_s):
         peaks = (forward, backward)
-        end = end_of_run(record, toe, heel, rules, side, state, off, peaks, impacts)
+        end = end_of_run(nodes, toe, heel, rules, side, state, off, peaks, impacts)
     return RockingRun(
         end.outcome, end.side, end.forward, end.backward, abs(off.theta), started_s,
         end.verdict_s, impacts, steps, samples, filled,

@@ -3,9 +3,9 @@
 A step of one run waits for the step before it, and leaves a processor idle most of the time. Here
 up to `BATCH` runs over one record take each step together. Only the plain step of a moving block
 is taken so; whatever else happens in an interval (a start, a peak, an impact, a jump, the end of
-the record) is left to :func:`rbfrag.solver.integrator.single_run.run_toppling`, which goes through
-that interval and hands the run back. Every operation is that of the single run, in the same order,
-so that the results are equal bit for bit.
+the record) is left to :func:`rbfrag.solver.integrator.single_run.advance`, which goes on to
+the next node at which the block moves. Every operation is that of the single run, in the same
+order, so that the results are equal bit for bit.
 """
 
 from __future__ import annotations
@@ -20,13 +20,26 @@ from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, kernel, within
 from rbfrag.solver.integrator.events import irrecoverable, keeps_direction, simple_turn
 from rbfrag.solver.integrator.single_run import (
-    HANDED,
-    PENDING,
     TOPPLED,
-    run_toppling,
+    Known,
+    Progress,
+    advance,
+    beginning,
+    end_of_run,
 )
-from rbfrag.solver.integrator.state import State, StepExcitation, excitation_over
-from rbfrag.solver.integrator.step import drift_of_step, exponential_bound, step_errors
+from rbfrag.solver.integrator.state import (
+    Peak,
+    State,
+    StepExcitation,
+    excitation_over,
+    kernel_corner,
+)
+from rbfrag.solver.integrator.step import (
+    StepRules,
+    drift_of_step,
+    exponential_bound,
+    step_errors,
+)
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
 from rbfrag.solver.results import FloatArray
 
@@ -50,10 +63,16 @@ TURNED, U_START, U_END, V_START, V_END, U6, U7, U8, SIN_END, COS_END, ALONE, FAL
 GIVEN = 12
 
 SLOT = np.dtype(
-    [("job", "i8"), ("number", "i8"), ("parts", "i8"), ("part", "f8"), ("length_s", "f8")]
-)
+    [
+        ("job", "i8"), ("number", "i8"), ("parts", "i8"), ("part", "f8"), ("length_s", "f8"),
+        ("node", "i8"), ("theta", "f8"), ("rate", "f8"), ("sin", "f8"), ("cos", "f8"),
+        ("error", "f8"), ("drift", "f8"), ("peak", "f8"), ("peak_error", "f8"),
+        ("started_s", "f8"), ("lost", "i8"), ("steps", "i8"), ("samples", "i8"),
+    ]
+)  # fmt: skip
 """Which run is in a slot, which part of its interval comes next, how many parts there are, their
-fraction of the interval, and the length of an interval that the last two hold for."""
+fraction of the interval, and the length of an interval that the last two hold for; then how far
+the run is (`Progress`), at node -1 before its beginning."""
 
 
 @fused_kernel
@@ -117,40 +136,59 @@ def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
 
 
 @within
-def enter(run: Any, place: Any, x: FloatArray, slot: int) -> None:
+def enter(progress: Progress, place: Any, x: FloatArray, slot: int) -> None:
     """Take a run, at a node, into the steps of its slot."""
     place.number = 0
     place.length_s = -1.0
-    x[THETA + slot] = run.theta
-    x[RATE + slot] = run.rate
-    x[SIN + slot] = run.sin
-    x[COS + slot] = run.cos
-    x[ERROR + slot] = run.error
-    x[DRIFT + slot] = run.drift
-    x[PEAK + slot] = run.peak
+    place.node, place.lost = progress.node, progress.lost
+    place.peak, place.peak_error = progress.known.peak
+    place.started_s, place.steps, place.samples = (
+        progress.started_s, progress.steps, progress.samples
+    )  # fmt: skip
+    x[THETA + slot], x[RATE + slot], x[SIN + slot], x[COS + slot] = progress.state
+    x[ERROR + slot] = progress.known.error
+    x[DRIFT + slot] = progress.known.drift
+    x[PEAK + slot] = progress.known.peak.x
 
 
 @within
-def put_down(run: Any, x: FloatArray, slot: int) -> None:
+def put_down(place: Any, x: FloatArray, slot: int) -> None:
     """Put down the state of a slot at the beginning of its interval."""
-    run.theta = x[THETA + slot]
-    run.rate = x[RATE + slot]
-    run.sin = x[SIN + slot]
-    run.cos = x[COS + slot]
-    run.error = x[ERROR + slot]
-    run.drift = x[DRIFT + slot]
+    place.theta = x[THETA + slot]
+    place.rate = x[RATE + slot]
+    place.sin = x[SIN + slot]
+    place.cos = x[COS + slot]
+    place.error = x[ERROR + slot]
+    place.drift = x[DRIFT + slot]
+
+
+@within
+def put_down_progress(place: Any) -> Progress:
+    """Return how far a run is whose state has been put down."""
+    state = State(place.theta, place.rate, place.sin, place.cos)
+    known = Known(place.error, place.drift, Peak(place.peak, place.peak_error))
+    return Progress(
+        place.node,
+        True,
+        state,
+        known,
+        place.started_s,
+        place.lost > 0,
+        place.steps,
+        place.samples,
+        math.nan,
+        0.0,
+        0,
+    )
 
 
 @inner_kernel
-def move_slot(
-    x: FloatArray, y: FloatArray, runs: np.ndarray, slots: np.ndarray, source: int, slot: int
-) -> None:
+def move_slot(x: FloatArray, y: FloatArray, slots: np.ndarray, source: int, slot: int) -> None:
     """Let a run change its slot."""
     for row in range(TAKEN):
         x[row * BATCH + slot] = x[row * BATCH + source]
     y[ALONE + slot] = y[ALONE + source]
     y[FALLS + slot] = y[FALLS + source]
-    runs[slot] = runs[source]
     slots[slot] = slots[source]
 
 
@@ -172,24 +210,24 @@ def run_batch(
     # to all these arrays at every step.
     time_s, interval_s, k_h, w = nodes.time_s, nodes.interval_s, nodes.k_h, nodes.w
     tail_min_q = nodes.tail_min_q
-    last = min(k_h.size, nodes.jump_node) - 1
+    last = nodes.last
+    rules = StepRules(ORDER, ph_max)
     x = np.ones(TAKEN * BATCH)
     y = np.zeros(GIVEN * BATCH)
-    runs = np.zeros(BATCH, HANDED)
     slots = np.zeros(BATCH, SLOT)
     no_rows, u = np.empty((4, 0)), np.empty(9)
     running = min(BATCH, kr.size)
     job = running
     for slot in range(running):
         slots[slot].job = slot
-        runs[slot].interval = -1
+        slots[slot].node = -1
         y[ALONE + slot] = 1.0  # up to where it first moves at a node
     begun = False
     while running > 0:
         # vectors of a few runs cost more than the runs: the last ones are finished one by one
-        if begun and running <= FEW:
+        few = begun and running <= FEW
+        if few:
             for slot in range(running):
-                runs[slot].to_the_end = 1
                 x[APART + slot] = 1.0 if slots[slot].number == 0 else 0.0
                 y[ALONE + slot] = 1.0
         elif begun:
@@ -197,7 +235,7 @@ def run_batch(
             # vector instructions
             for slot in range(running):
                 place = slots[slot]
-                i = runs[slot].interval
+                i = place.node
                 if i >= last or interval_s[i] == 0.0:
                     x[APART + slot] = 1.0
                     continue
@@ -211,7 +249,7 @@ def run_batch(
                     x[PH + slot] = length / place.parts
                 if place.parts > 1 and place.number == 0:
                     # the single kernel goes through a whole interval: it needs its beginning
-                    put_down(runs[slot], x, slot)
+                    put_down(place, x, slot)
                 shaking = excitation_over(k_h, w, i, place.number * place.part, place.part)
                 x[K_H + slot] = shaking.k_h
                 x[DK_H + slot] = shaking.dk_h
@@ -226,7 +264,6 @@ def run_batch(
         slot = 0
         while slot < running:
             place = slots[slot]
-            run = runs[slot]
             alone = y[ALONE + slot] > 0.0
             falls = y[FALLS + slot] > 0.0
             goes_on = not (alone or falls)
@@ -235,38 +272,43 @@ def run_batch(
                 place.number += 1 if goes_on else 0
             elif not alone:
                 place.number = 0
-                run.interval += 1
-                run.steps += place.parts
-                run.samples += 1
+                place.node += 1
+                place.steps += place.parts
+                place.samples += 1
                 if falls:
                     whole[0, place.job], real[0, place.job] = TOPPLED, math.nan
-                    whole[1, place.job], whole[2, place.job] = run.steps, run.samples
-                    real[1, place.job], real[2, place.job] = run.started_s, time_s[run.interval]
+                    whole[1, place.job], whole[2, place.job] = place.steps, place.samples
+                    real[1, place.job], real[2, place.job] = place.started_s, time_s[place.node]
                     real[3, place.job] = x[ERROR + slot]
             # a run that has just begun has no state in the slot yet
-            if alone and run.interval >= 0 and (place.parts == 1 or x[APART + slot] > 0.0):
-                put_down(run, x, slot)
+            if alone and place.node >= 0 and (place.parts == 1 or x[APART + slot] > 0.0):
+                put_down(place, x, slot)
             while alone or (not goes_on and job < kr.size):
                 if not alone:  # its run is over, and the next one begins
                     place.job = job
                     job += 1
-                    run.interval = -1
+                    place.node = -1
                 # to its next moving node, or to its end
                 alone = False
                 j = place.job
-                (
-                    outcome, real[0, j], real[1, j], real[2, j], real[3, j],
-                    whole[1, j], whole[2, j], _,
-                ) = run_toppling(
-                    nodes, kr[j], p[j], ORDER, ph_max, no_rows, runs[slot : slot + 1], u
-                )  # fmt: skip
-                whole[0, j] = outcome
-                goes_on = outcome == PENDING
+                corner = kernel_corner(kr[j], p[j], 0.0)
+                progress = beginning(corner) if place.node < 0 else put_down_progress(place)
+                progress = advance(nodes, corner, rules, progress, not few, no_rows, u)
+                goes_on = progress.node < last and math.isnan(progress.decided_s)
                 if goes_on:
-                    enter(run, place, x, slot)
+                    enter(progress, place, x, slot)
+                else:
+                    run = end_of_run(nodes, corner, progress)
+                    whole[0, j], whole[1, j], whole[2, j] = (
+                        run.outcome,
+                        run.steps,
+                        run.samples_moved,
+                    )
+                    real[0, j], real[1, j] = run.peak_rad, run.started_s
+                    real[2, j], real[3, j] = run.verdict_s, run.error_rad
             if not goes_on:
                 # the last run takes the place of the one that is done
                 running -= 1
-                move_slot(x, y, runs, slots, running, slot)
+                move_slot(x, y, slots, running, slot)
                 continue
             slot += 1

@@ -19,7 +19,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.free_rocking import Corner
+from rbfrag.solver.integrator.state import Corner, corner
 from rbfrag.solver.integrator.two_corners import RockingRun
 from rbfrag.solver.kind import (
     BlockOnPlanes,
@@ -39,7 +39,6 @@ from rbfrag.solver.rocking_run import (
     MOST_IMPACTS,
     FreeBlock,
     RockingHistory,
-    corner,
     corner_force,
     rocking_history,
     simulate,
@@ -85,7 +84,7 @@ def rectangle(p2: float, kr: float, given: float | None) -> FreeBlock:
         kr: tangent of the critical angle.
         given: restitution; None for that of the rectangle (Housner 1963).
     """
-    both = corner(kr, p2, restitution_of_rectangle(kr) if given is None else given)
+    both = corner(kr, math.sqrt(p2), restitution_of_rectangle(kr) if given is None else given)
     # half of the sides: the base is level, and the centroid above its middle
     half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
     return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
@@ -138,7 +137,7 @@ def _corner(
 ) -> Corner:
     # p_i² = g r_i/I_i, as (4.27) for the toe
     p2 = STANDARD_GRAVITY_M_S2 * arm_m / inertia_m2
-    return corner(math.tan(balance), p2, kept if given is None else given)
+    return corner(math.tan(balance), math.sqrt(p2), kept if given is None else given)
 
 
 class Rocking(Kind):

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import inner_kernel, within
 from rbfrag.solver.integrator.one_freedom.state import (
-    Peak,
     PhaseRules,
-    Record,
-    State,
+    PhaseState,
     Work,
     certain_since,
-    higher,
-    noted,
 )
 from rbfrag.solver.integrator.one_freedom.step import (
     CONDITIONS,
@@ -29,6 +26,7 @@ from rbfrag.solver.integrator.one_freedom.step import (
     harmonic_sum,
     uniform_terms,
 )
+from rbfrag.solver.integrator.state import Peak, higher, noted
 from rbfrag.solver.results import FloatArray
 
 NEAR_STANDSTILL = 1e-9
@@ -57,7 +55,7 @@ class Coast(NamedTuple):
     """Where the block is after whole intervals of motion; see :func:`coast`."""
 
     node: int
-    state: State
+    state: PhaseState
     peak: Peak
     certain_s: float
     filled: int
@@ -65,12 +63,12 @@ class Coast(NamedTuple):
 
 @inner_kernel
 def coast(
-    record: Record,
+    record: Nodes,
     rules: PhaseRules,
     table: FloatArray,
     conditions: FloatArray,
     node: int,
-    state: State,
+    state: PhaseState,
     peak: Peak,
     certain_s: float,
     history: FloatArray,
@@ -140,5 +138,5 @@ def coast(
         certain_s = certain_since(
             certain_s, now_s, rate, forward_driving, forward_resistance, least_q
         )
-    end = State(x, rate, 1.0, 0.0, error_x, error_rate, state.sense, False)
+    end = PhaseState(x, rate, 1.0, 0.0, error_x, error_rate, state.sense, False)
     return Coast(node, end, peak, certain_s, filled)

@@ -19,12 +19,8 @@ from rbfrag.solver.integrator.one_freedom.events import (
 )
 from rbfrag.solver.integrator.one_freedom.state import (
     COMES_TO_REST,
-    Line,
-    Peak,
     PhaseRules,
-    State,
-    higher,
-    noted,
+    PhaseState,
     resting,
 )
 from rbfrag.solver.integrator.one_freedom.step import (
@@ -33,6 +29,7 @@ from rbfrag.solver.integrator.one_freedom.step import (
     error_growth,
     fill_step,
 )
+from rbfrag.solver.integrator.state import Line, Peak, higher, noted
 from rbfrag.solver.integrator.taylor import rotation, value
 from rbfrag.solver.results import FloatArray
 
@@ -58,7 +55,7 @@ class Crossing(NamedTuple):
     kind: int
     condition: int
     tau: float
-    state: State
+    state: PhaseState
     peak: Peak
     filled: int
     steps: int
@@ -79,7 +76,7 @@ class Arrival(NamedTuple):
     kind: int
     condition: int
     tau: float
-    state: State
+    state: PhaseState
     turn_tau: float
     turn_x: float
 
@@ -92,7 +89,7 @@ def cross_interval(
     line: Line,
     tau: float,
     own: float,
-    state: State,
+    state: PhaseState,
     peak: Peak,
     history: FloatArray,
     filled: int,
@@ -162,7 +159,7 @@ def arrive(
     u: FloatArray,
     order: int,
     own: float,
-    state: State,
+    state: PhaseState,
     step: Step,
 ) -> Arrival:
     """Return the end of a step whose series is known: its first event, or its whole length.
@@ -199,14 +196,14 @@ def arrive(
             # a contact that would have to pull opens, and the model ends (docs/theory/slumping.md)
             tau, condition = first_violation(table, u, order, state.x, step, tau)
             x, rate = rotation(state.x, u, order, tau), value(u, order, tau) / step.h
-            end = State(x, rate, cos, sin, growth.x, growth.rate, state.sense, False)
+            end = PhaseState(x, rate, cos, sin, growth.x, growth.rate, state.sense, False)
             return Arrival(BROKEN, condition, tau, end, event.turn_tau, event.turn_x)
         # at a limit x is the limit itself, not the last iterate of a root finder
         if kind == AT_HIGHEST:
             x = rules.highest
         elif kind == AT_LOWEST:
             x = rules.lowest
-    end = State(x, rate, cos, sin, growth.x, growth.rate, state.sense, False)
+    end = PhaseState(x, rate, cos, sin, growth.x, growth.rate, state.sense, False)
     # friction holds what has come to a standstill: no rate is left, and no error of one
     if kind == STANDSTILL:
         end = resting(end, growth.x, state.sense, False)

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from rbfrag.solver.integrator.compiled import inner_kernel, within
-from rbfrag.solver.integrator.one_freedom.state import PhaseRules, State
+from rbfrag.solver.integrator.one_freedom.state import PhaseRules, PhaseState
 from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, INERTIA, Step, with_double
 from rbfrag.solver.integrator.taylor import rotation, slope, value
 from rbfrag.solver.results import FloatArray
@@ -39,7 +39,7 @@ class Event(NamedTuple):
 
 @within
 def find_event(
-    u: FloatArray, order: int, leading: int, rules: PhaseRules, state: State, x_end: float
+    u: FloatArray, order: int, leading: int, rules: PhaseRules, state: PhaseState, x_end: float
 ) -> Event:
     """Return the first event of a step.
 
@@ -189,7 +189,7 @@ def least_condition(
 
 
 @within
-def broken_condition(table: FloatArray, state: State, a: float, w: float) -> tuple[bool, int]:
+def broken_condition(table: FloatArray, state: PhaseState, a: float, w: float) -> tuple[bool, int]:
     """Whether a condition fails at a state under two accelerations, and which."""
     least, condition = least_condition(table, state.cos, state.sin, state.rate, a, w)
     return least <= 0.0, condition

@@ -33,14 +33,12 @@ from rbfrag.solver.integrator.one_freedom.state import (
     UPPER,
     VIOLATED,
     Entry,
-    Peak,
     PhaseRules,
     PhaseRun,
     Work,
-    record_of,
 )
 from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, ORDER, TURN_MAX, UNIFORM_ORDER
-from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.state import Peak, Place
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, Outcome
 
@@ -155,7 +153,7 @@ def follow(
         InputError: a block so small that the run would not end in reasonable time.
     """
     _refuse_endless(mechanism, excitation, turn_max)
-    record = record_of(excitation)
+    record = excitation.nodes
     phase, entry = mechanism.first, FROM_REST._replace(x=start[0], error_x=start[1])
     changes: list[Change] = []
     histories: list[MotionHistory] = []

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, within
 from rbfrag.solver.integrator.one_freedom.coast import coast, fill_uniform_conditions
 from rbfrag.solver.integrator.one_freedom.cross import cross_interval
@@ -21,31 +22,27 @@ from rbfrag.solver.integrator.one_freedom.events import (
     PASSED,
     broken_condition,
 )
-from rbfrag.solver.integrator.one_freedom.rest import leave_rest
 from rbfrag.solver.integrator.one_freedom.state import (
     AT_REST,
     ENDLESS,
     JUMPED,
     LOWER,
+    NO_REVERSE,
     REVERSE,
     REVERSE_LEAVES,
     UPPER,
     VIOLATED,
     Entry,
-    Line,
-    Peak,
     PhaseRules,
     PhaseRun,
-    Record,
-    State,
+    PhaseState,
     Work,
     certain_since,
-    line_at,
-    noted,
     resting,
 )
 from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum, own_rate
-from rbfrag.solver.integrator.state import Place, time_of_jump
+from rbfrag.solver.integrator.rest import Thresholds, depart
+from rbfrag.solver.integrator.state import Line, Peak, Place, line_at, noted, time_of_jump
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -60,7 +57,7 @@ FREE_STEP_S = 0.1
 
 @bare_kernel
 def run_phase(
-    record: Record, rules: PhaseRules, entry: Entry, work: Work, history: FloatArray
+    record: Nodes, rules: PhaseRules, entry: Entry, work: Work, history: FloatArray
 ) -> PhaseRun:
     """Run one phase from where it is entered to where it ends.
 
@@ -72,7 +69,7 @@ def run_phase(
     """
     fill_uniform_conditions(rules, work)
     node, tau, free_s = entry.place.interval, entry.place.fraction, entry.free_s
-    state = placed(rules, entry)
+    state = state_on_entry(rules, entry)
     peak = Peak(entry.x, entry.error_x)
     started_s = stopped_s = certain_s = math.nan
     steps = moved = impacts = free_steps = filled = 0
@@ -86,7 +83,8 @@ def run_phase(
 
     while stop == GOES_ON:
         if not moving:
-            rest = leave_rest(record, rules, state, Place(node, tau), barred)
+            # a block at rest does not change its thresholds: once is enough
+            rest = depart(record, thresholds(rules, state), Place(node, tau), barred)
             node, tau = rest.place
             state = resting(state, state.error_x, rest.sense, rest.smooth)
             line = line_at(record, node, free_s, 1.0)
@@ -99,7 +97,7 @@ def run_phase(
                 break
             moving, barred = True, 0
             filled = noted(history, filled, now_s, state.x, 0.0, -1)
-        elif thrown(record, node):
+        elif jumps_after(record, node):
             stop = JUMPED
             break
         free = node >= record.last
@@ -178,7 +176,7 @@ def run_phase(
 
 @within
 def ended(
-    record: Record, stop: int, line: Line, place: Place, free_s: float, state: State
+    record: Nodes, stop: int, line: Line, place: Place, free_s: float, state: PhaseState
 ) -> tuple[float, Entry]:
     """Return when a phase ended, and how: what another one may be entered with."""
     stop_s = line.start_s + place.fraction * line.h
@@ -193,9 +191,9 @@ def ended(
 
 @within
 def certain_at(
-    record: Record,
+    record: Nodes,
     rules: PhaseRules,
-    state: State,
+    state: PhaseState,
     node: int,
     free: bool,
     now_s: float,
@@ -210,28 +208,47 @@ def certain_at(
 
 
 @within
-def placed(rules: PhaseRules, entry: Entry) -> State:
+def state_on_entry(rules: PhaseRules, entry: Entry) -> PhaseState:
     """Return the state in which a phase is entered."""
     cos, sin = 1.0, 0.0  # the harmonics of a constant: no cosine is taken that nothing depends on
     if not rules.uniform:
         cos, sin = math.cos(entry.x), math.sin(entry.x)
     sense = -1 if entry.rate < 0.0 else 1
-    return State(entry.x, entry.rate, cos, sin, entry.error_x, entry.error_rate, sense, False)
+    return PhaseState(entry.x, entry.rate, cos, sin, entry.error_x, entry.error_rate, sense, False)
 
 
 @within
-def thrown(record: Record, node: int) -> bool:
+def jumps_after(record: Nodes, node: int) -> bool:
     """Whether the ground falls away under the block before the next node (1 + k_v <= 0)."""
     return node >= record.last and record.last < record.k_h.size - 1
 
 
 @within
+def thresholds(rules: PhaseRules, state: PhaseState) -> Thresholds:
+    """Return the factors of both equations where the block rests."""
+    c, s = state.cos, state.sin
+    # factors of zero: the acceleration in reverse is then zero, which starts nothing
+    reverse_driving = 0.0
+    reverse_resistance = 0.0
+    if rules.in_reverse != NO_REVERSE:
+        reverse_driving = harmonic_sum(rules.reverse, DRIVING, c, s)
+        reverse_resistance = harmonic_sum(rules.reverse, RESISTANCE, c, s)
+    return Thresholds(
+        harmonic_sum(rules.forward, DRIVING, c, s),
+        harmonic_sum(rules.forward, RESISTANCE, c, s),
+        reverse_driving,
+        reverse_resistance,
+        rules.in_reverse != NO_REVERSE and state.x > rules.lowest,
+    )
+
+
+@within
 def stop_at_rest(
-    record: Record, rules: PhaseRules, state: State, line: Line, place: Place
+    record: Nodes, rules: PhaseRules, state: PhaseState, line: Line, place: Place
 ) -> tuple[int, int]:
     """Return why a phase ends where its rest does, or that it goes on, and what fails."""
     if state.sense == 0:
-        return (JUMPED if thrown(record, place.interval) else AT_REST), 0
+        return (JUMPED if jumps_after(record, place.interval) else AT_REST), 0
     # confined toppling: the heel leaves its plane, and another phase begins
     # (docs/theory/confined-toppling.md)
     if state.sense < 0 and rules.in_reverse == REVERSE_LEAVES:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.compiled import within
-from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.state import Peak, Place
 from rbfrag.solver.results import FloatArray
 
 AT_REST, UPPER, LOWER, REVERSE, VIOLATED, JUMPED, ENDLESS = range(7)
@@ -23,31 +22,6 @@ NO_REVERSE, REVERSE_MOVES, REVERSE_LEAVES = range(3)
 
 LEAVES, COMES_TO_REST = range(2)
 """What an impact at the lowest position does: end the phase, or stop the block (inelastic)."""
-
-
-class Record(NamedTuple):
-    """One excitation; the names are those of `rbfrag.solver.excitation.Excitation`.
-
-    Args:
-        time_s: node times [s], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,).
-        k_h: driving acceleration at the nodes [g], shape (n,).
-        w: 1 + k_v at the nodes, shape (n,).
-        tail_min_q: least k_h/(1 + k_v) from each node on, rest after the record included.
-        block_max_q: greatest k_h/(1 + k_v) of each block of `BLOCK` nodes.
-        block_min_q: least of it.
-        last: last node with 1 + k_v > 0: the model holds up to it, and after the record if it is
-            the last of all.
-    """
-
-    time_s: FloatArray
-    interval_s: FloatArray
-    k_h: FloatArray
-    w: FloatArray
-    tail_min_q: FloatArray
-    block_max_q: FloatArray
-    block_min_q: FloatArray
-    last: int
 
 
 class PhaseRules(NamedTuple):
@@ -78,7 +52,7 @@ class PhaseRules(NamedTuple):
     turn_max: float
 
 
-class State(NamedTuple):
+class PhaseState(NamedTuple):
     """The state of the block.
 
     Args:
@@ -120,13 +94,6 @@ class Entry(NamedTuple):
     rate: float
     error_x: float
     error_rate: float
-
-
-class Peak(NamedTuple):
-    """The greatest position so far, and the bound on its error."""
-
-    x: float
-    error: float
 
 
 class Work(NamedTuple):
@@ -175,81 +142,11 @@ class PhaseRun(NamedTuple):
     history_length: int
 
 
-class Line(NamedTuple):
-    """An interval, over which both accelerations are straight lines.
-
-    Args:
-        start_s: where it begins [s].
-        h: its length [s].
-        a0: driving acceleration at its start [g].
-        a1: the same at its end.
-        w0: effective gravity 1 + k_v at its start.
-        w1: the same at its end.
-    """
-
-    start_s: float
-    h: float
-    a0: float
-    a1: float
-    w0: float
-    w1: float
-
-
-def record_of(excitation: Excitation) -> Record:
-    """Return an excitation as the kernels take it."""
-    return Record(
-        excitation.time_s,
-        excitation.interval_s,
-        excitation.k_h,
-        excitation.w,
-        excitation.tail_min_q,
-        excitation.block_max_q,
-        excitation.block_min_q,
-        # nothing is integrated through a jump: the model ends at the last node in contact
-        min(excitation.k_h.size, excitation.jump_node) - 1,
-    )
-
-
 @within
-def line_at(record: Record, node: int, free_s: float, free_h: float) -> Line:
-    """Return the interval after a node, or `free_h` seconds of rest after the record."""
-    # after its last sample the ground is at rest (docs/reference/units-and-signs.md)
-    if node >= record.last:
-        return Line(record.time_s[-1] + free_s, free_h, 0.0, 0.0, 1.0, 1.0)
-    k_h, w = record.k_h, record.w
-    return Line(
-        record.time_s[node], record.interval_s[node], k_h[node], k_h[node + 1], w[node], w[node + 1]
-    )
-
-
-@within
-def resting(state: State, error_x: float, sense: int, smooth: bool) -> State:
+def resting(state: PhaseState, error_x: float, sense: int, smooth: bool) -> PhaseState:
     """Return a state with a rate of zero, which is exact: the error of the rate is zero too."""
     # x does not change, nor do its cosine and sine
-    return State(state.x, 0.0, state.cos, state.sin, error_x, 0.0, sense, smooth)
-
-
-@within
-def higher(peak: Peak, x: float, error: float) -> Peak:
-    """Return the peak, now that the block has been at x."""
-    # the first of equal peaks is kept, whose error is the least
-    if x > peak.x:
-        return Peak(x, error)
-    return peak
-
-
-@within
-def noted(history: FloatArray, filled: int, time_s: float, x: float, rate: float, node: int) -> int:
-    """Put one more column in a history that is not full; return how many are filled."""
-    # a run that keeps no history has one without columns: no second kernel is compiled for it
-    if filled >= history.shape[1]:
-        return filled
-    history[0, filled] = time_s
-    history[1, filled] = x
-    history[2, filled] = rate
-    # the node lets a reader tell samples from events without comparing times
-    history[3, filled] = node
-    return filled + 1
+    return PhaseState(state.x, 0.0, state.cos, state.sin, error_x, 0.0, sense, smooth)
 
 
 @within

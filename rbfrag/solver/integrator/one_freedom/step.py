@@ -16,7 +16,7 @@ import math
 from typing import NamedTuple
 
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
-from rbfrag.solver.integrator.one_freedom.state import PhaseRules, State
+from rbfrag.solver.integrator.one_freedom.state import PhaseRules, PhaseState
 from rbfrag.solver.results import FloatArray
 
 ORDER = 8
@@ -106,7 +106,9 @@ def uniform_terms(
 
 
 @fused_kernel
-def fill_step(table: FloatArray, series: FloatArray, order: int, state: State, step: Step) -> None:
+def fill_step(
+    table: FloatArray, series: FloatArray, order: int, state: PhaseState, step: Step
+) -> None:
     """Fill the Taylor coefficients of U for one step.
 
     Args:
@@ -219,7 +221,7 @@ def truncation(u: FloatArray, order: int, own: float, rate: float, h: float) -> 
 
 @within
 def sensitivity(
-    table: FloatArray, state: State, step: Step, acceleration: float
+    table: FloatArray, state: PhaseState, step: Step, acceleration: float
 ) -> tuple[float, float]:
     """Return bounds of the derivatives of x'' by x [1/s²] and by x' [1/s] at a step's start."""
     c, s, rate = state.cos, state.sin, state.rate
@@ -241,7 +243,7 @@ def error_growth(
     u: FloatArray,
     order: int,
     own: float,
-    state: State,
+    state: PhaseState,
     step: Step,
     tau: float,
     x: float,

@@ -10,18 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rbfrag.solver.excitation import BLOCK
-from rbfrag.solver.integrator.compiled import inner_kernel, within
-from rbfrag.solver.integrator.one_freedom.state import (
-    NO_REVERSE,
-    Line,
-    PhaseRules,
-    Record,
-    State,
-    line_at,
-)
-from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum
-from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.excitation import BLOCK, Nodes
+from rbfrag.solver.integrator.compiled import within
+from rbfrag.solver.integrator.state import Line, Place, line_at
 
 CALM = 1e-12
 """Margin of a threshold by which a whole block of nodes must fall short of it to be passed over."""
@@ -59,63 +50,35 @@ class Departure(NamedTuple):
     smooth: bool
 
 
-@inner_kernel
-def leave_rest(
-    record: Record, rules: PhaseRules, state: State, place: Place, barred: int
-) -> Departure:
+@within
+def depart(nodes: Nodes, level: Thresholds, place: Place, barred: int) -> Departure:
     """Find where a block at rest starts to move.
 
     Args:
-        record: the excitation.
-        state: the state of the block, its rate 0.
+        nodes: the excitation.
+        level: where it does.
         place: where the rest begins.
         barred: sense in which the block has just come to a standstill, 0 for none. Its motion
             ended because the acceleration opposed it: to rounding it may still seem to have its
             sense, and is not resumed within the interval.
     """
-    # a block at rest does not change its thresholds: once is enough
-    return depart(record, thresholds(rules, state), place, barred)
-
-
-@inner_kernel
-def depart(record: Record, level: Thresholds, place: Place, barred: int) -> Departure:
-    """Find where motion sets in from a rest of known thresholds; see :func:`leave_rest`."""
     node, tau = place.interval, place.fraction
-    while node < record.last:
-        line = line_at(record, node, 0.0, 0.0)
+    while node < nodes.last:
+        line = line_at(nodes, node, 0.0, 0.0)
         if line.h == 0.0:  # nothing starts in no time
             node += 1
         else:
             start = first_start(level, line, tau, barred)
             if start.sense != 0:
                 return Departure(Place(node, start.tau), start.sense, start.smooth)
-            node = calm_until(record, level, node + 1)
+            node = calm_until(nodes, level, node + 1)
         tau = 0.0
         barred = 0
-    if record.last < record.k_h.size - 1:
+    if nodes.last < nodes.k_h.size - 1:
         return Departure(Place(node, tau), 0, False)
     # after the record: what stands without strength starts at once, all else stays
-    start = first_start(level, line_at(record, node, 0.0, 1.0), tau, barred)
+    start = first_start(level, line_at(nodes, node, 0.0, 1.0), tau, barred)
     return Departure(Place(node, start.tau), start.sense, start.smooth)
-
-
-@within
-def thresholds(rules: PhaseRules, state: State) -> Thresholds:
-    """Return the factors of both equations where the block rests."""
-    c, s = state.cos, state.sin
-    # factors of zero: the acceleration in reverse is then zero, which starts nothing
-    reverse_driving = 0.0
-    reverse_resistance = 0.0
-    if rules.in_reverse != NO_REVERSE:
-        reverse_driving = harmonic_sum(rules.reverse, DRIVING, c, s)
-        reverse_resistance = harmonic_sum(rules.reverse, RESISTANCE, c, s)
-    return Thresholds(
-        harmonic_sum(rules.forward, DRIVING, c, s),
-        harmonic_sum(rules.forward, RESISTANCE, c, s),
-        reverse_driving,
-        reverse_resistance,
-        rules.in_reverse != NO_REVERSE and state.x > rules.lowest,
-    )
 
 
 class Start(NamedTuple):
@@ -126,7 +89,7 @@ class Start(NamedTuple):
     smooth: bool
 
 
-@inner_kernel
+@within
 def first_start(level: Thresholds, line: Line, tau: float, barred: int) -> Start:
     """Return where motion sets in within an interval, from tau on."""
     # inertia times the acceleration that each equation gives, at both ends
@@ -134,21 +97,19 @@ def first_start(level: Thresholds, line: Line, tau: float, barred: int) -> Start
     f1 = level.driving * line.a1 - level.resistance * line.w1
     r0 = level.reverse_driving * line.a0 - level.reverse_resistance * line.w0
     r1 = level.reverse_driving * line.a1 - level.reverse_resistance * line.w1
-    if tau > 0.0:
-        f0 += (f1 - f0) * tau
-        r0 += (r1 - r0) * tau
+    f, r = f0 + (f1 - f0) * tau, r0 + (r1 - r0) * tau
     # above a threshold already: after a jump, a standstill, or at the first sample
-    if f0 > 0.0 and barred != 1:
+    if f > 0.0 and barred != 1:
         return Start(tau, 1, False)
-    if level.may_reverse and r0 < 0.0 and barred != -1:
+    if level.may_reverse and r < 0.0 and barred != -1:
         return Start(tau, -1, False)
     start = Start(2.0, 0, False)
     # the crossing of a straight line; where it was barred above zero, it starts anew at once
     if f1 > 0.0 and f1 > f0:
-        start = Start(tau + (1.0 - tau) * max(-f0, 0.0) / (f1 - f0), 1, True)
+        start = Start(max(tau, -f0 / (f1 - f0)), 1, True)
     # the earlier of both senses; only one can set in where both thresholds are apart
     if level.may_reverse and r1 < 0.0 and r1 < r0:
-        at = tau + (1.0 - tau) * max(r0, 0.0) / (r0 - r1)
+        at = max(tau, r0 / (r0 - r1))
         if at < start.tau:
             start = Start(at, -1, True)
     if start.tau > 1.0:  # a crossing that rounding puts beyond the end is at the next node
@@ -156,8 +117,8 @@ def first_start(level: Thresholds, line: Line, tau: float, barred: int) -> Start
     return start
 
 
-@inner_kernel
-def calm_until(record: Record, level: Thresholds, node: int) -> int:
+@within
+def calm_until(nodes: Nodes, level: Thresholds, node: int) -> int:
     """Return the first node, from one on, after which a threshold is passed; the last if none.
 
     Rest costs one comparison a sample, or one a block of samples.
@@ -172,15 +133,21 @@ def calm_until(record: Record, level: Thresholds, node: int) -> int:
         below = math.inf
         if level.reverse_driving > 0.0 and level.reverse_resistance < 0.0:
             below = level.reverse_resistance / level.reverse_driving * (1.0 - CALM)
-    k_h, w, last = record.k_h, record.w, record.last
-    block_max_q, block_min_q = record.block_max_q, record.block_min_q
+    k_h, w, last = nodes.k_h, nodes.w, nodes.last
+    block_max_q, block_min_q = nodes.block_max_q, nodes.block_min_q
     while node < last:
         # a block of nodes is left out whole if the step into it begins at its last neighbour
-        if (node + 1) % BLOCK == 0 and node + BLOCK <= last:
+        if (node + 1) % BLOCK == 0:
             block = (node + 1) // BLOCK
-            if block_max_q[block] < above and block_min_q[block] > below:
+            while (
+                node + BLOCK <= last
+                and block_max_q[block] < above
+                and (not level.may_reverse or block_min_q[block] > below)
+            ):
                 node += BLOCK
-                continue
+                block += 1
+            if node >= last:
+                break
         a1, w1 = k_h[node + 1], w[node + 1]
         if level.driving * a1 > level.resistance * w1:
             break
