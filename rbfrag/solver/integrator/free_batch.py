@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation, Nodes
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.free_rocking import STABLE, Corner
+from rbfrag.solver.integrator.free_rocking import STABLE
+from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.two_corners import RockingRules, run_rocking
 from rbfrag.solver.results import FloatArray
