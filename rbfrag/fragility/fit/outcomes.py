@@ -76,9 +76,13 @@ def fit_outcomes(
         )
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
-        b, cr1, naive = fit_by_statsmodels(rows.data)
-    # a parameter that these blocks leave open has no variance that is one
-    variances = np.concatenate([np.diag(cr1), np.diag(naive)])
+        try:
+            b, cr1, naive = fit_by_statsmodels(rows.data)
+            variances = np.concatenate([np.diag(cr1), np.diag(naive)])
+        except np.linalg.LinAlgError:
+            variances = np.array([np.nan])
+    # a parameter that these blocks leave open has no variance that is one: rounding decides
+    # whether the matrix is singular
     if not (np.isfinite(variances) & (variances >= 0.0)).all():
         raise FitError(
             f"the blocks and {len(data.event_names)} earthquakes do not tell the {len(names)} "
