@@ -16,7 +16,7 @@ from rbfrag.motions.polarity import Polarity as Polarity
 
 FloatArray = NDArray[np.float64]
 
-NUMERICS_VERSION = "5"
+NUMERICS_VERSION = "6"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
 
 Status = Literal["found", "below_limit", "no_motion", "outside_model"]
