@@ -23,10 +23,10 @@ from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.dependence import Dependence, event_range
+from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
 from rbfrag.fragility.fit.pair_tables import ANGLES, PairTable
-from rbfrag.fragility.joint import FailureCount, Placement
+from rbfrag.fragility.joint import FailureCount, Placement, event_ranges
 from rbfrag.fragility.joint_sampling import JointSampler
 
 FloatArray = NDArray[np.float64]
@@ -220,7 +220,7 @@ def cells(data: Outcomes, model: Study, laws: Sequence[Dependence]) -> dict[str,
             own = kind == number
             share = float(data.failed[rows[own]].mean())
             ends = np.quantile(failed[:, own].mean(axis=1), tails)
-            single = event_range(float(p[rows[own]].mean()), law.rho_e, LEVEL)
+            single = event_ranges(float(p[rows[own]].mean()), law.rho_e, LEVEL)
             alone = generator.random((SAMPLES // 2, int(own.sum()))) < p[rows[own]]
             apart = np.quantile(alone.mean(axis=1), tails)
             found.append((

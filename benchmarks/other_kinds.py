@@ -29,12 +29,12 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.db.queries import combination_table
-from rbfrag.fragility.dependence import event_range
 from rbfrag.fragility.fit.censoring import score_bounds
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
 from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
+from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.measures import TERMS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -207,7 +207,7 @@ def dependence_table(models: Sequence[ModelRow]) -> str:
             f"{row.dependence[name]:.2f} ± {errors[name]:.2f}"
             for name in ("rho_e", "rho_s", "rho_v", "rho_o")
         ]
-        low, high = event_range(0.5, row.dependence["rho_e"], 0.95)
+        low, high = event_ranges(0.5, row.dependence["rho_e"], 0.95)
         cells.append([f"`{row.name}`", *shares, f"{100 * low:.0f} to {100 * high:.0f} of 100"])
     return markdown((heads, cells))
 

@@ -182,24 +182,6 @@ class EventSpread(NamedTuple):
         return share((a - by) * self.scale), share((a + by) * self.scale)
 
 
-def event_range(probability: float, rho_e: float, level: float = 0.95) -> tuple[float, float]:
-    """Return between which shares of like blocks at many sites fail in one future earthquake.
-
-        Φ((Φ⁻¹(P) + √ρ_e Φ⁻¹(q)) / √(1 - ρ_e)),   q = (1 - level)/2 and (1 + level)/2
-
-    Too narrow for few sites or few blocks, whose own scatter it leaves out.
-
-    Args:
-        probability: P of one block, 0 to 1.
-        rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
-        level: probability that the share lies between both ends.
-    """
-    if not 0.0 < level < 1.0:
-        raise InputError(f"a level is above 0 and below 1, not {level!r}")
-    spread, reach = EventSpread.of(rho_e), -normal_quantile(0.5 - 0.5 * level)
-    return spread.ends(normal_quantile(probability), reach, normal_share)
-
-
 def normal_share(z: float) -> float:
     """Return Φ(z), the standard normal distribution function."""
     return 0.5 * math.erfc(-z * _ROOT_HALF)

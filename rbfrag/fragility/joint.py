@@ -182,7 +182,17 @@ def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
 def event_ranges(
     probability: ArrayLike, rho_e: float, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Return `rbfrag.fragility.dependence.event_range` of many P, two arrays of their shape."""
+    """Return between which shares of like blocks at many sites fail in one future earthquake.
+
+        Φ((Φ⁻¹(P) + √ρ_e Φ⁻¹(q)) / √(1 - ρ_e)),   q = (1 - level)/2 and (1 + level)/2
+
+    Too narrow for few sites or few blocks, whose own scatter it leaves out.
+
+    Args:
+        probability: P of one block, 0 to 1, of any shape, which both ends have.
+        rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
+        level: probability that the share lies between both ends.
+    """
     reach = -normal_quantile(0.5 - 0.5 * level)
     a = ndtri(np.asarray(probability, dtype=np.float64))
     low, high = EventSpread.of(rho_e).ends(a, reach, ndtr)

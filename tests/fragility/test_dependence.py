@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence, event_range, normal_quantile
+from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile, normal_share
 from rbfrag.fragility.joint import event_ranges
 from tests.fragility.portfolio_draws import LAW, anywhere
 
@@ -79,7 +79,7 @@ def test_what_is_no_dependence_is_refused() -> None:
     [(0.136, 0.22, 0.78), (0.055, 0.32, 0.68), (0.035, 0.35, 0.65), (0.082, 0.28, 0.72)],
 )
 def test_range_of_one_earthquake_at_one_half(rho_e: float, low: float, high: float) -> None:
-    found = event_range(0.5, rho_e)
+    found = event_ranges(0.5, rho_e)
     assert found == pytest.approx((low, high), abs=0.005)
     assert sum(found) == pytest.approx(1.0, abs=1e-15)
 
@@ -89,26 +89,28 @@ def test_range_of_one_earthquake_is_that_of_simulated_earthquakes() -> None:
     shared = np.random.default_rng(1).standard_normal(400_000)
     share = ndtr((ndtri(p) - math.sqrt(rho) * shared) / math.sqrt(1.0 - rho))
     assert share.mean() == pytest.approx(p, abs=1e-3)
-    assert event_range(p, rho, 0.9) == pytest.approx(np.quantile(share, [0.05, 0.95]), abs=2e-3)
+    assert event_ranges(p, rho, 0.9) == pytest.approx(np.quantile(share, [0.05, 0.95]), abs=2e-3)
 
 
 def test_range_of_one_earthquake_at_its_limits() -> None:
-    assert event_range(0.0, 0.2) == (0.0, 0.0)
-    assert event_range(1.0, 0.2) == (1.0, 1.0)
-    assert event_range(0.3, 0.0) == pytest.approx((0.3, 0.3), rel=1e-14)
-    assert event_range(0.3, 1.0) == (0.0, 1.0)
-    assert event_range(0.001, 1.0) == (0.0, 0.0)
-    with pytest.raises(InputError, match="level"):
-        event_range(0.3, 0.1, 1.0)
+    assert event_ranges(0.0, 0.2) == (0.0, 0.0)
+    assert event_ranges(1.0, 0.2) == (1.0, 1.0)
+    assert event_ranges(0.3, 0.0) == pytest.approx((0.3, 0.3), rel=1e-14)
+    assert event_ranges(0.3, 1.0) == (0.0, 1.0)
+    assert event_ranges(0.001, 1.0) == (0.0, 0.0)
     with pytest.raises(InputError, match="rho_e"):
-        event_range(0.3, 1.1)
+        event_ranges(0.3, 1.1)
 
 
 @pytest.mark.parametrize("rho_e", [0.0, 0.136, 1.0])
 def test_ranges_of_many_are_those_of_each(rho_e: float) -> None:
     p = np.array([[0.0, 1e-9, 0.2], [0.5, 0.97, 1.0]])
     low, high = event_ranges(p, rho_e, 0.9)
-    each = [event_range(one, rho_e, 0.9) for one in p.ravel().tolist()]
+    spread = EventSpread.of(rho_e)
+    each = [
+        spread.ends(normal_quantile(one), -normal_quantile(0.05), normal_share)
+        for one in p.ravel().tolist()
+    ]
     np.testing.assert_allclose(low.ravel(), [one[0] for one in each], rtol=1e-12)
     np.testing.assert_allclose(high.ravel(), [one[1] for one in each], rtol=1e-12)
     assert low.shape == high.shape == p.shape
@@ -122,7 +124,8 @@ def test_normal_quantile_is_that_of_scipy() -> None:
 
 def test_single_numbers_load_no_library() -> None:
     code = (
-        "import sys; from rbfrag.fragility.dependence import event_range; event_range(.3, .1);"
+        "import sys; from rbfrag.fragility.dependence import *;"
+        "EventSpread.of(.1).ends(normal_quantile(.3), 1.96, normal_share);"
         "sys.exit('numpy' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbfrag.fragility.dependence import EventSpread, event_range
+from rbfrag.fragility.dependence import EventSpread, normal_quantile, normal_share
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
@@ -40,7 +40,10 @@ def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> Non
     found = site_probability(
         SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
     )
-    ends = [event_range(float(p), 0.2) for p in found.probability]
+    reach, spread = -normal_quantile(0.025), EventSpread.of(0.2)
+    ends = [
+        spread.ends(normal_quantile(p), reach, normal_share) for p in found.probability.tolist()
+    ]
     assert found.event_low == pytest.approx([low for low, _ in ends], rel=1e-9)
     assert found.event_high == pytest.approx([high for _, high in ends], rel=1e-9)
     nothing = site_probability(
