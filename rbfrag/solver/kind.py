@@ -90,6 +90,8 @@ class Shaking:
         history: keep the motion in time.
         remarks: what is known about the block that the answer should say.
         start: the state that the motion finds; None for a block at rest in its first place.
+        laws: whether the error after a lost contact includes what laws of impact and friction
+            differ by, which takes as long as the motion itself.
     """
 
     motion: GroundMotion
@@ -98,6 +100,7 @@ class Shaking:
     history: bool = False
     remarks: tuple[str, ...] = ()
     start: BlockState | None = None
+    laws: bool = True
 
     @cached_property
     def excitation(self) -> Excitation:

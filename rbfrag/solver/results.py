@@ -122,7 +122,8 @@ class BlockState:
         gap_m: gap between the heel and its back plane, along the base [m].
         touching: corners that touch a plane.
         position: coordinate of its mechanism [rad] or [m]; None where no mechanism describes it.
-        error: bound on the error of the coordinate.
+        error: bound on the error of the rotation [rad], of a sliding block of the displacement [m];
+            infinite where it is not known.
     """
 
     turned_rad: float

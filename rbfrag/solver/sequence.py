@@ -159,12 +159,14 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
         times = [(_on_clock(part, getattr(part.response, name))) for part in parts]
         return [time_s for time_s in times if time_s is not None]
 
+    errors = [answer.error_estimate for answer in answers]
     slips = [answer.displacement_m for answer in answers]
     known_slips = [slip for slip in slips if slip is not None]
     return replace(
         answers[-1],
         outcome=outcome,
         **{name: greatest(name) for name in _GREATEST},
+        error_estimate=None if None in errors else _most(errors),
         started_s=min(clock("started_s"), default=None),
         toppled_s=min(clock("toppled_s"), default=None),
         stopped_s=max(clock("stopped_s"), default=None),
@@ -185,7 +187,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
 
 
 _GREATEST = (
-    "peak_theta_n", "peak_theta_rad", "peak_displacement_m", "error_estimate", "peak_forward_rad",
+    "peak_theta_n", "peak_theta_rad", "peak_displacement_m", "peak_forward_rad",
     "peak_backward_rad",
 )  # fmt: skip
 _SUMS = ("steps", "samples_moved", "samples_total")

@@ -21,6 +21,7 @@ from rbfrag.solver.free_motion import (
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
 from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import (
     BlockState,
     FloatArray,
@@ -103,24 +104,31 @@ class WholeRun:
 
     @property
     def step_error(self) -> float:
-        """Bound on the error of the integration: of the peak rotation [rad], of a slide [m]."""
+        """Bound on the error of the integration: of the peak rotation [rad], of a slide [m].
+
+        Infinite where the error of the state that it started from is not known.
+        """
         return self._error(None if self.free is None else self.free.step_error)
 
     @property
-    def error(self) -> float | None:
+    def error(self) -> float:
         """The same with what laws of impact and friction leave open after a lost contact.
 
-        None where some of them let the block fail and others do not.
+        Infinite also where some of them let the block fail and others do not.
         """
         if self.free is None:
             return self.step_error
-        return None if self.free.error is None else self._error(self.free.error)
+        return math.inf if self.free.error is None else self._error(self.free.error)
 
     def _error(self, of_free: FreeError | None) -> float:
-        error = 0.0 if self.run is None else self.run.error
+        if self.run is not None:
+            before = self.run.error
+        else:
+            assert self.start is not None
+            before = self.start.error
         if of_free is None:
-            return error
-        return error + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
+            return before
+        return before + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
 
     @property
     def changes(self) -> tuple[ModeChange, ...]:
@@ -140,13 +148,14 @@ class WholeRun:
             known = known[:-1]
         if self.free.landed_s:
             known = (*known, FALLS_ON_ITS_BASE.format(self.free.landed_s))
-        if self.free.error is None:
-            known = (*known, FAILS_BY_SOME_LAWS)
         return (*known, self.free.sentence) if self.free.sentence else known
 
-    @property
-    def state(self) -> BlockState | None:
-        """Where the block is left at rest; None where it is not."""
+    def state(self, error: float) -> BlockState | None:
+        """Return where the block is left at rest; None where it is not.
+
+        Args:
+            error: bound on its error.
+        """
         pose, block = self.pose, self.site.block
         if self.outcome is not Outcome.STABLE:
             return None
@@ -161,7 +170,8 @@ class WholeRun:
             gap_m=gap_m(block, pose) if block is not None else pose.displacement_m,
             touching=touching(self.site, pose) if block is not None else ("base",),
             position=position,
-            error=self.step_error if position else 0.0,
+            # in its first place it is exactly
+            error=0.0 if position == 0.0 else error,
         )
 
 
@@ -227,6 +237,10 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
     if whole.free is not None:
         steps += whole.free.steps
         moved += _samples(excited, whole)
+    error = whole.error if shaking.laws else whole.step_error
+    sentences = whole.sentences
+    if error == math.inf:
+        sentences = (*sentences, FAILS_BY_SOME_LAWS)
     return Response(
         kind=kind,
         outcome=whole.outcome,
@@ -235,11 +249,11 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
         critical_angle_deg=None if critical is None else math.degrees(critical),
         started_s=whole.started_s,
         toppled_s=(certain_s or whole.ended_s) if failed else None,
-        error_estimate=whole.error,
+        error_estimate=finite_or_none(error),
         steps=steps,
         samples_moved=moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
-        warnings=(*shaking.warnings, *whole.sentences),
+        warnings=(*shaking.warnings, *sentences),
         history=_history(whole, excited) if shaking.history else None,
         final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
         displacement_m=at_end.displacement_m - before_m if at_end else None,
@@ -247,7 +261,7 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
         centroid_displacement_m=math.dist(at_end.centroid_m, first.centroid_m) if at_end else None,
         stopped_s=whole.ended_s,
         mode_changes=whole.changes,
-        state=whole.state,
+        state=whole.state(error),
     )
 
 
