@@ -64,6 +64,7 @@ class TestCheck:
             ("combination", {"lower": 0.95}, "lies below its bracket"),
             ("combination", {"upper": 0.05}, "lies above its bracket"),
             ("combination", {"settings": "{"}, "settings cannot be read"),
+            ("combination", {"settings": '{"a":NaN}'}, "natural key is not the hash"),
             ("simulation", {"outcome": "stable"}, "no simulation topples at its critical"),
             ("simulation", {"outcome": "toppled"}, "topples above its critical"),
             ("simulation", {"outcome": "toppled"}, "status below_limit, yet"),

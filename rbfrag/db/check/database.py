@@ -121,6 +121,7 @@ def check_digests(connection: Connection) -> Iterator[Damage]:
     for name, table in sorted(metadata.tables.items()):
         key = list(table.primary_key.columns)
         columns = [column.name for column in table.c]
+        doubles = [i for i, column in enumerate(table.c) if isinstance(column.type, Double)]
         holds_arrays = any(isinstance(column.type, LargeBinary) for column in table.c)
         query = select(table).order_by(*key)
         rows_at_once = 16 if holds_arrays else 1 << 14
@@ -134,9 +135,9 @@ def check_digests(connection: Connection) -> Iterator[Damage]:
             for row, digest in zip(rows, digests, strict=True):
                 problems = [] if row.digest == digest else [ALTERED]
                 bad = [
-                    column
-                    for column, value in zip(columns, row, strict=True)
-                    if isinstance(value, float) and not math.isfinite(value)
+                    columns[i]
+                    for i in doubles
+                    if isinstance(row[i], float) and not math.isfinite(row[i])
                 ]
                 if bad:
                     problems.append(f"{', '.join(bad)}: not a finite number")

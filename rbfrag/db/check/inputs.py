@@ -11,6 +11,7 @@ from rbfrag.db.check.damage import COMPUTE_AGAIN, Damage
 from rbfrag.db.keys import key_of_row
 from rbfrag.db.motions import samples_of_motions
 from rbfrag.db.schema import campaign, response, shock_pair
+from rbfrag.errors import InputError
 
 _SERIES = ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v")
 
@@ -28,16 +29,21 @@ def input_problems(row: RowMapping, inputs: Inputs) -> Iterator[str]:
     """Yield what is wrong with the key of a combination, history or pair, or with its numerics."""
     samples, numerics = inputs
     motions = {row[name] for name in row if name.endswith("motion_id")} - {None}
-    try:
-        # a motion that is not there is a broken reference, which is its own finding
-        if motions <= samples.keys() and key_of_row(row, samples) != row["natural_key"]:
+    unreadable = []
+    for name in ("block", "settings"):
+        try:
+            json.loads(row.get(name) or "{}")
+        except ValueError as error:
+            unreadable.append(f"its {name} cannot be read: {error}")
+    yield from unreadable
+    # a motion that is not there is a broken reference, which is its own finding
+    if not unreadable and motions <= samples.keys():
+        try:
+            is_its_key = key_of_row(row, samples) == row["natural_key"]
+        except InputError:  # a number that is not finite
+            is_its_key = False
+        if not is_its_key:
             yield "its natural key is not the hash of its inputs"
-    except ValueError:
-        for name in ("block", "settings"):
-            try:
-                json.loads(row.get(name) or "{}")
-            except ValueError as error:
-                yield f"its {name} cannot be read: {error}"
     of_campaign = numerics.get(row.get("campaign_id", 0), row["numerics_version"])
     if of_campaign != row["numerics_version"]:
         yield f"numerics version {row['numerics_version']}, its campaign says {of_campaign}"
