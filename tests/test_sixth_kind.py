@@ -1,38 +1,42 @@
-"""A kind is a line of facts and a file: a throw-away one answers everywhere, without another line.
+"""A kind is a line of facts and a file each for its physics, its campaigns and its method.
 
-Its blocks fail when the peak acceleration exceeds k_r.
+A copy of the package gets one that no part of it names, with a number of its own, which one line
+declares; it answers by every door. Its blocks stand on pads and fail when the peak acceleration
+exceeds k_r (1 + thickness/10 mm).
 """
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from fastapi.testclient import TestClient
 
 import rbfrag
-import rbfrag.campaign.kinds
-import rbfrag.solver.models
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.service.app import make_app
-from rbfrag.service.settings import ServiceSettings
-from rbfrag.solver.kinds import KINDS, KindFacts
 from tests.synthetic import shaking
 
-FALLS = '''
-"""A block that falls when |a| exceeds k_r."""
+PACKAGE = Path(rbfrag.__file__).parent
+
+FIELD = '    pad_m: Annotated[V, Field("Thickness of the pads", "m", ("pads",), above=0.0)]\n'
+FACTS = '        KindFacts("padded", None, ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
+
+MODEL = '''
+"""A block on pads."""
 
 from rbfrag.solver.kind import Kind
 from rbfrag.solver.results import Outcome, Response
 
 
-class Falls(Kind):
+class Padded(Kind):
     def respond(self, site, shaking):
-        fails = shaking.motion.pga_g > site.yield_g
+        fails = shaking.motion.pga_g > site.yield_g * (1.0 + site.settings["pad_m"] / 0.01)
         return Response(
             kind=self.kind,
             outcome=Outcome.TOPPLED if fails else Outcome.STABLE,
@@ -48,90 +52,186 @@ class Falls(Kind):
         )
 
 
-MODEL = Falls.named("falls")
+MODEL = Padded.named("padded")
 '''
 
 CAMPAIGN = '''
-"""Campaigns of blocks that fall."""
-
-import math
+"""Campaigns of blocks on pads."""
 
 import numpy as np
 
-from rbfrag.campaign.kind import CampaignKind, Case, CaseResult
-from rbfrag.campaign.kinds.toppling import Y_OVER_PGV
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.campaign.kind import CampaignKind, Case, CaseResult, strengths_at
 from rbfrag.solver.results import SearchPoints
 
 
-class FallsCampaign(CampaignKind):
+class PaddedCampaign(CampaignKind):
     def cases(self):
-        return tuple(Case(self.kind, p2) for p2 in (10.0, 1.0))
+        return tuple(
+            Case(self.kind, p2, {"pad_m": pad}) for p2 in (10.0, 1.0) for pad in (0.001, 0.005)
+        )
 
     def grid(self, case, measures):
-        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
-        return math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
+        return strengths_at(case.size, measures, np.geomspace(0.1, 4.0, 25))
 
     def run_cases(self, shaking, cases, request):
         results = []
         for case in cases:
             k = self.grid(case, shaking.motion)
-            words = tuple("toppled" if each < 1.0 else "stable" for each in k)
-            results.append(CaseResult(None, SearchPoints(k, np.where(k < 1.0, np.nan, 0.0), words)))
+            fails = k * (1.0 + case.block["pad_m"] / 0.01) < 1.0
+            words = tuple("toppled" if each else "stable" for each in fails)
+            results.append(CaseResult(None, SearchPoints(k, np.where(fails, np.nan, 0.0), words)))
         return results
 
 
-CAMPAIGN = FallsCampaign("falls")
+CAMPAIGN = PaddedCampaign("padded")
 '''
 
+METHOD = '''
+"""The method of pads: logistic in ln(x/y) and in the thickness."""
 
-@pytest.fixture
-def falls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for package, text in ((rbfrag.solver.models, FALLS), (rbfrag.campaign.kinds, CAMPAIGN)):
-        folder = tmp_path / package.__name__
-        folder.mkdir()
-        (folder / "falls.py").write_text(text)
-        monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
-    facts = KindFacts("falls", parameters=("p2", "kr"))
-    monkeypatch.setitem(KINDS, "falls", facts)
+from rbfrag.fragility import fits, method
+from rbfrag.fragility.method import BlockParameters, Eta, Form, Method
 
 
-@pytest.fixture
-def database(tmp_path: Path) -> Path:
-    place = tmp_path / "falls.db"
-    with opened_database(place, create=True) as engine, engine.begin() as connection:
+def _eta(b, v, ns):
+    ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
+    return Eta(b[0] + b[1] * ratio + b[2] * v["pad_m"], (1.0, ratio, v["pad_m"]))
+
+
+METHOD = Method(
+    name="pads",
+    block=BlockParameters(
+        ("p2", "kr", "pad_m"), "padded", "kr", "p2", method.NOT_LIFTED, stored=("pad_m",)
+    ),
+    link=method.LOGIT,
+    forms={"pgv": Form(("b0", "b_ln_x_over_y", "b_pad"), _eta, 0)},
+    reads="outcomes",
+    meaning="probability that the block on pads fails",
+    fit=fits.outcomes,
+)
+'''
+
+ASKED = """
+import json
+import numpy as np
+import rbfrag
+from fastapi.testclient import TestClient
+from rbfrag.errors import InputError
+from rbfrag.service.app import make_app
+from rbfrag.service.settings import ServiceSettings
+
+motion = rbfrag.read_motions("record.csv")[0]
+outcomes = [
+    rbfrag.respond(motion, kind="padded", p2=3.0, kr=factor * motion.pga_g, pad_m=0.005).outcome
+    for factor in (0.66, 0.67)
+]
+try:
+    rbfrag.critical(motion, kind="padded", p2=3.0)
+except InputError as error:
+    refused = str(error)
+first = rbfrag.simulate("motions.db", kind="padded", jobs=1)
+again = rbfrag.simulate("motions.db", kind="padded", jobs=1)
+fitted = rbfrag.fit("motions.db", kind="padded", term="pgv").model.row
+block = {"p2": 3.0, "kr": 0.3, "pgv_m_s": 0.6}
+single = [
+    rbfrag.predict(**block, kind="padded", pad_m=pad, db="motions.db") for pad in (0.001, 0.005)
+]
+array = rbfrag.predict(**block, kind="padded", pad_m=np.array([0.001, 0.005]), db="motions.db")
+with TestClient(make_app(ServiceSettings(db="motions.db"))) as client:
+    asked = {"kind": "padded", "p2": 3.0, "kr": 0.3, "pad": 0.005, "pgv": 0.6}
+    http = client.get("/v1/predict", params=asked)
+print(json.dumps({
+    "outcomes": outcomes,
+    "refused": refused,
+    "stored": [first.combinations, first.not_searched, again.resumed],
+    "model": [fitted.kind, fitted.method, fitted.name],
+    "single": [each.probability for each in single],
+    "array": array.probability.tolist(),
+    "http": http.json(),
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package with one more kind, a record and a database of motions."""
+    folder = tmp_path_factory.mktemp("sixth")
+    additions = {
+        "solver/models/padded.py": MODEL,
+        "campaign/kinds/padded.py": CAMPAIGN,
+        "fragility/methods/pads.py": METHOD,
+    }
+    for path in PACKAGE.rglob("*"):
+        inside = path.relative_to(PACKAGE)
+        if path.is_dir() and path.name != "__pycache__":
+            (folder / "rbfrag" / inside).mkdir(parents=True)
+        elif "__pycache__" not in inside.parts:
+            (folder / "rbfrag" / inside).symlink_to(path)
+    for name, text in additions.items():
+        (folder / "rbfrag" / name).write_text(text)
+    for name, mark, line in (
+        ("question/fields.py", '"""What a model reads of a block beside its numbers', FIELD),
+        ("solver/kinds.py", '        KindFacts(\n            "rocking"', FACTS),
+    ):
+        text = (PACKAGE / name).read_text(encoding="utf-8")
+        head, found, rest = text.partition(mark)
+        assert found
+        if line == FIELD:
+            docstring, _, rest = rest.partition("\n")
+            text = f"{head}{found}{docstring}\n\n{line}{rest}"
+        else:
+            text = f"{head}{line}{found}{rest}"
+        (folder / "rbfrag" / name).unlink()
+        (folder / "rbfrag" / name).write_text(text, encoding="utf-8")
+    samples = shaking(3)
+    rows = (f"{0.02 * i:.2f},{a!r}" for i, a in enumerate(samples.tolist()))
+    (folder / "record.csv").write_text("\n".join(["time [s],acceleration [g]", *rows]))
+    with opened_database(folder / "motions.db", create=True) as engine, engine.begin() as into:
         for seed in range(12):
-            samples = (0.5 + 0.1 * seed) * shaking(seed, 450)
-            motion = GroundMotion(samples, 0.02, source_file=f"{seed}.txt")
+            motion = GroundMotion(
+                (0.5 + 0.1 * seed) * shaking(seed, 450), 0.02, source_file=f"{seed}.txt"
+            )
             quake = EarthquakeInfo(f"quake-{seed}", guessed=False)
-            add_motion(connection, motion, earthquake=quake, is_vertical=False, recording=str(seed))
-    return place
+            add_motion(into, motion, earthquake=quake, is_vertical=False, recording=str(seed))
+    return folder
 
 
-@pytest.mark.usefixtures("falls")
-def test_respond_answers() -> None:
-    motion = GroundMotion(shaking(3), 0.02)
-    for factor, outcome in ((0.99, "toppled"), (1.01, "stable")):
-        answer = rbfrag.respond(motion, kind="falls", p2=3.0, kr=factor * motion.pga_g)
-        assert (answer.kind, answer.outcome) == ("falls", outcome)
-    with pytest.raises(InputError, match="no search"):
-        rbfrag.critical(motion, kind="falls", p2=3.0)
+def run(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
-@pytest.mark.usefixtures("falls")
-def test_what_is_simulated_is_fitted_and_predicts(database: Path) -> None:
-    summary = rbfrag.simulate(database, kind="falls", jobs=1)
-    assert summary.combinations == summary.not_searched == 12 * 2 * 2
-    assert rbfrag.simulate(database, kind="falls", jobs=1).resumed == summary.combinations
-    model = rbfrag.fit(database, kind="falls", term="pgv", method="logistic").model.row
-    assert model.kind == "falls"
-    weak = rbfrag.predict(3.0, 0.02, kind="falls", pgv_m_s=0.6, db=database)
-    strong = rbfrag.predict(3.0, 2.0, kind="falls", pgv_m_s=0.6, db=database)
-    assert (weak.kind, weak.model) == ("falls", model.name)
-    assert weak.probability > 0.5 > strong.probability
-    with TestClient(make_app(ServiceSettings(db=str(database)))) as client:
-        asked = {"kind": "falls", "p2": 3.0, "kr": 0.02, "pgv": 0.6}
-        answer = client.get("/v1/predict", params=asked)
-        assert answer.status_code == 200, answer.text
-        assert answer.json()["probability"] == weak.probability
-        assert answer.json()["kind"] == "falls"
+def test_it_answers_by_every_door(folder: Path) -> None:
+    told = json.loads(run(folder, "-c", ASKED))
+    assert told["outcomes"] == ["toppled", "stable"]
+    assert "there is no search for the critical value of kind padded" in told["refused"]
+    assert told["stored"] == [12 * 2 * 4] * 3
+    kind, method, name = told["model"]
+    assert (kind, method) == ("padded", "pads")
+    thin, thick = told["single"]
+    assert 1.0 > thin > thick > 0.0
+    assert told["array"] == pytest.approx([thin, thick], rel=1e-12)
+    assert told["http"].get("probability") == thick, told["http"]
+    assert (told["http"]["kind"], told["http"]["model"]) == ("padded", name)
+    shell = ("-m", "rbfrag.cli.main")
+    asked = ("predict", "--kind", "padded", "--p2", "3", "--kr", "0.3", "--pgv", "0.6")
+    answer = json.loads(
+        run(folder, *shell, *asked, "--pad", "0.005", "--db", "motions.db", "--json")
+    )
+    assert answer["probability"] == thick
+    table = "kind,p2,kr,Pads [mm],PGV [m/s]\npadded,3,0.3,1,0.6\npadded,3,0.3,5,0.6\n"
+    (folder / "blocks.csv").write_text(table)
+    run(
+        folder, *shell, "predict", "--blocks", "blocks.csv", "--out", "answers.csv", "--db",
+        "motions.db",
+    )  # fmt: skip
+    head, *rows = (folder / "answers.csv").read_text().splitlines()
+    place = head.split(",").index("probability")
+    assert [float(row.split(",")[place]) for row in rows] == pytest.approx([thin, thick], rel=1e-9)
+    block = ("--kind", "padded", "--p2", "3", "--kr", "0.05", "--pad", "0.005")
+    answer = json.loads(run(folder, *shell, "respond", "record.csv", *block, "--json"))
+    assert (answer["kind"], answer["outcome"]) == ("padded", "toppled")

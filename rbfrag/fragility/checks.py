@@ -62,6 +62,11 @@ _DESCRIPTIONS = {
 }
 """Unit of each value, and what is to be given."""
 
+
+def _described(name: str) -> tuple[str, str]:
+    return _DESCRIPTIONS.get(name, ("", f"{name}, a number"))
+
+
 _ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s": "earthquake"}
 
 
@@ -84,7 +89,7 @@ class Remark:
         """Return the sentence for one value."""
         if not self.name:
             return self.text
-        unit = _DESCRIPTIONS[self.name][0]
+        unit = _described(self.name)[0]
         return f"{self.name} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
 
     def in_general(self) -> str:
@@ -131,7 +136,7 @@ def refusals(
     """Yield what makes an answer impossible; `signed` names the values that may be negative."""
     for name in needed:
         value = values[name]
-        wanted = _DESCRIPTIONS[name][1]
+        wanted = _described(name)[1]
         yield Remark(value != value, name, value, f"is not a number: give {wanted}")
         if name in _ABOVE_ZERO:
             yield Remark(value <= 0.0, name, value, f"is not above zero: give {wanted}")
@@ -193,7 +198,7 @@ def answer_with_findings(
         refuse(finding.holds, finding)
         missing = missing | finding.holds
     strength = given[block.strength]
-    wanted = _DESCRIPTIONS[block.strength][1]
+    wanted = _described(block.strength)[1]
     at_rest = (strength <= 0.0) & _not(missing)
     unstable(
         at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
@@ -262,7 +267,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         if name not in values or name in _RATIO_NAMES:
             continue
         value = values[name]
-        unit = _DESCRIPTIONS[name][0]
+        unit = _described(name)[0]
         # A p² computed from a shape may miss the edge by rounding.
         below, above = value < low * (1.0 - 1e-9), value > high * (1.0 + 1e-9)
         for holds, edge in ((below, low), (above, high)):

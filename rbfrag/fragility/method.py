@@ -195,6 +195,8 @@ class BlockParameters:
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
+        points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
+            blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
             nothing.
     """
@@ -211,6 +213,7 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
+    points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 
     @cached_property

@@ -12,7 +12,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
-from rbfrag.solver.kinds import NOT_BACKED, stands_free_of
+from rbfrag.solver.kinds import KINDS, NOT_BACKED, stands_free_of
 from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
@@ -43,6 +43,7 @@ def respond(
     horizontal: bool = False,
     restitution: float | None = None,
     history: bool = False,
+    **of_kind: float,
 ) -> Response:
     """Return what a block does under a ground motion, or under several one after another.
 
@@ -81,17 +82,24 @@ def respond(
         restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
             None for what angular momentum leaves at each corner.
         history: keep the motion in time.
+        of_kind: further settings of a kind, as its line in `rbfrag.solver.kinds` names them.
 
     Raises:
+        TypeError: a keyword that no kind knows.
         InputError: a value outside its range, a block given in no way or in two, a block that
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
             another model, components that cannot be brought together, a start of a block that
             carries none.
     """
+    known = {name for facts in KINDS.values() for name in facts.settings}
+    for name in of_kind:
+        if name not in known:
+            raise TypeError(f"respond() got an unexpected keyword argument {name!r}")
     settings = {
         "two_way": two_way or None,
         "horizontal": horizontal or None,
         "restitution": restitution,
+        **of_kind,
     }
     shaken = _Shaken(motion, vertical, polarity, history, gap_s, start)
     answer = shaken.answer

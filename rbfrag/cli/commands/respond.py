@@ -162,6 +162,7 @@ def respond(
     With --draws it is a block that is not known exactly: the answer is the share of the drawn
     blocks that fail, with its counting error.
     """
+    from rbfrag.solver.kinds import KINDS
     from rbfrag.solver.reports import response_as_dict, write_history
     from rbfrag.solver.respond import respond as run
 
@@ -207,6 +208,7 @@ def respond(
     title = ",\nthen ".join(ground.label for ground in grounds)
     several = len(grounds) > 1
     say_when_compiling()
+    settings = {name for facts in KINDS.values() for name in facts.settings}
     with given.named():
         response = run(
             grounds if several else grounds[0],
@@ -215,7 +217,7 @@ def respond(
             gap_s=direction.gap,
             two_way=model.two_way,
             horizontal=model.horizontal,
-            restitution=given.get("restitution"),
+            **{name: given[name] for name in settings if name in given},
             history=any((files.csv, files.plot, files.film)),
             **what,
         )

@@ -159,7 +159,7 @@ def read_source(
             for name in block.stored
         },
     )
-    if grid.outcome.shape[1] == 0 and block.strength == "kr":
+    if grid.outcome.shape[1] == 0 and block.points == "strengths":
         k, failed = _nothing_known(table)
         return replace(source, k_over_pga=k, failed=failed, displacement_m=None)
     return source
@@ -309,7 +309,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             f"{named} again, which adds those of the grid, or fit critical values, by method wls "
             "or lognormal"
         )
-    points = _READERS[method.block.names](source, method, term)
+    points = _READERS[method.block.points](source, method, term)
     own = points.combination
     keys = table.natural_key[own].astype(str)
     # further keys make the order, and so every sum, independent of the order of the rows
@@ -589,9 +589,9 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     )
 
 
-_READERS: Mapping[tuple[str, ...], Callable[[FitSource, Method, Term], _Points]] = {
-    ("p2", "kr"): _strengths,
-    ("ks", "ps2"): _scaled_records,
-    ("ky", "displacement_m"): _displacements,
+_READERS: Mapping[str, Callable[[FitSource, Method, Term], _Points]] = {
+    "strengths": _strengths,
+    "scaled_records": _scaled_records,
+    "displacements": _displacements,
 }
-"""How the columns of the database become points, by what describes the block."""
+"""How the columns of the database become points, as the description of the block says."""

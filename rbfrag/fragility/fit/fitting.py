@@ -163,7 +163,7 @@ def fit_source(
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fit(data, method, term, seed=seed, **options)
     dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
-    of_any_strength = method.block.strength == "kr"
+    of_any_strength = method.block.points == "strengths"
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"

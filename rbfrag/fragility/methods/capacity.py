@@ -29,6 +29,7 @@ BLOCK = BlockParameters(
         "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
     ),
     criterion="rotation_deg",
+    points="scaled_records",
     options=("leaves_g",),
     doubts=(
         Bound(

@@ -43,6 +43,7 @@ BLOCK = BlockParameters(
         "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
     ),
     options=("beta_deg",),
+    points="displacements",
     adjust=_level,
     refuses=(
         Bound(
