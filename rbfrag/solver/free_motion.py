@@ -18,6 +18,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.contacts import corner_at, corners_of
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.free_body import (
     AT_REST,
@@ -34,7 +35,7 @@ from rbfrag.solver.integrator.free_body import (
     Motion,
     run_free,
 )
-from rbfrag.solver.integrator.impulses import Corners, work_of
+from rbfrag.solver.integrator.impulses import work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.quantity import finite_or_none
@@ -269,25 +270,6 @@ def free_motion(
     )
 
 
-def gap_m(block: Block, pose: Pose) -> float:
-    """Return the gap between the heel and its back plane, along the base [m]."""
-    # normal distance of the heel from its plane, less that which a missing corner leaves at rest
-    gamma = math.radians(block.gamma_deg)
-    normal = (math.sin(gamma), math.cos(gamma))
-    low = [a - b for a, b in zip(block.lowest_on_back, block.heel, strict=True)]
-    off = low[0] * normal[0] + low[1] * normal[1]
-    x, y = _corner(pose.centroid_m, pose.turned_rad, block.heel)
-    gap = (x * normal[0] + y * normal[1] - off) / normal[0]
-    return gap if gap > 1e-12 * block.r3_m else 0.0
-
-
-def _corner(
-    centroid: tuple[float, float], turned_rad: float, arm: tuple[float, float]
-) -> tuple[float, float]:
-    c, s = math.cos(turned_rad), math.sin(turned_rad)
-    return centroid[0] + arm[0] * c - arm[1] * s, centroid[1] + arm[0] * s + arm[1] * c
-
-
 def _run(
     site: BlockOnPlanes,
     excited: Excitation,
@@ -297,7 +279,7 @@ def _run(
 ) -> tuple[FreeRun, FloatArray]:
     block = site.block
     assert block is not None
-    corners = _corners(site, block)
+    corners = corners_of(site, block)
     frame = Frame(
         block.inertia_m2,
         math.sin(site.beta_rad),
@@ -323,36 +305,8 @@ def _run(
             raise InputError("the record is too long to follow the block in steps: cut it")
 
 
-def _corners(site: BlockOnPlanes, block: Block) -> Corners:
-    """Return the pairs of corner and plane: those with the base first."""
-    arms = np.array(block.outline)
-    gamma = math.radians(block.gamma_deg)
-    # of base and back plane, into the block; each plane touches its nearest corner at rest
-    normals = [(0.0, 1.0), (math.sin(gamma), math.cos(gamma))]
-    from_heel = arms - np.array(block.heel)
-    planes = 2 if site.back_fracture else 1
-    offs = [float((from_heel @ np.array(normal)).min()) for normal in normals]
-    n = len(arms)
-    friction = (math.tan(site.phi_rad), math.tan(site.phi_back_rad))
-    named = {block.heel: HEEL, block.toe: TOE}
-    bits = [named.get(arm, ON_BASE) for arm in block.outline] + [ON_BACK] * (planes - 1) * n
-
-    def both(values: list[float] | tuple[float, ...]) -> FloatArray:
-        return np.repeat(np.array(values[:planes], dtype=np.float64), n)
-
-    return Corners(
-        np.tile(arms[:, 0], planes),
-        np.tile(arms[:, 1], planes),
-        both([x for x, _ in normals]),
-        both([y for _, y in normals]),
-        both(offs),
-        both(friction),
-        np.array(bits, dtype=np.float64),
-    )
-
-
 def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
-    here = _corner((at.x, at.y), at.turned, contact)
+    here = corner_at((at.x, at.y), at.turned, contact)
     start = contact[0] - block.heel[0]
     return Pose(at.turned, (at.x, at.y), here[0] - start)
 
@@ -423,26 +377,3 @@ def released(time_s: float, pose: Callable[[float], Pose], position: float, rate
     before, after = pose(position - half), pose(position + half)
     vx, vy = ((b - a) / _MOMENT_S for a, b in zip(before.centroid_m, after.centroid_m, strict=True))
     return Release(time_s, here, (vx, vy), (after.turned_rad - before.turned_rad) / _MOMENT_S)
-
-
-_TOUCHES = 1e-6
-"""Distance from a plane, over the size of the block, at which a corner touches it: steps leave
-a few times 1e-9 of it."""
-
-
-def touching(site: BlockOnPlanes, pose: Pose) -> tuple[str, ...]:
-    """Return which corners of a block touch which plane."""
-    block = site.block
-    assert block is not None
-    corners = _corners(site, block)
-    n = len(block.outline)
-    names = {block.heel: "heel", block.toe: "toe", block.back: "upper back corner"}
-    contacts = []
-    for i in range(corners.arm_x.size):
-        arm = block.outline[i % n]
-        x, y = _corner(pose.centroid_m, pose.turned_rad, arm)
-        away = x * corners.normal_x[i] + y * corners.normal_y[i] - corners.off_m[i]
-        if away <= _TOUCHES * block.r3_m:
-            plane = "base" if i < n else "back plane"
-            contacts.append(f"{names.get(arm, 'another corner')} on the {plane}")
-    return tuple(contacts)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rbfrag.solver.contacts import gap_m, touching
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
     FreeError,
@@ -14,9 +15,7 @@ from rbfrag.solver.free_motion import (
     Kinematics,
     Release,
     free_motion,
-    gap_m,
     released,
-    touching,
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow

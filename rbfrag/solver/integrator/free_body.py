@@ -227,7 +227,7 @@ def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
 
 
 @within
-def kept(history: FloatArray, filled: int, now: float, at: Motion, touch: int) -> int:
+def append_state(history: FloatArray, filled: int, now: float, at: Motion, touch: int) -> int:
     """Fill one more column of a history that is not full; how many are filled."""
     if filled >= history.shape[1]:
         return filled
@@ -331,7 +331,7 @@ def run_free(
                 landed_s = now
             # standstills and starts, and the end of every interval, whatever is due
             if since_kept >= KEEP or resting != was or n == parts - 1:
-                filled = kept(history, filled, now, at, touch)
+                filled = append_state(history, filled, now, at, touch)
                 since_kept = 0
             stop = stop_of(frame, at)
             if stop != GOES_ON:
