@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from operator import mul
 from typing import Any, Literal, NamedTuple
 
 from rbfrag.fragility.dependence import normal_quantile, normal_share
@@ -97,6 +98,11 @@ class Eta(NamedTuple):
     slopes: tuple[Any, ...]
     log_sigma: Any = None
     sigma_slopes: tuple[Any, ...] = ()
+
+
+def linear(b: Sequence[float], *features: Any) -> Eta:
+    """Return eta = Σ b·feature, whose slopes are the features."""
+    return Eta(sum(map(mul, b, features)), features)
 
 
 class Link(NamedTuple):

@@ -23,46 +23,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from operator import mul
 from typing import Any
 
 from rbfrag.fragility import fits, method
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, log_strength
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear, log_strength
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
-    f1, f2, f3 = -ns.log(ratio), ns.log(1.0 - ratio), ns.log(v["p"])
-    f4 = f3 * f3
-    return Eta(b[0] + b[1] * f1 + b[2] * f2 + b[3] * f3 + b[4] * f4, (1.0, f1, f2, f3, f4))
+    l = ns.log(v["p"])  # noqa: E741  as in the formula
+    return linear(b, 1.0, -ns.log(ratio), ns.log(1.0 - ratio), l, l * l)
 
 
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     pga, x = v["pga_g"], v["intensity_m_s"]
     r = v["kr"] / pga
-    f1, f2 = -ns.log(r), ns.log(1.0 - r)
-    f3 = ns.log(1.0 - v["y_m_s"] / (2.0 * x))
-    f4 = ns.log(v["p"] * x / (pga * STANDARD_GRAVITY_M_S2))
-    return Eta(b[0] + b[1] * f1 + b[2] * f2 + b[3] * f3 + b[4] * f4, (1.0, f1, f2, f3, f4))
+    below_two_pgv = ns.log(1.0 - v["y_m_s"] / (2.0 * x))
+    log_z = ns.log(v["p"] * x / (pga * STANDARD_GRAVITY_M_S2))
+    return linear(b, 1.0, -ns.log(r), ns.log(1.0 - r), below_two_pgv, log_z)
 
 
 def _pgv_pga_tm(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    eta, slopes, _, _ = _pgv_pga(b, v, ns)
-    f5 = ns.log(v["p"] * v["tm_s"] / (2.0 * math.pi))
-    return Eta(eta + b[5] * f5, (*slopes, f5))
-
-
-def _sum(b: Sequence[float], slopes: tuple[Any, ...]) -> Eta:
-    return Eta(sum(map(mul, b, slopes)), slopes)
+    return linear(b, *_pgv_pga(b, v, ns).slopes, ns.log(v["p"] * v["tm_s"] / (2.0 * math.pi)))
 
 
 def _pgv_kr(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
     l = ns.log(v["p"])  # noqa: E741  as in the formula
     logs = (-ns.log(ratio), ns.log(1.0 - ratio), log_strength(v, ns))
-    return _sum(b, (1.0, l, l * l, *logs))
+    return linear(b, 1.0, l, l * l, *logs)
 
 
 def _pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers, *measures: str) -> Eta:
@@ -73,7 +64,7 @@ def _pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers, *measures: str) 
         # V_T/(PGA g), in which g drops out
         q = ns.log(v[measure] / pga * (_PERIOD_S[measure] / (2.0 * math.pi)))
         slopes += [q, q * l]
-    return _sum(b, tuple(slopes))
+    return linear(b, *slopes)
 
 
 def _with_spectrum(*periods: str) -> Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]:

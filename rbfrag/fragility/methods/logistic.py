@@ -15,25 +15,20 @@ On the reference h lowers the held-out log loss from .1794, .1925 and .1470 to .
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import mul
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, log_strength
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear, log_strength
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
-    if len(b) == 2:
-        return Eta(b[0] + b[1] * ratio, (1.0, ratio))
-    log_p = ns.log(v["p"])
-    return Eta(b[0] + b[1] * ratio + b[2] * log_p, (1.0, ratio, log_p))
+    return linear(b, 1.0, ratio) if len(b) == 2 else linear(b, 1.0, ratio, ns.log(v["p"]))
 
 
 def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     x, l = v["intensity_m_s"], ns.log(v["p"])  # noqa: E741  as in the formula
-    slopes = (1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
-    return Eta(sum(map(mul, b, slopes)), slopes)
+    return linear(b, 1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
 
 
 _SPECTRAL = ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength")

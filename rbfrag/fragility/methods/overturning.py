@@ -18,11 +18,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from operator import mul
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import BlockParameters, Bound, Eta, Form, Method, Numbers, SizeFactor
+from rbfrag.fragility.method import (
+    BlockParameters,
+    Bound,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+    SizeFactor,
+    linear,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST_RESTITUTION = 1e-6
@@ -68,10 +76,6 @@ BLOCK = BlockParameters(
 """Free-standing blocks known by p² [1/s²], k_r = tan(critical angle) and, if given, restitution."""
 
 
-def _sum(b: Sequence[float], slopes: tuple[Any, ...]) -> Eta:
-    return Eta(sum(map(mul, b, slopes)), slopes)
-
-
 def _log_odds(v: Mapping[str, Any], ns: Numbers) -> Any:
     r = v["kr"] / v["pga_g"]
     return ns.log(r / (1.0 - r))
@@ -80,20 +84,20 @@ def _log_odds(v: Mapping[str, Any], ns: Numbers) -> Any:
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     odds, s = _log_odds(v, ns), v["speed_loss"]
     z = ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    return _sum(b, (1.0, odds, z, s, s * odds))
+    return linear(b, 1.0, odds, z, s, s * odds)
 
 
 def _velocity(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     s = v["speed_loss"]
     u, l = ns.log(v["y_m_s"] / v["intensity_m_s"]), ns.log(v["p"])  # noqa: E741  as in the formula
-    return _sum(b, (1.0, u, l, l * l, s, s * u))
+    return linear(b, 1.0, u, l, l * l, s, s * u)
 
 
 def _pga_sa10(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     odds, s = _log_odds(v, ns), v["speed_loss"]
     l = ns.log(v["p"])  # noqa: E741  as in the formula
     q = ns.log(v["sa10_g"] / v["pga_g"] * (0.5 / math.pi))
-    return _sum(b, (1.0, odds, l, l * l, s, s * odds, q))
+    return linear(b, 1.0, odds, l, l * l, s, s * odds, q)
 
 
 _OF_VELOCITY = ("b0", "b_ln_y_over_x", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_ln_y_over_x")

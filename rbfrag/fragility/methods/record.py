@@ -12,15 +12,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor
+from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     x = v["intensity_m_s"]
-    f1 = ns.log(x / v["y_m_s"])
-    f2 = ns.log(v["p"] * x / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    return Eta(b[0] + b[1] * f1 + b[2] * f2, (1.0, f1, f2))
+    log_s = ns.log(v["p"] * x / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
+    return linear(b, 1.0, ns.log(x / v["y_m_s"]), log_s)
 
 
 METHOD = Method(
