@@ -11,7 +11,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,34 +47,6 @@ class Likelihood(Protocol):
         """Return score, shape (k,), and information, shape (k, k), of rows that count `times`."""
 
 
-class FittedLink(NamedTuple):
-    """What fits need of a link beside F(eta).
-
-    Args:
-        slope: dF/deta.
-        eta: the inverse of F.
-    """
-
-    slope: Callable[[FloatArray], FloatArray]
-    eta: Callable[[FloatArray], FloatArray]
-
-
-def _logistic_slope(eta: FloatArray) -> FloatArray:
-    return np.asarray(0.25 / np.cosh(np.clip(0.5 * eta, -300.0, 300.0)) ** 2)
-
-
-def _loglog_slope(eta: FloatArray) -> FloatArray:
-    decay = np.exp(-np.clip(eta, -30.0, 700.0))
-    return np.asarray(decay * np.exp(-decay))
-
-
-LINKS: Mapping[str, FittedLink] = {
-    "logit": FittedLink(_logistic_slope, lambda p: np.log(p / (1.0 - p))),
-    "loglog": FittedLink(_loglog_slope, lambda p: -np.log(-np.log(p))),
-}
-"""The links of outcomes by name."""
-
-
 @dataclass(frozen=True, eq=False)
 class Binomial:
     """Rows of a fit of outcomes, P = F(features · b).
@@ -99,10 +71,13 @@ class Binomial:
         )
         return Binomial(self.link, columns, outcome, weights, self.event[chosen])
 
+    def eta(self, b: FloatArray) -> FloatArray:
+        """Return the argument of the link of each row, as far as exponentials are finite."""
+        return np.clip(self.columns @ b, -700.0, 700.0)
+
     def probability(self, b: FloatArray) -> FloatArray:
         """Return P of each row."""
-        eta = np.clip(self.columns @ b, -700.0, 700.0)
-        return np.asarray(self.link.probability(eta, arrays()), dtype=np.float64)
+        return np.asarray(self.link.probability(self.eta(b), arrays()), dtype=np.float64)
 
     def log_likelihood(self, b: FloatArray) -> FloatArray:
         """Return the weighted log likelihood of each row."""
@@ -115,13 +90,13 @@ class Binomial:
         """Return score and expected information."""
         x, w = self.columns, self.weights if times is None else self.weights * times
         p = np.clip(self.probability(b), _EDGE, 1.0 - _EDGE)
-        slope = LINKS[self.link.name].slope(x @ b)
+        slope = self.link.density(self.eta(b), arrays())
         per_eta = w * slope / (p * (1.0 - p))
         return x.T @ (per_eta * (self.outcome - p)), (x * (per_eta * slope)[:, None]).T @ x
 
     def start(self) -> FloatArray:
         """Return parameters to start from: least squares of P = 0.9 and 0.1."""
-        middle = LINKS[self.link.name].eta(np.where(self.outcome > 0.5, 0.9, 0.1))
+        middle = self.link.quantile(np.where(self.outcome > 0.5, 0.9, 0.1), arrays())
         root = np.sqrt(self.weights)
         return np.asarray(
             np.linalg.lstsq(self.columns * root[:, None], middle * root, rcond=None)[0],
