@@ -40,14 +40,14 @@ def study(
         if time.process_time() - started > seconds:
             break
         for polarity in POLARITIES:
-            drive = excitation(recording.motion, None, polarity)
+            excited = excitation(recording.motion, None, polarity)
             for p2 in DEFAULT_P2:
-                for kr in (drive.pga_g * np.exp(rng.uniform(edges[:-1], edges[1:]))).tolist():
-                    if drive.max_q <= kr:
+                for kr in (excited.pga_g * np.exp(rng.uniform(edges[:-1], edges[1:]))).tolist():
+                    if excited.max_q <= kr:
                         never += 1
                         continue
-                    run = simulate(drive, p2=p2, kr=kr)
-                    true = truth(drive, p2=p2, kr=kr)
+                    run = simulate(excited, p2=p2, kr=kr)
+                    true = truth(excited, p2=p2, kr=kr)
                     runs += 1
                     mine = OUTCOMES[run.outcome].value
                     name = f"{recording.name} {polarity} p2={p2:g} kr={kr!r}"

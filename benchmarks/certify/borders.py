@@ -27,7 +27,7 @@ BISECTED = 1e-17
 Pair = tuple[float, float]
 
 
-def border(drive: Excitation, p2: float, topples: float, stays: float) -> Pair | None:
+def border(excited: Excitation, p2: float, topples: float, stays: float) -> Pair | None:
     """Bisect between two k_r with the reference alone; the k_r is a pair, None if they agree.
 
     The ends come from the search; they are moved apart until the reference itself finds one
@@ -37,23 +37,23 @@ def border(drive: Excitation, p2: float, topples: float, stays: float) -> Pair |
     span = stays - topples
     for widened in (1.0, 10.0, 100.0):
         low, high = -0.5 * span * widened, 0.5 * span * widened
-        if _topples(drive, p2, middle, low) and not _topples(drive, p2, middle, high):
+        if _topples(excited, p2, middle, low) and not _topples(excited, p2, middle, high):
             break
     else:
         return None
     while abs(high - low) > BISECTED * middle:
         offset = 0.5 * (low + high)
-        if _topples(drive, p2, middle, offset):
+        if _topples(excited, p2, middle, offset):
             low = offset
         else:
             high = offset
     return middle, 0.5 * (low + high)
 
 
-def _topples(drive: Excitation, p2: float, kr: float, offset: float) -> bool:
+def _topples(excited: Excitation, p2: float, kr: float, offset: float) -> bool:
     high = kr + offset
     low = offset - (high - kr)
-    return truth(drive, p2=p2, kr=(high, low)).outcome == "toppled"
+    return truth(excited, p2=p2, kr=(high, low)).outcome == "toppled"
 
 
 def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict[str, Any]:
@@ -69,20 +69,20 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
         )  # fmt: skip
         if result.status != "found" or result.lower is None or result.upper is None:
             continue
-        drive = one.drive()
-        pairs = [(result.lower * drive.pga_g, result.upper * drive.pga_g)]
+        excited = one.excited()
+        pairs = [(result.lower * excited.pga_g, result.upper * excited.pga_g)]
         said = result.intervals.outcome
         for m in rng.permutation(max(len(said) - 2, 0)).tolist():
             if len(pairs) > OF_ONE_MAP:
                 break
             ends = {said[m], said[m + 2]}
             if said[m + 1] == "undecided" and ends == {"safe", "topples"}:
-                low = float(result.intervals.k_lo[m + 1]) * drive.pga_g
-                high = float(result.intervals.k_hi[m + 1]) * drive.pga_g
+                low = float(result.intervals.k_lo[m + 1]) * excited.pga_g
+                high = float(result.intervals.k_hi[m + 1]) * excited.pga_g
                 pairs.append((low, high) if said[m] == "topples" else (high, low))
-        run = runner(drive, p2=one.p2)
+        run = runner(excited, p2=one.p2)
         for topples, stays in pairs:
-            critical_kr = border(drive, one.p2, topples, stays)
+            critical_kr = border(excited, one.p2, topples, stays)
             if critical_kr is None:
                 wrong.append(f"{one.name}: the reference sees no border at {topples!r}")
                 continue
@@ -93,7 +93,7 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
                 for side in (-1.0, 1.0):
                     kr = critical_kr[0] * (1.0 + side * distance)
                     mine = OUTCOMES[run(kr).outcome].value
-                    true = truth(drive, p2=one.p2, kr=kr).outcome
+                    true = truth(excited, p2=one.p2, kr=kr).outcome
                     if mine == true:
                         table[distance]["same"] += 1
                     elif mine == "undetermined":

@@ -33,10 +33,10 @@ class Count:
     undetermined: int = 0
 
     def check(
-        self, drive: Excitation, p2: float, low: float, high: float, topples: bool, kr: FloatArray
+        self, excited: Excitation, p2: float, low: float, high: float, topples: bool, kr: FloatArray
     ) -> list[str]:
         """Run blocks inside [low, high], of which it is said whether they topple."""
-        run = runner(drive, p2=p2)
+        run = runner(excited, p2=p2)
         self.intervals += 1
         self.topple += topples
         wrong = []
@@ -52,20 +52,20 @@ class Count:
 
 
 def inner_values(
-    drive: Excitation, low: float, high: float, rng: np.random.Generator
+    excited: Excitation, low: float, high: float, rng: np.random.Generator
 ) -> FloatArray:
     """Ten k_r of [low, high]: both ends, samples of q that lie between, the rest at random."""
-    q = drive.q[(drive.q > low) & (drive.q < high)]
+    q = excited.q[(excited.q > low) & (excited.q < high)]
     at_samples = rng.choice(q, min(3, q.size), replace=False) if q.size else q
     random = rng.uniform(low, high, INNER - 2 - at_samples.size)
     return np.concatenate([[low, high], at_samples, random])
 
 
-def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | None:
+def verdict_on(excited: Excitation, p2: float, low: float, high: float) -> bool | None:
     """Ask the rules of the search for one interval of k_r: all topple, none does, or None."""
     verdict = _verdict(
-        block_excitation(drive, p2=p2), low, high, MARGIN, not keeps_order(drive),
-        excursion_table(drive.q.size), no_work(),
+        block_excitation(excited, p2=p2), low, high, MARGIN, not keeps_order(excited),
+        excursion_table(excited.q.size), no_work(),
     )  # fmt: skip
     return {ALL_SAFE: False, ALL_TOPPLE: True}.get(verdict)
 

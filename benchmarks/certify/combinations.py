@@ -39,7 +39,7 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
             continue
         certified += result.certified
         slivers += bool(result.undecided)
-        if keeps_order(one.drive()):
+        if keeps_order(one.excited()):
             ordered += 1
             if not result.certified:
                 missed.append(one.name)

@@ -62,8 +62,8 @@ def study(
         )
         if result.status == "outside_model" or not result.intervals.outcome:
             continue
-        drive = excitation(motion, up, polarity)
-        pga = drive.pga_g
+        excited = excitation(motion, up, polarity)
+        pga = excited.pga_g
         here: list[str] = []
         decided = [m for m, w in enumerate(result.intervals.outcome) if w != "undecided"]
         count = in_maps.setdefault(kind, Count())
@@ -73,8 +73,8 @@ def study(
             low = result.intervals.k_lo[m] if rng.random() < 0.3 else ends.min()
             high = result.intervals.k_hi[m] if rng.random() < 0.3 else ends.max()
             topples = result.intervals.outcome[m] == "topples"
-            kr = inner_values(drive, low * pga, high * pga, rng)
-            here += count.check(drive, p2, low * pga, high * pga, topples, kr)
+            kr = inner_values(excited, low * pga, high * pga, rng)
+            here += count.check(excited, p2, low * pga, high * pga, topples, kr)
             done += 1
         count = direct.setdefault(kind, Count())
         top = max(result.k_up_over_pga or 0.02, 0.02) * pga
@@ -86,11 +86,11 @@ def study(
                 low = pga * rng.uniform(result.intervals.k_lo[m], result.intervals.k_hi[m])
             high = low * (1.0 + np.exp(rng.uniform(np.log(1e-7), np.log(0.3))))
             asked += 1
-            answer = verdict_on(drive, p2, low, high)
+            answer = verdict_on(excited, p2, low, high)
             if answer is None:
                 continue
-            kr = inner_values(drive, low, high, rng)
-            here += count.check(drive, p2, low, high, answer, kr)
+            kr = inner_values(excited, low, high, rng)
+            here += count.check(excited, p2, low, high, answer, kr)
             done += 1
         wrong += [f"{kind} {motion.label} p2={p2!r} {polarity}: {sentence}" for sentence in here]
     return {

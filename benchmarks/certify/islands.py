@@ -65,15 +65,15 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
         uncertified += not result.certified
         narrowest = min(narrowest, *gaps)
         said = np.array(result.intervals.outcome)
-        drive = one.drive()
-        run = runner(drive, p2=one.p2)
+        excited = one.excited()
+        run = runner(excited, p2=one.p2)
         bottom = result.search_limit
-        top = drive.max_q / drive.pga_g
+        top = excited.max_q / excited.pga_g
         half = values // 2
         ratios = np.concatenate(
             [np.linspace(bottom, top, half), np.geomspace(bottom, top, values - half)]
         )
-        outcomes = np.array([run(r * drive.pga_g).outcome for r in ratios.tolist()])
+        outcomes = np.array([run(r * excited.pga_g).outcome for r in ratios.tolist()])
         blocks += ratios.size
         at = np.minimum(np.searchsorted(result.intervals.k_hi, ratios), said.size - 1)
         undetermined += int(((outcomes != STABLE) & (outcomes != TOPPLED)).sum())

@@ -48,7 +48,7 @@ class Combination:
         vertical = ", vertical" if self.with_vertical else ""
         return f"{self.recording.name} {self.polarity} p2={self.p2:g}{vertical}"
 
-    def drive(self) -> Excitation:
+    def excited(self) -> Excitation:
         return excitation(self.recording.motion, self.vertical, self.polarity)
 
 

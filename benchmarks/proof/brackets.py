@@ -98,7 +98,7 @@ def prove(one: Combination, seconds: float) -> Row | None:
     result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
     if result.status != "found" or result.lower is None or result.upper is None:
         return None
-    excited = one.drive()
+    excited = one.excited()
     lower, upper = result.lower * excited.pga_g, result.upper * excited.pga_g
     k_up = (result.k_up_over_pga or np.nan) * excited.pga_g
     started = time.process_time()

@@ -106,8 +106,8 @@ def test_it_agrees_with_two_other_integrators(seed: int, p2: float) -> None:
 
 
 def test_energy_between_jumps_is_kept_to_30_digits() -> None:
-    # a constant drive, then none: the peak is that of the energy at the end of the drive, and
-    # a drive that goes on at the same level past a repeated node changes nothing
+    # a constant excitation, then none: the peak is that of the energy at the end of it, and
+    # one that goes on at the same level past a repeated node changes nothing
     kr = 0.3
     once = GroundMotion.from_nodes([0.0, 0.0, 0.4, 0.4, 3.0], [0.0, 0.5, 0.5, 0.0, 0.0])
     cut = GroundMotion.from_nodes(

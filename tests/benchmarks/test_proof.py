@@ -225,7 +225,7 @@ def test_a_block_on_the_wrong_side_is_no_proof() -> None:
     assert row.off_proven
     found = critical(PULSE, p2=5.0)
     assert found.upper is not None
-    wrong = enclose(one.drive(), p2=5.0, kr=found.upper * one.drive().pga_g * (1.0 + 1e-9))
+    wrong = enclose(one.excited(), p2=5.0, kr=found.upper * one.excited().pga_g * (1.0 + 1e-9))
     assert wrong.outcome != TOPPLED
 
 

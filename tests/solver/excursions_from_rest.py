@@ -16,7 +16,7 @@ def failing(excitation: BlockExcitation, table: ExcursionTable, kr: float) -> in
 
 
 def fails(excitation: Excitation, p2: float, kr: float) -> bool:
-    """Whether a block that starts from rest at any rise of the drive above k_r topples."""
+    """Whether a block that starts from rest at any rise of k_h/(1 + k_v) above k_r topples."""
     table = excursion_table(excitation.q.size)
     return failing(block_excitation(excitation, p2=p2), table, kr) > 0
 

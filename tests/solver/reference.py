@@ -47,8 +47,8 @@ class _Interval:
     def slope(self, t: float, y: Vector) -> Vector:
         k, w = self.k[0] + self.dk * t, self.w[0] + self.dw * t
         x = self.theta_c - y[0]
-        drive = k - w * x if self.linear else k * math.cos(x) - w * math.sin(x)
-        return np.array([y[1], self.p2 * drive])
+        excited = k - w * x if self.linear else k * math.cos(x) - w * math.sin(x)
+        return np.array([y[1], self.p2 * excited])
 
     def steps(self, t: float, y: Vector, end: float) -> list[tuple[float, Vector]]:
         """Points that the method itself lands on, the start left out."""

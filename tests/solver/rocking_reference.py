@@ -72,8 +72,8 @@ class _Arc:
 
     def slope(self, t: float, y: Vector) -> Vector:
         x = self.c - y[0]
-        drive = (self.k0 + self.dk * t) * math.cos(x) - (self.w0 + self.dw * t) * math.sin(x)
-        return np.array([y[1], self.p2 * drive])
+        excited = (self.k0 + self.dk * t) * math.cos(x) - (self.w0 + self.dw * t) * math.sin(x)
+        return np.array([y[1], self.p2 * excited])
 
     def to(self, t: float, y: Vector, end: float) -> Vector:
         if end <= t:

@@ -71,8 +71,8 @@ def compare(
 ) -> tuple[str, float]:
     """Return the outcome both agree on and the relative deviation of the peak."""
     run = respond(motion, vertical=vertical, p2=p2, kr=kr, polarity=polarity)
-    drive = excitation(motion, vertical, polarity)
-    truth = integrate(drive.time_s, drive.k_h, drive.w - 1.0, p2=p2, kr=kr)
+    excited = excitation(motion, vertical, polarity)
+    truth = integrate(excited.time_s, excited.k_h, excited.w - 1.0, p2=p2, kr=kr)
     assert run.outcome == truth.outcome, (motion.source_file, p2, kr)
     if run.outcome is not Outcome.STABLE:
         assert run.peak_theta_rad is None

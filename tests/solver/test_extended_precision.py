@@ -43,17 +43,17 @@ def test_outcome_next_to_critical(
     assert result.status == "found"
     assert result.lower is not None
     assert result.upper is not None
-    drive = excitation(motion, vertical, polarity)
+    excited = excitation(motion, vertical, polarity)
     # where the border lies, the reference decides by itself, to 17 digits
-    found = border(drive, p2, result.lower * drive.pga_g, result.upper * drive.pga_g)
+    found = border(excited, p2, result.lower * excited.pga_g, result.upper * excited.pga_g)
     assert found is not None
     assert result.kr == pytest.approx(found[0], rel=2e-9)
     outcomes = set()
     for distance in DISTANCES:
         for side in (-1.0, 1.0):
             kr = found[0] * (1.0 + side * distance)
-            mine = OUTCOMES[simulate(drive, p2=p2, kr=kr).outcome].value
-            assert mine == truth(drive, p2=p2, kr=kr).outcome, (distance, side)
+            mine = OUTCOMES[simulate(excited, p2=p2, kr=kr).outcome].value
+            assert mine == truth(excited, p2=p2, kr=kr).outcome, (distance, side)
             outcomes.add((side, mine))
     assert {(-1.0, "toppled"), (1.0, "stable")} <= outcomes
 
@@ -69,11 +69,11 @@ def test_peaks_errors_and_their_estimates(records_dir: Path) -> None:
     for file in sorted({name for name, *_ in NEAR_CRITICAL}):
         motion = read_motions(records_dir / file)[0]
         for polarity in POLARITIES:
-            drive = excitation(motion, None, polarity)
+            excited = excitation(motion, None, polarity)
             for p2 in (30.0, 10.0, 3.0, 1.0, 0.3, 0.1):
-                kr = float(drive.pga_g * np.exp(rng.uniform(np.log(0.05), np.log(0.9))))
-                run = simulate(drive, p2=p2, kr=kr)
-                true = truth(drive, p2=p2, kr=kr)
+                kr = float(excited.pga_g * np.exp(rng.uniform(np.log(0.05), np.log(0.9))))
+                run = simulate(excited, p2=p2, kr=kr)
+                true = truth(excited, p2=p2, kr=kr)
                 assert OUTCOMES[run.outcome].value == true.outcome
                 assert run.samples_moved == true.intervals_moved
                 if true.outcome != "stable" or true.peak_rad == 0.0:

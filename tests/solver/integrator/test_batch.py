@@ -18,14 +18,14 @@ from tests.solver.search.test_critical import shaking
 @pytest.mark.parametrize("with_vertical", [False, True])
 def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(with_vertical: bool) -> None:
     vertical = shaking(60, pga_g=0.4) if with_vertical else None
-    drive = excitation(shaking(11), vertical, "reverse")
-    kr = np.geomspace(0.02, 1.1 * drive.max_q, 23)
+    excited = excitation(shaking(11), vertical, "reverse")
+    kr = np.geomspace(0.02, 1.1 * excited.max_q, 23)
     p2 = np.array([30.0, 3.0, 0.1])[:, None]
-    runs = simulate_many(drive, p2=p2, kr=kr)
+    runs = simulate_many(excited, p2=p2, kr=kr)
     outcomes = set()
     for i in range(3):
         for j in range(23):
-            alone = simulate(drive, p2=float(p2[i, 0]), kr=float(kr[j]))
+            alone = simulate(excited, p2=float(p2[i, 0]), kr=float(kr[j]))
             here = (
                 runs.outcome[i, j], runs.peak_rad[i, j], runs.started_s[i, j],
                 runs.verdict_s[i, j], runs.steps[i, j], runs.samples_moved[i, j],
@@ -40,11 +40,11 @@ def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(with_vertical:
 
 
 def test_a_batch_does_not_depend_on_its_company_or_order() -> None:
-    drive = excitation(shaking(3))
+    excited = excitation(shaking(3))
     kr = np.geomspace(0.03, 0.5, 40)
-    together = simulate_many(drive, p2=10.0, kr=kr)
-    backwards = simulate_many(drive, p2=10.0, kr=kr[::-1])
-    few = simulate_many(drive, p2=10.0, kr=kr[7:9])
+    together = simulate_many(excited, p2=10.0, kr=kr)
+    backwards = simulate_many(excited, p2=10.0, kr=kr[::-1])
+    few = simulate_many(excited, p2=10.0, kr=kr[7:9])
     np.testing.assert_array_equal(together.theta_n, backwards.theta_n[::-1])
     np.testing.assert_array_equal(together.theta_n[7:9], few.theta_n)
     assert together.outcome.shape == (40,)
@@ -65,6 +65,6 @@ def test_a_batch_of_none_is_empty() -> None:
     ],
 )
 def test_bad_blocks_are_named(p2: object, kr: object, words: str) -> None:
-    drive = excitation(GroundMotion(np.array([0.0, 0.2, 0.0]), 0.1))
+    excited = excitation(GroundMotion(np.array([0.0, 0.2, 0.0]), 0.1))
     with pytest.raises(InputError, match=words):
-        simulate_many(drive, p2=p2, kr=kr)  # type: ignore[arg-type]
+        simulate_many(excited, p2=p2, kr=kr)  # type: ignore[arg-type]

@@ -20,14 +20,14 @@ Problem = tuple[Excitation, float, Truth]
 
 @pytest.fixture(scope="module")
 def problems() -> list[Problem]:
-    """Two dozen blocks thrown up by a jump, under a straight drive and a straight gravity.
+    """Two dozen blocks thrown up by a jump, under a straight k_h and a straight gravity.
 
     Chosen so that nothing but the step can err. The motion starts at a node and the steps are
     of one length, so no step is cut by an event. The block is still rising when the record
     ends, so its peak is a closed form of the state there and not a root inside a step, where
     the polynomial is less accurate than at its end. None is close to toppling, where the error
     of a coarse step would decide. With one problem alone the leading term of its error may
-    happen to be small (its sign changes with the problem, and from rest under a constant drive
+    happen to be small (its sign changes with the problem, and from rest under a constant k_h
     every other coefficient vanishes): hence the root mean square over many.
     """
     rng = np.random.default_rng(0)
@@ -43,16 +43,16 @@ def problems() -> list[Problem]:
             continue
         rising = np.interp(END_S, run.history.time_s, run.history.theta_dot_rad_s)
         if rising > 0.02:
-            drive = excitation(pull, lift)
-            found.append((drive, kr, truth(drive, p2=1.0, kr=kr)))
+            excited = excitation(pull, lift)
+            found.append((excited, kr, truth(excited, p2=1.0, kr=kr)))
     return found
 
 
 def error(problems: list[Problem], order: int, steps: int) -> float:
     """Root mean square of the relative errors of the peaks."""
     squares = []
-    for drive, kr, true in problems:
-        run = simulate(drive, p2=1.0, kr=kr, order=order, ph_max=END_S / steps)
+    for excited, kr, true in problems:
+        run = simulate(excited, p2=1.0, kr=kr, order=order, ph_max=END_S / steps)
         squares.append((((run.peak_rad - true.peak_rad) - true.peak_low_rad) / true.peak_rad) ** 2)
     return math.sqrt(sum(squares) / len(squares))
 

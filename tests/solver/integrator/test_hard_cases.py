@@ -95,10 +95,10 @@ def test_grazing_the_base(off: float) -> None:
 @pytest.mark.parametrize("size", [1e-9, 1e-12])
 @pytest.mark.parametrize("p2", [0.3, 10.0])
 def test_chatter_about_the_threshold(size: float, p2: float) -> None:
-    """A drive that crosses the threshold at every sample starts one tiny motion an interval.
+    """An excitation that crosses the threshold at every sample starts one tiny motion an interval.
 
-    At most one start is possible in an interval, because the drive is straight in it; the
-    excursions end, because the mean drive is at the threshold; nothing is skipped.
+    At most one start is possible in an interval, because k_h is straight in it; the
+    excursions end, because the mean of k_h is at the threshold; nothing is skipped.
     """
     rng = np.random.default_rng(0)
     values = 0.2 + size * rng.choice([-1.0, 1.0], 200)
@@ -107,7 +107,7 @@ def test_chatter_about_the_threshold(size: float, p2: float) -> None:
     true = truth(excitation(motion), p2=p2, kr=0.2)
     assert run.outcome == true.outcome == "stable"
     assert run.peak_theta_rad is not None
-    # the drive is only known to rounding: 1e-16 of it is 1e-7 of the chatter
+    # the excitation is only known to rounding: 1e-16 of it is 1e-7 of the chatter
     error = abs(run.peak_theta_rad - true.peak_rad)
     assert error <= run.error_estimate
     assert error <= 1e-15 + 1e-6 * true.peak_rad

@@ -28,9 +28,9 @@ def arcs(order: int, number: int) -> list[tuple[float, FloatArray, tuple[float, 
         phi = rng.uniform(0.01, 0.6)
         theta = 0.0 if rng.random() < 0.5 else ph * ph * 10.0 ** rng.uniform(-6.0, 1.0)
         u0 = ph * ph * rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 1.0)
-        drive = StepExcitation(rng.normal(), rng.normal(), 1.0 + 0.2 * rng.normal(), 0.0)
+        excited = StepExcitation(rng.normal(), rng.normal(), 1.0 + 0.2 * rng.normal(), 0.0)
         u = np.empty(9)
-        turned, u_end, v_end = taylor_step(order, u, u0, ph, math.sin(phi), math.cos(phi), drive)
+        turned, u_end, v_end = taylor_step(order, u, u0, ph, math.sin(phi), math.cos(phi), excited)
         rounds = u0 > 0.0 and u[1] < 0.0 and v_end < 0.0
         falls = theta > 0.0 and u0 < 0.0 and keeps_direction(u0, u[1], u_end, v_end)
         if theta + turned <= 0.0 and (rounds or falls):

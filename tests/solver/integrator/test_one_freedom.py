@@ -113,9 +113,9 @@ MECHANISMS = {
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_error_estimate_covers_the_error(name: str, seed: int) -> None:
-    drive = excitation(record(seed, 0.8))
-    usual = follow(MECHANISMS[name], drive)
-    fine = follow(MECHANISMS[name], drive, turn_max=TURN_MAX / 30.0)
+    excited = excitation(record(seed, 0.8))
+    usual = follow(MECHANISMS[name], excited)
+    fine = follow(MECHANISMS[name], excited, turn_max=TURN_MAX / 30.0)
     assert usual.started_s is not None
     assert usual.outcome is fine.outcome
     assert usual.steps < fine.steps
@@ -124,10 +124,10 @@ def test_the_error_estimate_covers_the_error(name: str, seed: int) -> None:
 
 
 def test_the_history_changes_nothing() -> None:
-    drive = excitation(record(1, 0.8))
+    excited = excitation(record(1, 0.8))
     for mechanism in (*MECHANISMS.values(), TWO_WAY):
-        with_history = follow(mechanism, drive, history=True)
-        without = follow(mechanism, drive)
+        with_history = follow(mechanism, excited, history=True)
+        without = follow(mechanism, excited)
         assert with_history.history is not None
         assert without_history(with_history) == without_history(without)
 
@@ -164,7 +164,7 @@ def test_calm_stretches_are_passed_over(calm: int) -> None:
 
 def test_limits_and_contacts_are_met_in_the_same_place_by_long_and_short_steps() -> None:
     # an equation that is the same everywhere, and one that is all but the same
-    drive = excitation(record(3, 0.8))
+    excited = excitation(record(3, 0.8))
 
     def run(wobble: float, highest: float, lift: float) -> MechanismRun:
         equation = Equation(
@@ -184,7 +184,7 @@ def test_limits_and_contacts_are_met_in_the_same_place_by_long_and_short_steps()
             after=lambda exit: Ending(Outcome.TOPPLED),
             highest=highest,
         )
-        return follow(Mechanism(first=phase, rotates=False, critical=None), drive)
+        return follow(Mechanism(first=phase, rotates=False, critical=None), excited)
 
     outcomes = set()
     for highest, lift in itertools.product((0.01, 0.1, 0.5, math.inf), (0.2, 0.5, 1.0)):
@@ -247,7 +247,7 @@ def test_painleve() -> None:
 def test_an_end_nearer_to_the_limit_than_the_error_is_open() -> None:
     # a pulse and a limit that the block reaches but for rounding, a little more, a little less
     equation = Equation(inertia=constant(1.0), driving=constant(3.0), resistance=constant(0.7))
-    drive = excitation(
+    excited = excitation(
         GroundMotion.from_nodes([0.0, 0.0, 0.3, 0.3, 9.0], [0.0, 0.6, 0.6, 0.0, 0.0])
     )
     reach = 0.5 * 1.1 * 0.3**2 + (1.1 * 0.3) ** 2 / (2.0 * 0.7)
@@ -260,7 +260,7 @@ def test_an_end_nearer_to_the_limit_than_the_error_is_open() -> None:
             after=lambda exit: Ending(Outcome.TOPPLED),
             highest=limit,
         )
-        return follow(Mechanism(first=phase, rotates=False, critical=None), drive).outcome
+        return follow(Mechanism(first=phase, rotates=False, critical=None), excited).outcome
 
     assert run(reach * (1.0 + 1e-9)) is Outcome.STABLE
     assert run(reach * (1.0 - 1e-9)) is Outcome.TOPPLED
@@ -316,13 +316,13 @@ def test_equations_that_are_the_same_everywhere_are_solved_exactly() -> None:
 
 
 def test_a_scaled_excitation_scales_the_ground_and_not_gravity() -> None:
-    drive = excitation(record(1, 0.5), record(2, 0.3))
-    half = drive.scaled(0.5)
-    assert half.k_h == pytest.approx(0.5 * drive.k_h, rel=1e-15)
-    assert half.w - 1.0 == pytest.approx(0.5 * (drive.w - 1.0), abs=1e-15)
-    assert half.pga_g == 0.5 * drive.pga_g
+    excited = excitation(record(1, 0.5), record(2, 0.3))
+    half = excited.scaled(0.5)
+    assert half.k_h == pytest.approx(0.5 * excited.k_h, rel=1e-15)
+    assert half.w - 1.0 == pytest.approx(0.5 * (excited.w - 1.0), abs=1e-15)
+    assert half.pga_g == 0.5 * excited.pga_g
     # the same numbers as of the motion times one half
     motion = excitation(record(1, 0.5).scaled(0.5), record(2, 0.3).scaled(0.5))
     assert half.q == pytest.approx(motion.q, rel=1e-14)
-    same = drive.scaled(1.0)
-    assert np.array_equal(same.w, drive.w)
+    same = excited.scaled(1.0)
+    assert np.array_equal(same.w, excited.w)

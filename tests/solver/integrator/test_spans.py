@@ -19,22 +19,22 @@ START = (0.3, 0.12, -0.2)
 
 
 def integrated(
-    drive: Excitation, p: float, length: int, nodes: int, rows: int = 0
+    excited: Excitation, p: float, length: int, nodes: int, rows: int = 0
 ) -> tuple[float, float]:
     """Rotation and theta'/p after `nodes` intervals, by spans of `length` or by single steps."""
     critical, theta, rate = START
     s, c = math.sin(critical - theta), math.cos(critical - theta)
     table = np.empty((nodes // max(length, 1), COLUMNS))
     if length:
-        fill_spans(drive.interval_s, drive.k_h, drive.w, length, table)
+        fill_spans(excited.interval_s, excited.k_h, excited.w, length, table)
     u = np.empty(9)
     for i in range(nodes // max(length, 1)):
         if length:
             ph = p * float(table[i, 0])
             turned, u_end = span_step(table, i, ph * rate, ph, s, c)
         else:
-            ph = p * float(drive.interval_s[i])
-            a, w = drive.k_h, drive.w
+            ph = p * float(excited.interval_s[i])
+            a, w = excited.k_h, excited.w
             over = StepExcitation(a[i], a[i + 1] - a[i], w[i], w[i + 1] - w[i])
             turned, u_end, _ = taylor_step(ORDER, u, ph * rate, ph, s, c, over)
         theta += turned
@@ -47,21 +47,21 @@ def integrated(
 @pytest.mark.parametrize("length", [2, 8, 32])
 def test_spans_fly_as_single_steps_do(length: int, with_vertical: bool) -> None:
     vertical = shaking(8, npts=600, pga_g=0.4) if with_vertical else None
-    drive = excitation(shaking(7, npts=600), vertical)
+    excited = excitation(shaking(7, npts=600), vertical)
     for ph, error in ((0.04, 3e-8), (0.01, 3e-11)):
         p = ph / (length * 0.01)
-        exact = integrated(drive, p, 0, 512)
-        spanned = integrated(drive, p, length, 512)
+        exact = integrated(excited, p, 0, 512)
+        spanned = integrated(excited, p, length, 512)
         assert abs(exact[0] - spanned[0]) + abs(exact[1] - spanned[1]) < error
 
 
 def test_what_the_cubics_miss_is_taken_into_account() -> None:
-    drive = excitation(shaking(7, npts=600))
+    excited = excitation(shaking(7, npts=600))
     length, p = 32, 0.0125 / 0.32
-    exact = integrated(drive, p, 0, 512)
+    exact = integrated(excited, p, 0, 512)
     table = np.empty((16, COLUMNS))
-    fill_spans(drive.interval_s, drive.k_h, drive.w, length, table)
-    # for a cubic drive nothing is missed
+    fill_spans(excited.interval_s, excited.k_h, excited.w, length, table)
+    # for a cubic excitation nothing is missed
     t = np.linspace(0.0, 1.0, 33)
     smooth = excitation(GroundMotion(0.3 + 0.4 * t, 0.01))
     plain = np.empty((1, COLUMNS))
@@ -69,17 +69,19 @@ def test_what_the_cubics_miss_is_taken_into_account() -> None:
     assert np.abs(plain[0, 10:]).max() < 1e-15
     np.testing.assert_allclose(plain[0, 2:10], [0.3, 0.4, 0, 0, 1, 0, 0, 0], atol=1e-13)
     assert np.abs(table[:, 10]).max() > 1e-7
-    spanned = integrated(drive, p, length, 512)
+    spanned = integrated(excited, p, length, 512)
     assert abs(exact[0] - spanned[0]) < 1e-10
 
 
 def test_jumps_inside_a_span_are_exact_in_the_mean() -> None:
     times = np.repeat(np.arange(9) * 0.05, 2)[1:-1]
     values = np.repeat([0.2, -0.1, 0.4, 0.0, 0.3, -0.3, 0.1, 0.2], 2)
-    drive = excitation(GroundMotion.from_nodes(times, values))
-    n = drive.interval_s.size // 4 * 4
+    excited = excitation(GroundMotion.from_nodes(times, values))
+    n = excited.interval_s.size // 4 * 4
     table = np.empty((n // 4, COLUMNS))
-    fill_spans(drive.interval_s, drive.k_h, drive.w, 4, table)
-    area = (0.5 * drive.interval_s * (drive.k_h[1:] + drive.k_h[:-1]))[:n].reshape(-1, 4).sum(1)
+    fill_spans(excited.interval_s, excited.k_h, excited.w, 4, table)
+    area = (
+        (0.5 * excited.interval_s * (excited.k_h[1:] + excited.k_h[:-1]))[:n].reshape(-1, 4).sum(1)
+    )
     mean = table[:, 2] + table[:, 3] / 2 + table[:, 4] / 3 + table[:, 5] / 4
     np.testing.assert_allclose(mean * table[:, 0], area, atol=1e-15)

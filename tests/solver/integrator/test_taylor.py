@@ -14,14 +14,14 @@ from rbfrag.solver.integrator.taylor import taylor_step
 FloatArray = NDArray[np.float64]
 
 
-def series(order: int, u0: float, ph: float, phi: float, drive: StepExcitation) -> FloatArray:
+def series(order: int, u0: float, ph: float, phi: float, excited: StepExcitation) -> FloatArray:
     """Coefficients of U by the recurrence in sin(phi) and cos(phi) of numerics, section 1."""
     u, s, c = np.zeros(9), np.zeros(9), np.zeros(9)
     u[0], s[0], c[0] = u0, math.sin(phi), math.cos(phi)
     for k in range(order):
-        pull = drive.k_h * c[k] - drive.w * s[k]
+        pull = excited.k_h * c[k] - excited.w * s[k]
         if k > 0:
-            pull += drive.dk_h * c[k - 1] - drive.dw * s[k - 1]
+            pull += excited.dk_h * c[k - 1] - excited.dw * s[k - 1]
         u[k + 1] = ph * ph * pull / (k + 1)
         s[k + 1] = -sum(u[j] * c[k - j] for j in range(k + 1)) / (k + 1)
         c[k + 1] = sum(u[j] * s[k - j] for j in range(k + 1)) / (k + 1)
@@ -35,11 +35,11 @@ def test_the_step_is_the_series_of_the_equation(order: int) -> None:
     for _ in range(300):
         ph = 10.0 ** rng.uniform(-3.0, -0.3)
         phi, u0 = rng.uniform(-1.2, 1.5), ph * rng.normal()
-        drive = StepExcitation(
+        excited = StepExcitation(
             rng.normal(), 0.3 * rng.normal(), 1.0 + 0.3 * rng.normal(), 0.1 * rng.normal()
         )
-        turned, u_end, v_end = taylor_step(order, u, u0, ph, math.sin(phi), math.cos(phi), drive)
-        expected = series(order, u0, ph, phi, drive)
+        turned, u_end, v_end = taylor_step(order, u, u0, ph, math.sin(phi), math.cos(phi), excited)
+        expected = series(order, u0, ph, phi, excited)
         k = np.arange(9)
         size = np.abs(expected).max()
         np.testing.assert_allclose(u, expected, rtol=1e-12, atol=1e-15 * size)

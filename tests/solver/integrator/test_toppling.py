@@ -237,12 +237,12 @@ def test_any_short_record(
 def test_the_shorter_component_drops_to_zero_at_its_last_sample() -> None:
     horizontal = GroundMotion(np.array([0.0, 0.3, 0.5]), 0.1)
     vertical = GroundMotion(np.array([0.0, 0.1, 0.2, 0.3, 0.0]), 0.1)
-    drive = excitation(horizontal, vertical)
-    assert drive.time_s.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.2, 0.3, 0.4])
-    assert drive.interval_s.tolist() == [0.1, 0.1, 0.0, 0.1, 0.1]
-    assert drive.k_h.tolist() == [0.0, 0.3, 0.5, 0.0, 0.0, 0.0]
-    assert drive.w.tolist() == [1.0, 1.1, 1.2, 1.2, 1.3, 1.0]
-    assert "horizontal component has 3 samples" in drive.warnings[0]
+    excited = excitation(horizontal, vertical)
+    assert excited.time_s.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.2, 0.3, 0.4])
+    assert excited.interval_s.tolist() == [0.1, 0.1, 0.0, 0.1, 0.1]
+    assert excited.k_h.tolist() == [0.0, 0.3, 0.5, 0.0, 0.0, 0.0]
+    assert excited.w.tolist() == [1.0, 1.1, 1.2, 1.2, 1.3, 1.0]
+    assert "horizontal component has 3 samples" in excited.warnings[0]
     swapped = excitation(vertical, horizontal)
     assert swapped.k_h.tolist() == [0.0, 0.1, 0.2, 0.2, 0.3, 0.0]
     assert swapped.w.tolist() == [1.0, 1.3, 1.5, 1.0, 1.0, 1.0]

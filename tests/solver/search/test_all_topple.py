@@ -21,13 +21,13 @@ def test_every_block_below_topples(with_vertical: bool) -> None:
     found = 0
     for seed in range(12):
         vertical = shaking(seed + 70, pga_g=0.3) if with_vertical else None
-        drive = excitation(shaking(seed), vertical)
+        excited = excitation(shaking(seed), vertical)
         for p2 in (30.0, 4.0, 0.5):
-            g = block_excitation(drive, p2=p2)
-            low = all_topple_below(g, 1e-3, 0.5, 1e-9, np.empty(drive.q.size))
+            g = block_excitation(excited, p2=p2)
+            low = all_topple_below(g, 1e-3, 0.5, 1e-9, np.empty(excited.q.size))
             if low > 1e-3:
                 found += 1
-                runs = simulate_many(drive, p2=p2, kr=rng.uniform(1e-3, low, 60))
+                runs = simulate_many(excited, p2=p2, kr=rng.uniform(1e-3, low, 60))
                 assert (runs.outcome == TOPPLED).all()
     assert found > 20
 
@@ -35,10 +35,10 @@ def test_every_block_below_topples(with_vertical: bool) -> None:
 def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:
     compared = 0
     for seed in range(6):
-        drive = excitation(shaking(seed))
+        excited = excitation(shaking(seed))
         for p2, kr in ((30.0, 0.2), (4.0, 0.1), (0.5, 0.05)):
-            g = block_excitation(drive, p2=p2)
-            bound = np.empty(drive.q.size)
+            g = block_excitation(excited, p2=p2)
+            bound = np.empty(excited.q.size)
             least_rate(g, kr, bound)
             history = respond(shaking(seed), p2=p2, kr=1.2 * kr, history=True).history
             assert history is not None
@@ -48,8 +48,8 @@ def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:
                 continue
             phi = np.arctan(0.9 * kr) - run.history.theta_rad
             x = run.history.theta_dot_rad_s / g.p + 2.0 * np.sin(0.5 * phi)
-            at_nodes = np.interp(run.history.time_s, drive.time_s, bound)
-            nodes = np.isin(run.history.time_s, drive.time_s)
+            at_nodes = np.interp(run.history.time_s, excited.time_s, bound)
+            nodes = np.isin(run.history.time_s, excited.time_s)
             assert (x >= at_nodes - 1e-12)[nodes].all()
             compared += 1
     assert compared > 0

@@ -56,7 +56,7 @@ MAKERS = {"noise": noise, "steps": steps, "pulses": pulses, "started": started}
 
 
 def contradictions(
-    result: CriticalResult, drive: Excitation, count: int, rng: np.random.Generator
+    result: CriticalResult, excited: Excitation, count: int, rng: np.random.Generator
 ) -> list[str]:
     """Blocks inside decided intervals that do otherwise."""
     found = []
@@ -66,7 +66,7 @@ def contradictions(
         if what == "undecided":
             continue
         for ratio in rng.uniform(low, high, count):
-            outcome = simulate(drive, p2=result.p2, kr=ratio * drive.pga_g).outcome
+            outcome = simulate(excited, p2=result.p2, kr=ratio * excited.pga_g).outcome
             if outcome in (STABLE, TOPPLED) and (outcome == TOPPLED) != (what == "topples"):
                 found.append(f"{ratio!r} in [{low!r}, {high!r}] {what}")
     return found
@@ -89,8 +89,8 @@ def test_blocks_inside_decided_intervals_do_as_they_say(kind: str, with_vertical
             )
         for p2 in (30.0, 2.0):
             result = critical(motion, p2=p2, vertical=vertical, search_limit=0.1, full_map=True)
-            drive = excitation(motion, vertical)
-            assert contradictions(result, drive, 10, rng) == []
+            excited = excitation(motion, vertical)
+            assert contradictions(result, excited, 10, rng) == []
             outcomes = result.intervals.outcome
             decided += len(outcomes)
             assert np.array_equal(result.intervals.k_lo[1:], result.intervals.k_hi[:-1])
@@ -104,9 +104,9 @@ def test_blocks_inside_decided_intervals_do_as_they_say(kind: str, with_vertical
 def test_brute_force_finds_nothing_that_the_map_denies(seed: int) -> None:
     motion = noise(seed + 20)
     result = critical(motion, p2=12.0, search_limit=0.05, full_map=True)
-    drive = excitation(motion)
-    ratios = np.linspace(0.05, drive.max_q / drive.pga_g, 3000)
-    runs = np.array([simulate(drive, p2=12.0, kr=r * drive.pga_g).outcome for r in ratios])
+    excited = excitation(motion)
+    ratios = np.linspace(0.05, excited.max_q / excited.pga_g, 3000)
+    runs = np.array([simulate(excited, p2=12.0, kr=r * excited.pga_g).outcome for r in ratios])
     at = np.searchsorted(result.intervals.k_hi, ratios)
     at = np.minimum(at, len(result.intervals.outcome) - 1)
     said = np.array(result.intervals.outcome)[at]
@@ -192,12 +192,12 @@ def test_fresh_excursions_fail_monotonely_in_kr() -> None:
     rises = np.flatnonzero((a[:-1] < 0.05) & (a[1:] >= 0.05))
     compared = 0
     for node in rng.choice(rises, 6, replace=False):
-        drive = excitation(GroundMotion(a[node:], motion.dt_s))
+        excited = excitation(GroundMotion(a[node:], motion.dt_s))
         # a weakest block that lifts with the others, so that its first excursion is the same one
-        result = certified_map(drive, p2=4.0, bottom=0.02, full=False)
+        result = certified_map(excited, p2=4.0, bottom=0.02, full=False)
         compared += 1
-        for kr in rng.uniform(result.k_up, drive.max_q, 50):
-            assert simulate(drive, p2=4.0, kr=kr * (1.0 + 1e-9)).outcome == STABLE
+        for kr in rng.uniform(result.k_up, excited.max_q, 50):
+            assert simulate(excited, p2=4.0, kr=kr * (1.0 + 1e-9)).outcome == STABLE
     assert compared == 6
 
 
@@ -242,8 +242,8 @@ def test_answers_without_proof_are_still_toppling_and_say_why() -> None:
     for seed in range(8):
         motion = noise(seed, pga_g=3.0)
         result = critical(motion, p2=8.0, search_limit=0.05)
-        drive = excitation(motion)
-        assert contradictions(result, drive, 10, rng) == []
+        excited = excitation(motion)
+        assert contradictions(result, excited, 10, rng) == []
         if not result.certified:
             refused += 1
             assert any("not certified" in sentence for sentence in result.warnings)
@@ -251,7 +251,7 @@ def test_answers_without_proof_are_still_toppling_and_say_why() -> None:
             assert result.undecided > 1e-9
         if result.status == "found":
             assert result.kr is not None
-            assert simulate(drive, p2=8.0, kr=result.kr).outcome == TOPPLED
+            assert simulate(excited, p2=8.0, kr=result.kr).outcome == TOPPLED
     assert refused > 0
 
 
@@ -271,7 +271,7 @@ def test_recorded_motions_are_certified(records_dir: Path, name: str, p2: float)
         assert result.lower is not None
         assert result.upper is not None
         assert result.upper - result.lower <= 1e-6 * result.upper
-        drive = excitation(motion, None, polarity)  # type: ignore[arg-type]
-        assert contradictions(result, drive, 40, rng) == []
+        excited = excitation(motion, None, polarity)  # type: ignore[arg-type]
+        assert contradictions(result, excited, 40, rng) == []
         peaks: NDArray[np.float64] = result.points.theta_n
         assert math.isnan(peaks[-1])

@@ -30,8 +30,8 @@ def shaking(seed: int, npts: int = 1500, dt_s: float = 0.01, pga_g: float = 0.5)
 def outcome(motion: GroundMotion, ratio: float, p2: float, **how: object) -> Outcome:
     vertical = how.get("vertical")
     assert vertical is None or isinstance(vertical, GroundMotion)
-    drive = excitation(motion, vertical, "reverse" if how.get("reverse") else "forward")
-    return OUTCOMES[simulate(drive, p2=p2, kr=ratio * drive.pga_g).outcome]
+    excited = excitation(motion, vertical, "reverse" if how.get("reverse") else "forward")
+    return OUTCOMES[simulate(excited, p2=p2, kr=ratio * excited.pga_g).outcome]
 
 
 ISLAND_SEED = 17
@@ -66,11 +66,11 @@ def test_nothing_topples_above_a_certified_bracket(
     assert result.status == "found"
     assert result.upper is not None
     assert result.k_up_over_pga is not None
-    drive = excitation(motion, vertical)
+    excited = excitation(motion, vertical)
     # where the search makes no promise, K_up still is one
     floor = result.upper if result.certified else result.k_up_over_pga
-    ratios = np.linspace(floor, 1.02 * drive.max_q / drive.pga_g, 2001)[1:]
-    codes = [simulate(drive, p2=p2, kr=float(ratio) * drive.pga_g).outcome for ratio in ratios]
+    ratios = np.linspace(floor, 1.02 * excited.max_q / excited.pga_g, 2001)[1:]
+    codes = [simulate(excited, p2=p2, kr=float(ratio) * excited.pga_g).outcome for ratio in ratios]
     assert {OUTCOMES[code] for code in codes} == {Outcome.STABLE}
     assert result.upper <= result.k_up_over_pga
 
@@ -120,12 +120,12 @@ def test_points_are_sorted_and_repeat_exactly() -> None:
     ratios = result.points.kr_over_pga
     assert all(a > b for a, b in pairwise(ratios))
     assert len(result.points.outcome) == ratios.size == result.points.theta_n.size
-    drive = excitation(motion)
+    excited = excitation(motion)
     for ratio, theta_n, text in zip(
         ratios, result.points.theta_n, result.points.outcome, strict=True
     ):
-        kr = float(ratio) * drive.pga_g
-        run = simulate(drive, p2=3.0, kr=kr)
+        kr = float(ratio) * excited.pga_g
+        run = simulate(excited, p2=3.0, kr=kr)
         assert OUTCOMES[run.outcome] == text
         if text == Outcome.STABLE:
             assert run.peak_rad / math.atan(kr) == pytest.approx(theta_n, rel=4e-16, abs=0.0)
@@ -230,9 +230,9 @@ def test_real_record_against_a_scan(records_dir: Path, file: str, p2: float) -> 
     assert result.status == "found"
     assert result.upper is not None
     assert result.lower is not None
-    drive = excitation(motion)
+    excited = excitation(motion)
     ratios = np.linspace(result.upper, 1.0, 1001)[1:]
-    topple = [r for r in ratios if simulate(drive, p2=p2, kr=r * drive.pga_g).outcome == 1]
+    topple = [r for r in ratios if simulate(excited, p2=p2, kr=r * excited.pga_g).outcome == 1]
     if result.certified:
         assert not topple
     assert all(ratio <= (result.k_up_over_pga or 0.0) for ratio in topple)

@@ -22,15 +22,15 @@ def test_rules_are_right_about_any_interval(kind: str, with_vertical: bool) -> N
         motion = MAKERS[kind](rng)
         up = vertical_of(motion, rng) if with_vertical else None
         p2 = float(np.exp(rng.uniform(np.log(0.3), np.log(40.0))))
-        drive = excitation(motion, up)
+        excited = excitation(motion, up)
         top = critical(motion, p2=p2, vertical=up).k_up_over_pga or 0.1
         for _ in range(60):
-            low = drive.pga_g * top * np.exp(rng.uniform(np.log(0.1), 0.05))
+            low = excited.pga_g * top * np.exp(rng.uniform(np.log(0.1), 0.05))
             high = low * (1.0 + np.exp(rng.uniform(np.log(1e-7), np.log(0.3))))
-            answer = verdict_on(drive, p2, low, high)
+            answer = verdict_on(excited, p2, low, high)
             if answer is not None:
-                kr = inner_values(drive, low, high, rng)
-                assert count.check(drive, p2, low, high, answer, kr) == []
+                kr = inner_values(excited, low, high, rng)
+                assert count.check(excited, p2, low, high, answer, kr) == []
     assert count.intervals > 60
     assert 0 < count.topple < count.intervals
     assert count.blocks == 10 * count.intervals

@@ -64,11 +64,11 @@ def test_the_block_moves_just_above_the_scale_of_first_motion(with_vertical: boo
     motion = shaking()
     up = vertical_of(motion) if with_vertical else None
     shaken = shaken_mechanism(model_of_kind("slumping"), slump(), **PLANES)
-    drive = excitation(motion, up)
-    starts = first_motion(drive, shaken.yield_g)
+    excited = excitation(motion, up)
+    starts = first_motion(excited, shaken.yield_g)
     assert starts is not None
-    below = follow(shaken.mechanism, drive.scaled(starts * (1.0 - 1e-9)))
-    above = follow(shaken.mechanism, drive.scaled(starts * (1.0 + 1e-3)))
+    below = follow(shaken.mechanism, excited.scaled(starts * (1.0 - 1e-9)))
+    above = follow(shaken.mechanism, excited.scaled(starts * (1.0 + 1e-3)))
     assert below.peak == 0.0
     assert above.peak > 0.0
 

@@ -37,8 +37,8 @@ def test_the_strength_of_a_rectangular_pulse_is_the_closed_form(
 ) -> None:
     # D = A g T²/2 (A/k_y - 1)
     found = critical(pulse(amplitude_g, duration_s), displacement_m=threshold_m)
-    drive = amplitude_g * STANDARD_GRAVITY_M_S2 * duration_s**2
-    expected = 1.0 / (1.0 + 2.0 * threshold_m / drive)
+    excited = amplitude_g * STANDARD_GRAVITY_M_S2 * duration_s**2
+    expected = 1.0 / (1.0 + 2.0 * threshold_m / excited)
     assert found.status == "found"
     assert found.kr_over_pga == pytest.approx(expected, abs=1.1e-9)
     assert found.lower is not None

@@ -37,10 +37,10 @@ MOTIONS = {
 @pytest.mark.parametrize("name", MOTIONS)
 def test_is_the_linear_bound_by_bisection(name: str, polarity: str) -> None:
     motion = MOTIONS[name]
-    drive = excitation(motion, None, polarity)  # type: ignore[arg-type]
+    excited = excitation(motion, None, polarity)  # type: ignore[arg-type]
     for p2 in P2:
         x = toppling_spectrum(motion, p2, polarity)  # type: ignore[call-overload]
-        k = linear_block.largest_failing(drive, p2)
+        k = linear_block.largest_failing(excited, p2)
         assert k * STANDARD_GRAVITY_M_S2 / math.sqrt(p2) == pytest.approx(x, rel=1e-9, abs=1e-13)
 
 
@@ -63,9 +63,9 @@ def test_no_block_above_it_topples() -> None:
     toppled = 0
     for motion in MOTIONS.values():
         for polarity in POLARITIES:
-            drive = excitation(motion, None, polarity)
+            excited = excitation(motion, None, polarity)
             for p2 in np.exp(rng.uniform(math.log(0.1), math.log(30.0), 6)):
-                run = runner(drive, p2=float(p2))
+                run = runner(excited, p2=float(p2))
                 top = math.sqrt(p2) * toppling_spectrum(motion, float(p2), polarity)
                 top /= STANDARD_GRAVITY_M_S2
                 for factor in np.exp(rng.uniform(math.log(1.02), math.log(1.6), 4)):
@@ -78,9 +78,9 @@ def test_real_records(records_dir: Path) -> None:
     for file in sorted(records_dir.rglob("*.AT2"))[:3]:
         motion = read_motions(file)[0]
         for polarity in POLARITIES:
-            drive = excitation(motion, None, polarity)
+            excited = excitation(motion, None, polarity)
             for p2 in (10.0, 0.1):
                 x = toppling_spectrum(motion, p2, polarity)
-                k = linear_block.largest_failing(drive, p2)
+                k = linear_block.largest_failing(excited, p2)
                 y = k * STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
                 assert y == pytest.approx(x, rel=1e-9)
