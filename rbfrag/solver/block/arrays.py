@@ -13,8 +13,10 @@ from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
 from rbfrag.solver.block.formulas import (
     array_elementwise,
+    corner_distance,
     cot_gamma,
     frequency_parameter,
+    parallelogram_inertia,
     shape_factor,
     tan_deg,
     tangents_from_spacings,
@@ -150,7 +152,7 @@ class BlockArray(Tabular):
             alpha1, alpha3, r3 = _only_usable(reason, alpha1, alpha3, r3)
             t1, t3 = tan_deg(alpha1, functions), tan_deg(alpha3, functions)
             _because(_NO_BLOCK, t1 >= t3, reason)
-            return t1, t3, r3 / np.sqrt(t3 * t3 + 1.0), reason
+            return t1, t3, r3 / corner_distance(1.0, t3, functions), reason
 
         return _blocks(formula, {"alpha1_deg": alpha1_deg, "alpha3_deg": alpha3_deg, "r3_m": r3_m})
 
@@ -201,8 +203,7 @@ class BlockArray(Tabular):
     @property
     def inertia_m2(self) -> FloatArray:
         """Moments of inertia about the centroid per mass [m²]."""
-        h, t1, t3 = self.half_s1_m, self.tan_alpha1, self.tan_alpha3
-        return h * h * (2.0 + t1 * t1 + t3 * t3) / 6.0
+        return parallelogram_inertia(self.tan_alpha1, self.tan_alpha3, self.half_s1_m)
 
     @property
     def alpha1_deg(self) -> FloatArray:
@@ -222,12 +223,12 @@ class BlockArray(Tabular):
     @property
     def r1_m(self) -> FloatArray:
         """Distances from the centroid to the heel [m]."""
-        return self.half_s1_m * np.sqrt(self.tan_alpha1 * self.tan_alpha1 + 1.0)
+        return corner_distance(self.half_s1_m, self.tan_alpha1, array_elementwise())
 
     @property
     def r3_m(self) -> FloatArray:
         """Distances from the centroid to the toe [m]."""
-        return self.half_s1_m * np.sqrt(self.tan_alpha3 * self.tan_alpha3 + 1.0)
+        return corner_distance(self.half_s1_m, self.tan_alpha3, array_elementwise())
 
     @property
     def shape_factor(self) -> FloatArray:

@@ -131,6 +131,38 @@ def tangents_from_spacings(
     return cot - half_base, cot + half_base
 
 
+def corner_distance(half_s1_m: N, tangent: N, functions: Elementwise[N]) -> N:
+    """Return r = (S1/2)/cos α, from the centroid to the corner whose angle has this tangent [m]."""
+    return half_s1_m * functions.sqrt(tangent * tangent + 1.0)
+
+
+def parallelogram_inertia(tan_alpha1: N, tan_alpha3: N, half_s1_m: N) -> N:
+    """Return (r1² + r3²)/6, the moment of inertia about the centroid per mass [m²]."""
+    heel_x, toe_x = half_s1_m * tan_alpha1, half_s1_m * tan_alpha3
+    return (heel_x * heel_x + toe_x * toe_x + 2.0 * half_s1_m * half_s1_m) / 6.0
+
+
+def moments_about_corners(inertia_m2: N, heel: tuple[N, N], toe: tuple[N, N]) -> tuple[N, N, N]:
+    """Return the moments of inertia about toe and heel, and what an impact keeps; per mass [m²].
+
+    The last is I_C + r1·r3, the angular momentum about the corner that takes over, over the speed
+    before: it is the same after the impact, whose force passes through that corner (Housner 1963).
+
+    Args:
+        inertia_m2: moment of inertia about the centroid per mass [m²].
+        heel: from the centroid to the heel [m].
+        toe: from the centroid to the toe [m].
+    """
+    about_toe = inertia_m2 + (toe[0] * toe[0] + toe[1] * toe[1])
+    about_heel = inertia_m2 + (heel[0] * heel[0] + heel[1] * heel[1])
+    return about_toe, about_heel, inertia_m2 + (heel[0] * toe[0] + heel[1] * toe[1])
+
+
+def bond_over_weight(cohesion_pa: N, density_kg_m3: N, base_m: N, area_m2: N) -> N:
+    """Return the strength of the bond of a base over the weight of its block, c L/(ρ g A)."""
+    return cohesion_pa * base_m / (density_kg_m3 * STANDARD_GRAVITY_M_S2 * area_m2)
+
+
 def shape_factor(tan_alpha1: N, tan_alpha3: N) -> N:
     """Return F_s = m r3²/I_toe = 1/(7/6 + (cos α3/cos α1)²/6)."""
     ratio = (tan_alpha1 * tan_alpha1 + 1.0) / (tan_alpha3 * tan_alpha3 + 1.0)

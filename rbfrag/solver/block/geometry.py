@@ -10,8 +10,10 @@ from typing import NamedTuple
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import (
     SCALAR,
+    corner_distance,
     cot_gamma,
     frequency_parameter,
+    parallelogram_inertia,
     shape_factor,
     tan_deg,
     tangents_from_spacings,
@@ -202,7 +204,7 @@ class Block:
     @property
     def r1_m(self) -> float:
         """Distance from the centroid to the heel [m]."""
-        return -self.heel[1] * math.sqrt(self.tan_alpha1 * self.tan_alpha1 + 1.0)
+        return corner_distance(-self.heel[1], self.tan_alpha1, SCALAR)
 
     @property
     def r2_m(self) -> float:
@@ -212,7 +214,7 @@ class Block:
     @property
     def r3_m(self) -> float:
         """Distance from the centroid to the toe [m]."""
-        return -self.toe[1] * math.sqrt(self.tan_alpha3 * self.tan_alpha3 + 1.0)
+        return corner_distance(-self.toe[1], self.tan_alpha3, SCALAR)
 
     @property
     def alpha2_deg(self) -> float:
@@ -356,8 +358,7 @@ def _parallelogram(
         toe=toe,
         lowest_on_back=heel,
         area_m2=base_m * 2.0 * h,
-        # (r1² + r3²)/6, that of a parallelogram by its half diagonals
-        inertia_m2=(heel[0] * heel[0] + toe[0] * toe[0] + 2.0 * h * h) / 6.0,
+        inertia_m2=parallelogram_inertia(t1, t3, h),
         outline=(heel, toe, front, back),
         is_parallelogram=True,
     )

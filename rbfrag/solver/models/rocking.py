@@ -17,6 +17,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.formulas import moments_about_corners
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.state import Corner, corner
@@ -115,14 +116,7 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
                 f"{name} = {math.degrees(balance):.6g} degrees: a block rocks about a corner whose "
                 "critical angle is below 90 degrees"
             )
-    inertia = block.inertia_m2
-    toe, heel = block.toe, block.heel
-    # moments of inertia about the corners, per mass: I_i = I_C + r_i²
-    about_toe = inertia + (toe[0] * toe[0] + toe[1] * toe[1])
-    about_heel = inertia + (heel[0] * heel[0] + heel[1] * heel[1])
-    # I_C + r1·r3, the angular momentum about the corner that takes over, over the speed before:
-    # it is the same after the impact, whose force passes through that corner (Housner 1963)
-    kept = inertia + (heel[0] * toe[0] + heel[1] * toe[1])
+    about_toe, about_heel, kept = moments_about_corners(block.inertia_m2, block.heel, block.toe)
     return FreeBlock(
         toe=_corner(balances[0][2], block.r3_m, about_toe, kept / about_heel, given),
         heel=_corner(balances[1][2], block.r1_m, about_heel, kept / about_toe, given),

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.arrays import REASONS, BlockArray, CodeArray, common_shape, in_chunks
 from rbfrag.solver.block.formulas import (
     SCALAR,
     array_elementwise,
+    bond_over_weight,
+    corner_distance,
     cot_gamma,
     frequency_parameter,
     shape_factor,
@@ -161,13 +162,16 @@ def stability_arrays(
             there = {name: np.where(ok, value, 0.0) for name, value in there.items()}
         bond = None
         if "cohesion_pa" in there:
-            bond = _bond(t1, t3, h, there["cohesion_pa"], there["density_kg_m3"])
+            base = h * t3 - h * t1
+            bond = np.asarray(
+                bond_over_weight(there["cohesion_pa"], there["density_kg_m3"], base, base * 2.0 * h)
+            )
         tb, mu1 = _tangent(there["beta_deg"]), _tangent(there["phi_deg"])
         mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
         planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], array_elementwise(), bond)
         mode, k, ky, lifts = _yields(t1, t3, planes, back_fracture)
         state = state_code(k, planes.functions)
-        p2 = frequency_parameter(shape_factor(t1, t3), h * np.sqrt(t3 * t3 + 1.0))
+        p2 = frequency_parameter(shape_factor(t1, t3), corner_distance(h, t3, planes.functions))
         if reason.any():
             mode, state = np.where(ok, mode, NOTHING), np.where(ok, state, NOTHING)
             k, ky, p2 = (np.where(ok, value, math.nan) for value in (k, ky, p2))
@@ -226,13 +230,6 @@ def _at(planes: Planes[Any], here: NDArray[np.intp]) -> Planes[Any]:
         name: value[here] for name, value in values.items() if isinstance(value, np.ndarray)
     }
     return replace(planes, **parts)
-
-
-def _bond(t1: FloatArray, t3: FloatArray, h: FloatArray, cohesion: Any, density: Any) -> FloatArray:
-    """Return the strength of the base's bond over the weight, c L/(ρ g A)."""
-    base = h * t3 - h * t1
-    area = base * 2.0 * h
-    return np.asarray(cohesion * base / (density * STANDARD_GRAVITY_M_S2 * area))
 
 
 def _reasons(bad: CodeArray, size: int, given: Mapping[str, Any]) -> CodeArray:

@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.block.formulas import Elementwise, N
+from rbfrag.solver.block.formulas import Elementwise, N, corner_distance, moments_about_corners
 
 
 def slump_at_rest(
@@ -109,13 +109,12 @@ def rocking_at_rest(
     least = where(steep[0] < steep[1], steep[0], steep[1])
     forward = (tan_alpha3 - tan_beta) / where(steep[0] > 0.0, steep[0], 1.0)
     backward = (tan_beta - tan_alpha1) / where(steep[1] > 0.0, steep[1], 1.0)
-    square = half_s1_m * half_s1_m
-    toe2, heel2 = (square * (1.0 + t * t) for t in (tan_alpha3, tan_alpha1))
-    # moments of inertia about the corners, per mass: I_i = I_C + r_i²
-    about_toe, about_heel = inertia_m2 + toe2, inertia_m2 + heel2
-    per_moment = where(forward <= backward, sqrt(toe2) / about_toe, sqrt(heel2) / about_heel)
-    # I_C + r1·r3, the angular momentum about the corner that takes over, over the speed before:
-    # it is the same after the impact, whose force passes through that corner
-    kept = inertia_m2 + square * (1.0 + tan_alpha1 * tan_alpha3)
+    heel, toe = ((half_s1_m * t, -half_s1_m) for t in (tan_alpha1, tan_alpha3))
+    about_toe, about_heel, kept = moments_about_corners(inertia_m2, heel, toe)
+    per_moment = where(
+        forward <= backward,
+        corner_distance(half_s1_m, tan_alpha3, functions) / about_toe,
+        corner_distance(half_s1_m, tan_alpha1, functions) / about_heel,
+    )
     restitution = where(kept > 0.0, kept, 0.0) / sqrt(about_toe * about_heel)
     return forward, backward, STANDARD_GRAVITY_M_S2 * per_moment, restitution, least

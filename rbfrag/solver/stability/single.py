@@ -10,7 +10,7 @@ from typing import Any
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.block.formulas import SCALAR, tan_deg
+from rbfrag.solver.block.formulas import SCALAR, bond_over_weight, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.quantity import (
     angle,
@@ -207,7 +207,7 @@ def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
             )
         return 0.0
     density = positive(density_kg_m3, "density_kg_m3", "kg/m³")
-    return cohesion * block.base_m / (density * STANDARD_GRAVITY_M_S2 * block.area_m2)
+    return bond_over_weight(cohesion, density, block.base_m, block.area_m2)
 
 
 def _friction_that_slides_at(
