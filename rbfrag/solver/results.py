@@ -15,6 +15,7 @@ from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 NUMERICS_VERSION = "6"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.taylor import PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
-from rbfrag.solver.results import FloatArray
-
-IntArray = NDArray[np.int64]
+from rbfrag.solver.results import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.spans import COLUMNS, LENGTHS, SPAN_PH, fill_spans
 from rbfrag.solver.integrator.taylor import PH_MAX
-from rbfrag.solver.results import FloatArray
+from rbfrag.solver.results import FloatArray, IntArray
 
 
 @kernel
@@ -57,8 +56,6 @@ def remaining_excitation(
             where = i
     return greatest, where
 
-
-IntArray = NDArray[np.int64]
 
 SPAN_LEVELS = 3
 """Lengths of span in use at a time: near an event only short ones fit."""

@@ -124,6 +124,18 @@ def upright_rate(s: float, c: float) -> float:
     return 2.0 * math.sin(0.5 * math.atan2(s, c))
 
 
+@within
+def left_at_turn(border: float, rate: float) -> float:
+    """Return the angle to the balance point at which motion that does not reach it turns back.
+
+    Args:
+        border: :func:`upright_rate` of where it is.
+        rate: theta'/p there, above 0 and below the border.
+    """
+    # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
+    return 2.0 * math.asin(min(1.0, 0.5 * math.sqrt((border - rate) * (border + rate))))
+
+
 @inner_kernel
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float

@@ -13,10 +13,9 @@ from typing import NamedTuple
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import inner_kernel, within
 from rbfrag.solver.integrator.events import (
+    eventful,
     examine_step,
     irrecoverable,
-    keeps_direction,
-    simple_turn,
     upright_rate,
 )
 from rbfrag.solver.integrator.spans import span_step
@@ -129,12 +128,10 @@ def impact_in_step(
     theta: float, theta_end: float, u: FloatArray, u_start: float, u_end: float, v_end: float
 ) -> float:
     """Return the fraction of a step at which theta returns to 0, or -1; see `examine_step`."""
-    looks = theta_end <= 0.0 or (
-        not keeps_direction(u_start, u[1], u_end, v_end)
-        # of a peak nothing is asked: only a dip that may be an impact is looked into
-        and not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, math.inf, 0.0)
-    )
-    return examine_step(theta, u, ORDER, theta_end, u_end, v_end).impact if looks else -1.0
+    # of a peak nothing is asked: only a dip that may be an impact is looked into
+    if not eventful(theta, theta_end, u_start, u[1], u_end, v_end, math.inf, 0.0):
+        return -1.0
+    return examine_step(theta, u, ORDER, theta_end, u_end, v_end).impact
 
 
 @inner_kernel

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation, Nodes
 from rbfrag.solver.integrator.compiled import kernel
@@ -13,9 +12,7 @@ from rbfrag.solver.integrator.free_rocking import STABLE
 from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.two_corners import RockingRules, run_rocking
-from rbfrag.solver.results import FloatArray
-
-IntArray = NDArray[np.int64]
+from rbfrag.solver.results import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

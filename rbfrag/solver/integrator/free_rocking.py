@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from rbfrag.solver.integrator.compiled import inner_kernel, within
-from rbfrag.solver.integrator.events import upright_rate
+from rbfrag.solver.integrator.events import left_at_turn, upright_rate
 from rbfrag.solver.integrator.state import Corner, Peak, State, higher
 
 STABLE, TOPPLED = 0, 1
@@ -47,9 +47,7 @@ def free_peak(corner: Corner, border: float, rate: float, error: float) -> Peak:
         rate: theta'/p, above 0.
         error: of the rate.
     """
-    # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
-    rest = math.sqrt((border - rate) * (border + rate))
-    x_top = 2.0 * math.asin(min(1.0, 0.5 * rest))
+    x_top = left_at_turn(border, rate)
     return Peak(corner.theta_c - x_top, min(1.0, error * (border + rate) / math.sin(x_top)))
 
 

@@ -20,6 +20,7 @@ from rbfrag.solver.integrator.events import (
     eventful,
     examine_step,
     irrecoverable,
+    left_at_turn,
     upright_rate,
 )
 from rbfrag.solver.integrator.rest import Thresholds, depart
@@ -290,9 +291,7 @@ def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float
         return TOPPLED, math.nan, error
     peak = known.peak
     if state.rate > 0.0:
-        # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
-        rest = math.sqrt((border - state.rate) * (border + state.rate))
-        x_top = 2.0 * math.asin(0.5 * rest)
+        x_top = left_at_turn(border, state.rate)
         x = math.atan2(state.sin, state.cos)
         top_error = error * ((abs(math.sin(x)) + state.rate) / math.sin(x_top))
         peak = higher(peak, theta_c - x_top, top_error)

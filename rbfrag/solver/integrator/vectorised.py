@@ -14,7 +14,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, kernel, within
@@ -41,9 +40,7 @@ from rbfrag.solver.integrator.step import (
     step_errors,
 )
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
-from rbfrag.solver.results import FloatArray
-
-IntArray = NDArray[np.int64]
+from rbfrag.solver.results import FloatArray, IntArray
 
 BATCH = 32
 

@@ -14,7 +14,7 @@ from rbfrag.solver.integrator.compiled import inner_kernel, within
 from rbfrag.solver.integrator.one_freedom.state import (
     PhaseRules,
     PhaseState,
-    Work,
+    PhaseWork,
     certain_since,
 )
 from rbfrag.solver.integrator.one_freedom.step import (
@@ -34,7 +34,7 @@ NEAR_STANDSTILL = 1e-9
 
 
 @within
-def fill_uniform_conditions(rules: PhaseRules, work: Work) -> None:
+def fill_uniform_conditions(rules: PhaseRules, work: PhaseWork) -> None:
     """Fill the factors of k_h, 1 + k_v and x'^2 in each condition of equations without x."""
     fill_conditions(rules.forward, work.conditions_forward)
     fill_conditions(rules.reverse, work.conditions_reverse)

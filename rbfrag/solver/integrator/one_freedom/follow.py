@@ -35,7 +35,7 @@ from rbfrag.solver.integrator.one_freedom.state import (
     Entry,
     PhaseRules,
     PhaseRun,
-    Work,
+    PhaseWork,
 )
 from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, ORDER, TURN_MAX, UNIFORM_ORDER
 from rbfrag.solver.integrator.state import Peak, Place
@@ -246,15 +246,15 @@ def _rules(phase: Phase, turn_max: float, order: int) -> PhaseRules:
     )
 
 
-def _work(rules: PhaseRules) -> Work:
+def _work(rules: PhaseRules) -> PhaseWork:
     series = np.empty((8, rules.order + 1))
     # conditions that depend on x are taken at each step: they need no work array
     if not rules.uniform:
-        return Work(series, _NO_CONDITIONS, _NO_CONDITIONS)
+        return PhaseWork(series, _NO_CONDITIONS, _NO_CONDITIONS)
     forward, reverse = (
         np.empty(((len(table) - CONDITIONS) // 3, 3)) for table in (rules.forward, rules.reverse)
     )
-    return Work(series, forward, reverse)
+    return PhaseWork(series, forward, reverse)
 
 
 def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:

@@ -36,13 +36,13 @@ from rbfrag.solver.integrator.one_freedom.state import (
     PhaseRules,
     PhaseRun,
     PhaseState,
-    Work,
+    PhaseWork,
     certain_since,
     resting,
 )
 from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum, own_rate
 from rbfrag.solver.integrator.rest import Thresholds, depart
-from rbfrag.solver.integrator.state import Line, Peak, Place, line_at, noted, time_of_jump
+from rbfrag.solver.integrator.state import EVENT, Line, Peak, Place, line_at, noted, time_of_jump
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -57,7 +57,7 @@ FREE_STEP_S = 0.1
 
 @bare_kernel
 def run_phase(
-    record: Nodes, rules: PhaseRules, entry: Entry, work: Work, history: FloatArray
+    record: Nodes, rules: PhaseRules, entry: Entry, work: PhaseWork, history: FloatArray
 ) -> PhaseRun:
     """Run one phase from where it is entered to where it ends.
 
@@ -96,7 +96,7 @@ def run_phase(
             if stop != GOES_ON:
                 break
             moving, barred = True, 0
-            filled = noted(history, filled, now_s, state.x, 0.0, -1)
+            filled = noted(history, filled, now_s, state.x, 0.0, EVENT)
         elif jumps_after(record, node):
             stop = JUMPED
             break
@@ -151,7 +151,7 @@ def run_phase(
             impacts += 1 if crossing.kind == IMPACT else 0
             moving, barred = not rules.sticks, state.sense
             stopped_s, certain_s = line.start_s + tau * line.h, math.nan
-            filled = noted(history, filled, stopped_s, state.x, 0.0, -1)
+            filled = noted(history, filled, stopped_s, state.x, 0.0, EVENT)
             # what is left of an interval of the record goes on from the same place
             if free:
                 free_s, tau = free_s + tau * line.h, 0.0
@@ -164,7 +164,7 @@ def run_phase(
         else:
             node += 1
         now_s = record.time_s[node] + free_s
-        filled = noted(history, filled, now_s, state.x, state.rate, -1 if free else node)
+        filled = noted(history, filled, now_s, state.x, state.rate, EVENT if free else node)
         certain_s = certain_at(record, rules, state, node, free, now_s, certain_s)
 
     stop_s, end = ended(record, stop, line, Place(node, tau), free_s, state)

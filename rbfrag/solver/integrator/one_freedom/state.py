@@ -96,7 +96,7 @@ class Entry(NamedTuple):
     error_rate: float
 
 
-class Work(NamedTuple):
+class PhaseWork(NamedTuple):
     """Room for the kernels, which make no arrays: what they write is not read afterwards.
 
     Args:
