@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -66,6 +66,20 @@ def words_of(name: str) -> set[str]:
     return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
 
 
+def repeated_classes(sources: Mapping[str, str]) -> list[str]:
+    """Return the names of classes that are made in more than one place, and where.
+
+    Args:
+        sources: texts by their place.
+    """
+    homes: dict[str, list[str]] = {}
+    for where, source in sources.items():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(f"{where}:{node.lineno}")
+    return [f"{name}: {', '.join(places)}" for name, places in homes.items() if len(places) > 1]
+
+
 def wrong_names(source: str, where: str) -> list[str]:
     """Return the identifiers of a source that are not in the field's terms."""
     found = []
@@ -87,6 +101,17 @@ def test_names_are_the_terms_of_the_field() -> None:
         for text in wrong_names(path.read_text(), path.relative_to(ROOT / "rbfrag").as_posix())
     ]
     assert not found, "\n".join(found)
+
+
+def test_the_name_of_a_class_has_one_meaning() -> None:
+    sources = {path.relative_to(ROOT / "rbfrag").as_posix(): path.read_text() for path in SOURCES}
+    repeated = repeated_classes(sources)
+    assert not repeated, "\n".join(repeated)
+
+
+def test_a_second_class_of_a_name_is_seen() -> None:
+    sources = {"a.py": "class A: pass", "b.py": "def f():\n    class A: pass"}
+    assert repeated_classes(sources) == ["A: a.py:1, b.py:2"]
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,7 @@ class CampaignKind(ABC):
         """Return critical value and outcome grid of every case under one motion."""
 
 
-class SingleBlocks(CampaignKind):
+class SingleBlockCampaign(CampaignKind):
     """A kind of which campaigns run single blocks too: options `grid` and `store_responses`."""
 
     @abstractmethod

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.kind import Case, CaseRequest, SingleBlocks
+from rbfrag.campaign.kind import Case, CaseRequest, SingleBlockCampaign
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.sequences import PairWork, SequenceTask, run_pair
@@ -189,11 +189,11 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
     if answer.critical is not None:
         ends = {**ends_of(answer.critical.points), **ends}
     others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
-    if others and isinstance(kind, SingleBlocks):
+    if others and isinstance(kind, SingleBlockCampaign):
         ends |= ends_of(kind.run_blocks(shaking, case, others))
 
     def error(k_over_pga: float) -> float:
-        if not isinstance(kind, SingleBlocks):
+        if not isinstance(kind, SingleBlockCampaign):
             return 0.0
         alone = kind.history(shaking, case, k_over_pga)
         if not alone.peak_theta_rad or alone.peak_theta_n is None or not alone.error_estimate:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rbfrag.campaign.kind import Case, CaseRequest, SingleBlocks
+from rbfrag.campaign.kind import Case, CaseRequest, SingleBlockCampaign
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.db.keys import response_key
 from rbfrag.db.responses import ResponseRecord
@@ -185,7 +185,7 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     for task, (critical, grid) in zip(tasks, answers, strict=True):
         blocks = None
         if task.blocks:
-            assert isinstance(kind, SingleBlocks)
+            assert isinstance(kind, SingleBlockCampaign)
             blocks = kind.run_blocks(shaking, task.planned.case, task.blocks)
         ratios = list(task.histories)
         value = task.critical_k_over_pga if critical is None else critical.kr_over_pga
@@ -201,7 +201,7 @@ def _history(
 ) -> ResponseRecord:
     motion, vertical, case = work.motion, shaking.vertical, planned.case
     kind = campaign_of_kind(case.kind)
-    assert isinstance(kind, SingleBlocks)
+    assert isinstance(kind, SingleBlockCampaign)
     response = kind.history(shaking, case, k_over_pga)
     return ResponseRecord(
         natural_key=planned.history_key(

@@ -12,7 +12,7 @@ from rbfrag.campaign.kind import (
     CaseRequest,
     CaseResult,
     Measures,
-    SingleBlocks,
+    SingleBlockCampaign,
     each_once,
     strengths_at,
 )
@@ -28,7 +28,7 @@ Y_OVER_PGV = np.concatenate([0.1 * 40.0 ** (np.arange(-10, 0) / 24.0), np.geomsp
 """Toppling velocity of the blocks of the outcome grid over PGV: 35 values in steps of ln(40)/24."""
 
 
-class TopplingCampaign(SingleBlocks):
+class TopplingCampaign(SingleBlockCampaign):
     """Critical block and outcome grid of every size."""
 
     options = ("p2", "grid", "store_responses", "full_map")

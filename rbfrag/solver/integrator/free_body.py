@@ -16,7 +16,13 @@ from typing import NamedTuple
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
-from rbfrag.solver.integrator.impulses import CONVERGED, Corners, Velocity, Work, after_impulses
+from rbfrag.solver.integrator.impulses import (
+    CONVERGED,
+    ContactArrays,
+    Corners,
+    Velocity,
+    after_impulses,
+)
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -116,7 +122,7 @@ ROWS = 8
 
 @inner_kernel
 def one_step(
-    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: Work
+    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: ContactArrays
 ) -> tuple[Motion, int]:
     """Take one step; return where it leads and what touched, as bits.
 
@@ -207,7 +213,7 @@ def rests(
     a: float,
     w: float,
     known: Loads,
-    work: Work,
+    work: ContactArrays,
 ) -> tuple[bool, Loads]:
     """Whether a block at rest stays so under two accelerations [g]; what is known of it then."""
     q = a / w
@@ -254,7 +260,7 @@ def run_free(
     start_s: float,
     at: Motion,
     h: float,
-    work: Work,
+    work: ContactArrays,
     history: FloatArray,
 ) -> FreeRun:
     """Run a block from a time of the record until nothing moves it any more.

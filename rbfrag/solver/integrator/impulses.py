@@ -56,7 +56,7 @@ class Corners(NamedTuple):
     bit: FloatArray
 
 
-class Work(NamedTuple):
+class ContactArrays(NamedTuple):
     """Arrays that a step writes to.
 
     Args:
@@ -92,11 +92,11 @@ class Work(NamedTuple):
     columns: FloatArray
 
 
-def work_of(corners: Corners) -> Work:
+def work_of(corners: Corners) -> ContactArrays:
     """Return the work arrays of a run."""
     m = corners.arm_x.size
     shapes = [*11 * [(m,)], (3, 4), (3, 3)]
-    return Work(*[np.zeros(shape) for shape in shapes])
+    return ContactArrays(*[np.zeros(shape) for shape in shapes])
 
 
 class Velocity(NamedTuple):
@@ -109,7 +109,12 @@ class Velocity(NamedTuple):
 
 @inner_kernel
 def after_impulses(
-    corners: Corners, work: Work, active: int, per_inertia: float, free: Velocity, tolerance: float
+    corners: Corners,
+    work: ContactArrays,
+    active: int,
+    per_inertia: float,
+    free: Velocity,
+    tolerance: float,
 ) -> Velocity:
     """Return the velocity at the end of a step, and leave the impulses in the work arrays.
 
@@ -177,7 +182,7 @@ def after_impulses(
 
 @inner_kernel
 def _of_one(
-    corners: Corners, work: Work, per_inertia: float, free: Velocity
+    corners: Corners, work: ContactArrays, per_inertia: float, free: Velocity
 ) -> tuple[bool, Velocity]:
     """Solve for the impulse of the only corner that may touch.
 
@@ -217,7 +222,7 @@ def _of_one(
 
 @inner_kernel
 def _solved(
-    corners: Corners, work: Work, active: int, per_inertia: float, free: Velocity
+    corners: Corners, work: ContactArrays, active: int, per_inertia: float, free: Velocity
 ) -> tuple[bool, Velocity]:
     """Solve for the impulses of corners that do what the last two sweeps say.
 
@@ -238,7 +243,7 @@ def _solved(
 
 
 @inner_kernel
-def _fill_columns(corners: Corners, work: Work, active: int, per_inertia: float) -> int:
+def _fill_columns(corners: Corners, work: ContactArrays, active: int, per_inertia: float) -> int:
     """Fill the velocity that each unknown impulse gives; return their number, 4 for too many."""
     columns = work.columns
     n = 0
@@ -266,7 +271,9 @@ def _fill_columns(corners: Corners, work: Work, active: int, per_inertia: float)
 
 
 @inner_kernel
-def _fill_equations(corners: Corners, work: Work, active: int, n: int, free: Velocity) -> None:
+def _fill_equations(
+    corners: Corners, work: ContactArrays, active: int, n: int, free: Velocity
+) -> None:
     """Fill an equation for each unknown: the speed of its corner at the end of the step."""
     equations, columns = work.equations, work.columns
     row = 0
@@ -304,7 +311,7 @@ def _eliminated(equations: FloatArray, n: int) -> bool:
 
 
 @inner_kernel
-def _substituted(work: Work, n: int, free: Velocity) -> Velocity:
+def _substituted(work: ContactArrays, n: int, free: Velocity) -> Velocity:
     """Solve triangular equations, in place of their right sides; return the velocity."""
     equations, columns = work.equations, work.columns
     vx, vy, spin = free
@@ -321,7 +328,7 @@ def _substituted(work: Work, n: int, free: Velocity) -> Velocity:
 
 
 @inner_kernel
-def _keeps_coulomb(corners: Corners, work: Work, active: int, velocity: Velocity) -> bool:
+def _keeps_coulomb(corners: Corners, work: ContactArrays, active: int, velocity: Velocity) -> bool:
     """Whether impulses and velocity are such that each corner may do what it is taken to do."""
     vx, vy, spin = velocity
     row = 0
@@ -350,7 +357,7 @@ def _keeps_coulomb(corners: Corners, work: Work, active: int, velocity: Velocity
 
 
 @inner_kernel
-def _put_impulses(work: Work, active: int) -> None:
+def _put_impulses(work: ContactArrays, active: int) -> None:
     """Put the solution in the place of the impulses that sweeps have left."""
     row = 0
     for k in range(active):

@@ -13,7 +13,7 @@ from rbfrag.solver.search.from_rest import follow
 from rbfrag.solver.search.renewal import ExcursionTable
 
 
-class Bracket(NamedTuple):
+class Border(NamedTuple):
     """Two k_r, of which one topples and the other does not.
 
     Args:
@@ -39,7 +39,7 @@ class Bracket(NamedTuple):
 
 
 @inner_kernel
-def narrowed(b: Bracket, k: float, distance: float) -> Bracket:
+def narrowed(b: Border, k: float, distance: float) -> Border:
     """Put a block in the place of the end that does as it does (Illinois).
 
     The distance of an end that stays for the second time is halved, so that the next root is drawn
@@ -48,13 +48,13 @@ def narrowed(b: Bracket, k: float, distance: float) -> Bracket:
     # the sign alone decides; the size only chooses where to look next
     if (distance > 0.0) == b.low_topples:
         at_high = 0.5 * b.at_high if b.side > 0 else b.at_high
-        return Bracket(k, b.high, b.low_topples, distance, at_high, 1, b.tries, b.gauge)
+        return Border(k, b.high, b.low_topples, distance, at_high, 1, b.tries, b.gauge)
     at_low = 0.5 * b.at_low if b.side < 0 else b.at_low
-    return Bracket(b.low, k, b.low_topples, at_low, distance, -1, b.tries, b.gauge)
+    return Border(b.low, k, b.low_topples, at_low, distance, -1, b.tries, b.gauge)
 
 
 @inner_kernel
-def next_trial(b: Bracket, width: float) -> tuple[Bracket, float]:
+def next_trial(b: Border, width: float) -> tuple[Border, float]:
     """Choose the next k_r inside a bracket that is to close to a relative width."""
     tries = b.tries + 1
     gauge = b.gauge
@@ -73,7 +73,7 @@ def next_trial(b: Bracket, width: float) -> tuple[Bracket, float]:
         edge = 0.25 * width * b.high
         root = (b.low * b.at_high - b.high * b.at_low) / (b.at_high - b.at_low)
         k = min(max(root + (edge if b.side > 0 else -edge), b.low + edge), b.high - edge)
-    return Bracket(b.low, b.high, b.low_topples, b.at_low, b.at_high, b.side, tries, gauge), k
+    return Border(b.low, b.high, b.low_topples, b.at_low, b.at_high, b.side, tries, gauge), k
 
 
 @bare_kernel
@@ -104,7 +104,7 @@ def border(
     # only the outcome of `high` is known: the first block is the middle one
     topples = at_low > 0.0
     at_high = -math.inf if topples else math.inf
-    b = Bracket(low, high, topples, at_low, at_high, 0, 0, high - low)
+    b = Border(low, high, topples, at_low, at_high, 0, 0, high - low)
     k = 0.5 * (low + high)
     while b.high - b.low > width * b.high:
         b = narrowed(b, k, follow(excitation, k, rest, table, work))

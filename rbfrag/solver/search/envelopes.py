@@ -51,7 +51,7 @@ OVERTAKEN = 3
 ANYWHERE = math.nan
 
 
-class Blocks(NamedTuple):
+class BlockInterval(NamedTuple):
     """The blocks of an interval of k_r, and how their bounding trajectories are integrated.
 
     Args:
@@ -191,13 +191,13 @@ def decide(
 
 
 @within
-def blocks_between(k1: float, k2: float, margin: float, check: bool) -> Blocks:
+def blocks_between(k1: float, k2: float, margin: float, check: bool) -> BlockInterval:
     """Pull the ends of an interval of k_r apart by the margin."""
     # D is looked at between the upper trajectory and the least rotated block, at rest with the
     # greatest k_r; between the lower one and the border of the irrecoverable states, beyond which
     # the order no longer matters
     k_lower = k2 * (1.0 + margin)
-    return Blocks(
+    return BlockInterval(
         k1,
         k2,
         k1 * (1.0 - margin),
@@ -208,7 +208,7 @@ def blocks_between(k1: float, k2: float, margin: float, check: bool) -> Blocks:
 
 
 @within
-def all_at_rest(blocks: Blocks, node: int) -> Impacts:
+def all_at_rest(blocks: BlockInterval, node: int) -> Impacts:
     """All blocks are at rest at a node: both trajectories may start anew from there."""
     place = Place(node, 0.0)
     lower = Trajectory(place, at_rest(blocks.k_lower))
@@ -225,7 +225,7 @@ def node_of_rest(impacts: Impacts, n: int) -> int:
 
 @within
 def mixed_pair(
-    excitation: BlockExcitation, blocks: Blocks, impacts: Impacts, work: np.void
+    excitation: BlockExcitation, blocks: BlockInterval, impacts: Impacts, work: np.void
 ) -> Pair:
     """Rule E: one pair for blocks that start anew at their impact and for those still in motion.
 
@@ -280,7 +280,7 @@ def mixed_pair(
 @within
 def one_stretch(
     excitation: BlockExcitation,
-    blocks: Blocks,
+    blocks: BlockInterval,
     impacts: Impacts,
     earliest: Place,
     peak: float,
@@ -311,7 +311,7 @@ def one_stretch(
 
 
 @within
-def border_of_lift(blocks: Blocks, peak: float) -> float:
+def border_of_lift(blocks: BlockInterval, peak: float) -> float:
     """Rule B: the k_r to split at is that of the peak of q at which A failed.
 
     It lifts the weaker blocks and not the stronger, if it lies between them.
@@ -321,7 +321,7 @@ def border_of_lift(blocks: Blocks, peak: float) -> float:
 
 @within
 def carried_on(
-    excitation: BlockExcitation, blocks: Blocks, impacts: Impacts, pair: Pair, work: np.void
+    excitation: BlockExcitation, blocks: BlockInterval, impacts: Impacts, pair: Pair, work: np.void
 ) -> tuple[Decision, Impacts]:
     """Carry a pair of trajectories to the verdict, or to the impacts of both.
 

@@ -11,7 +11,7 @@ from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.excursion import TRUSTED, excursion_from_rest
 from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.integrator.state import Place
-from rbfrag.solver.search.borders import Bracket, narrowed, next_trial
+from rbfrag.solver.search.borders import Border, narrowed, next_trial
 from rbfrag.solver.search.from_rest import linear_distance
 from rbfrag.solver.search.renewal import ExcursionTable, add_work, all_known, begin
 from rbfrag.solver.search.rises import next_start
@@ -70,7 +70,7 @@ def border_of_stretches(
         The least k_r known not to fail (`top` where all do), and whether any fails.
     """
     # neither end has been looked at: the guess is near the root, its sides are found from there
-    b = Bracket(bottom, top, True, math.inf, -math.inf, 0, 0, top - bottom)
+    b = Border(bottom, top, True, math.inf, -math.inf, 0, 0, top - bottom)
     reach = 0.004
     k = guess
     while b.high - b.low > width * b.high:
