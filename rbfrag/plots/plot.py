@@ -54,6 +54,11 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(f"rbfrag.plots.{name}"), _DRAWN_THERE[name])
 
 
+def __dir__() -> list[str]:
+    """List the figures."""
+    return [*__all__]
+
+
 def fit(
     out: Out = None,
     *,

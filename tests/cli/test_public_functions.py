@@ -74,6 +74,9 @@ def test_figures_are_pictures_without_a_file(tmp_path: Path) -> None:
         rbfrag.plot.chart(tmp_path / "chart.gif")
     with pytest.raises(rbfrag.InputError, match="motion is of type int"):
         rbfrag.plot.spectrum(3)
+    assert all(callable(getattr(rbfrag.plot, name)) for name in dir(rbfrag.plot))
+    with pytest.raises(AttributeError, match="no attribute 'mode'"):
+        rbfrag.plot.mode  # noqa: B018
 
 
 def test_asking_for_figures_and_exports_loads_no_matplotlib() -> None:
