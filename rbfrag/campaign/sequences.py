@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import Engine
 
@@ -43,14 +44,6 @@ class SequenceTask:
     natural_key: str
     polarity: Polarity
     block: Mapping[str, object]
-
-
-@dataclass(frozen=True)
-class PairTasks:
-    """What is to do on one pair of motions."""
-
-    pair: MotionPair
-    tasks: tuple[SequenceTask, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +106,14 @@ def simulate_sequences(
     with opened_database(db) as engine:
         with engine.connect() as connection:
             pairs = motion_pairs(connection, suite=suite, seed=seed, draws=draws)
-            plan = [PairTasks(pair, _tasks(pair, kind, blocks)) for pair in pairs]
-            keys = [task.natural_key for each in plan for task in each.tasks]
+            plan = [(pair, _tasks(pair, kind, blocks)) for pair in pairs]
+            keys = [task.natural_key for _, tasks in plan for task in tasks]
             known = known_shock_pairs(connection, keys)
-        todo = _remaining(plan, known)
+        lacking = (
+            (pair, tuple(task for task in tasks if task.natural_key not in known))
+            for pair, tasks in plan
+        )
+        todo = [(pair, tasks) for pair, tasks in lacking if tasks]
         runs = 0
 
         def store(campaign_id: int, results: PairResults) -> int:
@@ -126,14 +123,21 @@ def simulate_sequences(
             runs += results.runs
             return len(results.records)
 
-        settings = {"kind": kind.kind, "suite": suite, "sequence": True, "seed": seed}
+        settings = {
+            "kind": kind.kind, "suite": suite, "sequence": True, "seed": seed, "draws": draws,
+        }  # fmt: skip
         workforce.carry_out(
-            engine, {**settings, "draws": draws}, run_pair, _work(engine, kind, todo), len(todo),
-            store, total=len(keys), resumed=len(known), started=started,
+            engine, settings, run_pair, _work(engine, kind.kind, todo), len(todo), store,
+            total=len(keys), resumed=len(known), started=started,
         )  # fmt: skip
         with engine.connect() as connection:
             rows = stored_shock_pairs(connection, keys)
     of_station = sum(pair.pairing == "station" for pair in pairs)
+    drawn = len(pairs) - of_station
+    warning = (
+        f"{of_station} of {len(pairs)} pairs of motions are shocks of one station; the other "
+        f"{drawn} are motions of different earthquakes, drawn with seed {seed}"
+    )
     return CampaignSummary(
         kind=kind.kind,
         combinations=len(keys),
@@ -141,65 +145,41 @@ def simulate_sequences(
         runs=runs,
         seconds=time.perf_counter() - started,
         resumed=len(known),
-        warnings=_warnings(len(pairs), of_station, seed),
+        warnings=(warning,) if drawn else (),
         sequence=SequenceReport(
             seed=seed,
             station_pairs=of_station,
-            drawn_pairs=len(pairs) - of_station,
+            drawn_pairs=drawn,
             conditional=conditional_shares(rows, kind.measure, limits),
         ),
-    )
-
-
-def _warnings(pairs: int, of_station: int, seed: int) -> tuple[str, ...]:
-    drawn = pairs - of_station
-    if not drawn:
-        return ()
-    return (
-        f"{of_station} of {pairs} pairs of motions are shocks of one station; the other {drawn} "
-        f"are motions of different earthquakes, drawn with seed {seed}",
     )
 
 
 def _tasks(
     pair: MotionPair, kind: Sequences, blocks: Sequence[Mapping[str, object]]
 ) -> tuple[SequenceTask, ...]:
+    inputs: dict[str, Any] = {
+        "first_sha256": pair.first.sha256,
+        "first_dt_s": pair.first.dt_s,
+        "motion_sha256": pair.second.sha256,
+        "dt_s": pair.second.dt_s,
+        "kind": kind.kind,
+        "numerics_version": NUMERICS_VERSION,
+    }
     return tuple(
-        SequenceTask(
-            pair_key(
-                first_sha256=pair.first.sha256,
-                first_dt_s=pair.first.dt_s,
-                motion_sha256=pair.second.sha256,
-                dt_s=pair.second.dt_s,
-                polarity=polarity,
-                kind=kind.kind,
-                block=block,
-                numerics_version=NUMERICS_VERSION,
-            ),
-            polarity,
-            block,
-        )
+        SequenceTask(pair_key(**inputs, polarity=polarity, block=block), polarity, block)
         for polarity in kind.polarities
         for block in blocks
     )
 
 
-def _remaining(plan: Sequence[PairTasks], known: set[str]) -> list[PairTasks]:
-    left = [
-        PairTasks(each.pair, tuple(t for t in each.tasks if t.natural_key not in known))
-        for each in plan
-    ]
-    return [each for each in left if each.tasks]
-
-
-def _work(engine: Engine, kind: Sequences, todo: Sequence[PairTasks]) -> Iterator[PairWork]:
-    for each in todo:
-        pair = each.pair
+def _work(
+    engine: Engine, kind: str, todo: Sequence[tuple[MotionPair, tuple[SequenceTask, ...]]]
+) -> Iterator[PairWork]:
+    for pair, tasks in todo:
         with engine.connect() as connection:
             first, second = (load_motion(connection, row.id) for row in (pair.first, pair.second))
-        yield PairWork(
-            kind.kind, pair.first.id, pair.second.id, pair.pairing, first, second, each.tasks
-        )
+        yield PairWork(kind, pair.first.id, pair.second.id, pair.pairing, first, second, tasks)
 
 
 def run_pair(work: PairWork) -> PairResults:
