@@ -124,14 +124,25 @@ def critical_in_words(answer: Mapping[str, Any]) -> str:
     """
     if "scale" in answer:
         return _scale_in_words(answer)
+    pga_g, certified = answer["pga_g"], answer["certified"]
     if answer["status"] != "found":
-        return STATUS[answer["status"]]
-    half_width = 0.5 * (answer["upper"] - answer["lower"]) * answer["pga_g"]
-    certified = "certified" if answer["certified"] else "not certified"
+        if certified or answer["upper"] is None:
+            return STATUS[answer["status"]]
+        return (
+            "No block of this size was seen to topple down to the search limit; not certified: "
+            f"only above k_r = {rounded(answer['upper'] * pga_g)} is it proven."
+        )
+    ratio = rounded(answer["kr_over_pga"])
+    if certified:
+        half_width = 0.5 * (answer["upper"] - answer["lower"]) * pga_g
+        value = f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, certified)"
+    else:
+        ends = f"{rounded(answer['kr'])} and {rounded(answer['upper'] * pga_g)}"
+        value = f"a k_r between {ends}, not certified"
+        ratio = f"{ratio} to {rounded(answer['upper'])}"
     return (
         f"The strongest block of p² = {answer['p2']:.3g} 1/s² that this motion topples has "
-        f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, {certified}), "
-        f"{rounded(answer['kr_over_pga'])} of the PGA of {rounded(answer['pga_g'])} g."
+        f"{value}, {ratio} of the PGA of {rounded(pga_g)} g."
     )
 
 

@@ -190,10 +190,14 @@ def _verdict(result: CriticalResult) -> str:
     block = f"$p^2$ = {result.p2:g} s$^{{-2}}$"
     if result.lower is None or result.upper is None:
         return f"{block}: no block down to $k_r$/PGA = {result.search_limit:g} topples"
-    known = "certified" if result.certified else "not certified"
+    if not result.certified:
+        return (
+            f"{block}: critical $k_r$/PGA between {result.lower:.6g} and $K_{{up}}$ = "
+            f"{result.upper:.6g}, not certified"
+        )
     width = (result.upper - result.lower) / result.upper
     upper = f", $K_{{up}}$ = {result.k_up_over_pga:.6g}" if result.k_up_over_pga else ""
     return (
-        f"{block}: critical $k_r$/PGA = {result.lower:.6g} ({known}, bracket {width:.0e})"
+        f"{block}: critical $k_r$/PGA = {result.lower:.6g} (certified, bracket {width:.0e})"
         f"{upper} PGA"
     )

@@ -299,14 +299,19 @@ class CriticalResult(Tabular):
             ``no_motion`` (no block down to the limit ever lifts); ``outside_model``.
         search_limit: smallest k_r/PGA looked at.
         kr_over_pga: the largest k_r/PGA known to topple; None unless found.
-        lower: lower end of the bracket (topples), k_r/PGA.
-        upper: upper end of the bracket (safe), k_r/PGA.
+        lower: lower end of the bracket, k_r/PGA: a block there topples, by a run that is clear of
+            its error.
+        upper: upper end of the bracket, k_r/PGA: no block there topples. Where the answer is
+            certified the two are 1e-6 apart at most. Toppling where it is not: `upper` is K_up,
+            above which nothing topples, and between them only single blocks were looked at; then
+            also of a search that has found nothing.
         kr: the critical k_r itself.
         y_m_s: critical toppling velocity k_r g/p [m/s].
         certified: True when every k_r above the bracket is proven not to topple, slivers of
             the total length `undecided` (at most 1e-9) excepted.
         k_up_over_pga: proven upper bound over excursions from rest: nothing above it topples.
-        undecided: length of k_r/PGA above `upper` for which safety is not proven.
+        undecided: length of k_r/PGA above the bracket, or where it is not certified above
+            `lower`, for which safety is not proven.
         island_width: width in k_r/PGA of the toppling interval that the bracket caps; None
             without a full map.
         kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored; None

@@ -9,7 +9,7 @@ import numpy as np
 
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.spans import COLUMNS, LENGTHS, SPAN_PH, fill_spans
+from rbfrag.solver.integrator.spans import COLUMNS, LENGTHS, SPAN_ERROR, SPAN_PH, fill_spans
 from rbfrag.solver.integrator.taylor import PH_MAX
 from rbfrag.solver.results import FloatArray, IntArray
 
@@ -79,6 +79,7 @@ class BlockExcitation(NamedTuple):
         span_length: intervals of a span, by falling length, shape (levels,).
         span_row: row at which each length begins, shape (levels,).
         span_ph: greatest p·T of a span.
+        span_error: greatest error bound of a span, as of `spans.SPAN_ERROR`.
         p: frequency parameter [1/s].
         ph_max: greatest p·h of one step.
         u: coefficients of the last step, shape (9,).
@@ -98,13 +99,14 @@ class BlockExcitation(NamedTuple):
     span_length: IntArray
     span_row: IntArray
     span_ph: float
+    span_error: float
     p: float
     ph_max: float
     u: FloatArray
 
 
 def block_excitation(
-    excitation: Excitation, *, p2: float, span_ph: float = SPAN_PH
+    excitation: Excitation, *, p2: float, span_ph: float = SPAN_PH, span_error: float = SPAN_ERROR
 ) -> BlockExcitation:
     """Bring together what the kernels need.
 
@@ -112,6 +114,7 @@ def block_excitation(
         excitation: the excitation; 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²].
         span_ph: greatest p·T of a span.
+        span_error: greatest error bound of a span, as of `spans.SPAN_ERROR`.
     """
     p = math.sqrt(p2)
     remaining = np.empty(excitation.q.size)
@@ -137,6 +140,7 @@ def block_excitation(
         span_length=np.array(lengths, dtype=np.int64),
         span_row=np.cumsum([0, *(len(table) for table in tables)])[:-1].astype(np.int64),
         span_ph=span_ph,
+        span_error=span_error,
         p=p,
         ph_max=PH_MAX,
         u=np.empty(9),

@@ -114,6 +114,9 @@ def take_span(excitation: BlockExcitation, i: int, stop: int, state: State) -> t
         ph = excitation.p * spans[row, 0]
         if not 0.0 < ph <= excitation.span_ph:
             continue
+        # the samples of this span are too rough for cubics
+        if (ph * ph * spans[row, 18]) ** 2 > excitation.span_error:
+            continue
         # |theta''| <= p² (|a| + w): the block cannot touch down in this span
         if theta + min(ph * rate, 0.0) - 0.5 * ph * ph * spans[row, 1] <= 0.0:
             continue

@@ -38,6 +38,9 @@ of those."""
 MAP_SPAN_PH = 0.04
 """Greatest p·T of a span there."""
 
+MAP_SPAN_ERROR = 3e-9
+"""Greatest error bound of a span there: as of `spans.SPAN_ERROR`, by the ratio of the margins."""
+
 DEPTH = 1e-9
 """Relative width of an interval that is left undecided."""
 
@@ -97,10 +100,18 @@ class CertifiedMap:
         without: NDArray[np.bool_] = (self.verdict != SAFE) & (self.verdict != TOPPLES)
         return without
 
+    def open_above(self, bottom: float) -> tuple[FloatArray, FloatArray]:
+        """Return the ends of what has no verdict above a k_r, shapes (m,), by falling k_r."""
+        chosen = self.undecided & (self.high > bottom)
+        low, high = self.low[chosen], self.high[chosen]
+        if self.reached > bottom:  # the search was given up there
+            low, high = np.append(low, bottom), np.append(high, self.reached)
+        return np.maximum(low, bottom), high
+
     def undecided_above(self, bottom: float) -> float:
         """Return the length of k_r down to `bottom` that has no verdict."""
-        undecided = float((self.high - self.low)[self.undecided].sum())
-        return undecided + max(self.reached - bottom, 0.0)
+        low, high = self.open_above(bottom)
+        return float((high - low).sum())
 
 
 def keeps_order(excitation: Excitation) -> bool:
@@ -186,7 +197,9 @@ def certified_map(
                 # wider margins must stay far below the depth, or they are what is left open
                 if map_depth >= 100.0 * MAP_MARGIN:
                     margin = MAP_MARGIN
-                    block = block_excitation(excitation, p2=p2, span_ph=MAP_SPAN_PH)
+                    block = block_excitation(
+                        excitation, p2=p2, span_ph=MAP_SPAN_PH, span_error=MAP_SPAN_ERROR
+                    )
                 least = map_depth * excitation.pga_g
                 reached = give_verdicts(
                     below._replace(

@@ -4,7 +4,8 @@ The set of k_r that topple is often not one interval: an earlier pulse may leave
 rocking so that the decisive one misses. No search by single blocks can promise that it has
 stepped over none. The search here decides whole intervals of k_r at a time, by two trajectories
 that enclose those of every block between (`rbfrag.solver.search.envelopes`), from an upper bound
-K_up downwards. Where the argument does not hold, the answer is that of a scan, and says so.
+K_up downwards. Where the argument does not hold, the answer is an interval: from what was seen to
+topple to K_up.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +32,8 @@ from rbfrag.solver.results import (
     SearchPoints,
 )
 from rbfrag.solver.search.certified import (
+    BRACKET_WIDTH,
+    MAP_SPAN_ERROR,
     MAP_SPAN_PH,
     Bracket,
     CertifiedMap,
@@ -43,10 +47,16 @@ from rbfrag.solver.search.islands import (
     islands_of_map,
     outcome_intervals,
 )
+from rbfrag.solver.search.march import TOPPLES
+from rbfrag.solver.search.scan import strongest_seen
 from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, runner
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
+
+
+CLEARANCES = (2e-11, 1e-10, 1e-9, 5e-9)
+"""Distances of the lower end from the border, over the upper end, that are tried in turn."""
 
 
 def critical(
@@ -104,30 +114,24 @@ def critical(
     if pga == 0.0 or excitation.max_q <= bottom:
         return replace(answer, status="no_motion", certified=True)
     of_map = certified_map(excitation, p2=p2, bottom=bottom, full=full_map, map_depth=map_depth)
-    bracket = bracket_of(of_map)
-    undecided = (bracket.undecided if bracket else of_map.undecided_above(bottom)) / pga
+    ends = _ends(blocks, excitation, p2, of_map, bottom)
     answer = replace(
         answer,
-        certified=undecided <= SLIVERS,
+        certified=ends.certified,
+        upper=None if ends.upper is None else ends.upper / pga,
         k_up_over_pga=of_map.k_up / pga if of_map.k_up > bottom else None,
-        undecided=undecided,
-        n_runs=of_map.runs,
-        warnings=(*answer.warnings, *_doubts(of_map, pga, undecided, full_map)),
+        undecided=ends.undecided / pga,
+        n_runs=of_map.runs + ends.runs,
+        warnings=(*answer.warnings, *_doubts(of_map, pga, ends, full_map)),
     )
-    if not answer.certified:
-        # a scan may have found what the search could not decide; neither is a proof
-        bracket = _better(bracket, scan_down(blocks, of_map.k_up, bottom))
     if full_map:
         intervals = outcome_intervals(of_map, pga, excitation.max_q, bottom)
         answer = replace(answer, reentrant=False, intervals=intervals)
-    if bracket is not None:
-        # from here on in k_r/PGA, of which blocks are run again by those who check the answer
-        lower, upper = bracket.lower / pga, bracket.upper / pga
-        lower = _clear_of_error(blocks, lower, upper, search_limit)
-        kr = lower * pga
+    if ends.lower is not None:
+        kr = ends.lower * pga
         y_m_s = kr * STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
         answer = replace(
-            answer, status="found", kr_over_pga=lower, lower=lower, upper=upper, kr=kr, y_m_s=y_m_s
+            answer, status="found", kr_over_pga=ends.lower, lower=ends.lower, kr=kr, y_m_s=y_m_s
         )
         if full_map:
             islands, runs = _islands(excitation, p2, of_map, kr, bottom)
@@ -143,12 +147,83 @@ def critical(
     return replace(answer, points=points, n_runs=answer.n_runs + len(points.outcome))
 
 
-def _doubts(of_map: CertifiedMap, pga: float, undecided: float, full_map: bool) -> Iterator[str]:
-    """Yield what is not proven; `undecided` is the length of k_r/PGA above the answer."""
-    if undecided > SLIVERS:
+class Ends(NamedTuple):
+    """What is known of the critical value.
+
+    Args:
+        lower: k_r/PGA of a block that topples; None where none was seen to.
+        upper: k_r above which nothing topples; None where that is the least one of interest.
+        certified: whether nothing topples above the two.
+        undecided: length of k_r that is neither proven safe nor to topple, above the two or where
+            they are not certified above the lower one.
+        runs: number of blocks, those apart that are kept with the answer.
+    """
+
+    lower: float | None
+    upper: float | None
+    certified: bool
+    undecided: float
+    runs: int
+
+
+def _ends(
+    blocks: SingleBlocks, excitation: Excitation, p2: float, of_map: CertifiedMap, bottom: float
+) -> Ends:
+    """Return the ends of the critical value: proven, or what was seen to topple and K_up."""
+    pga = excitation.pga_g
+    bracket = bracket_of(of_map)
+    undecided = bracket.undecided if bracket else of_map.undecided_above(bottom)
+    upper: float | None = of_map.k_up if of_map.k_up > bottom else None
+    known, runs = bracket and bracket.lower, 0
+    if undecided <= SLIVERS * pga:
+        if bracket is None:
+            return Ends(None, None, True, undecided, 0)
+        lower, runs = _lower_end(blocks, excitation, p2, bracket, bottom)
+        if lower is not None:
+            return Ends(lower, bracket.upper, True, undecided, runs)
+        # nothing topples above, but of no block just below is it sure
+        known, upper = None, bracket.upper
+    low, high = of_map.open_above(known or bottom)
+    seen = strongest_seen(excitation, p2, low, high, known)
+    lower = None
+    if seen.kr is not None:
+        lower = seen.kr / pga
+        blocks.outcome_at(lower)
+    return Ends(lower, upper, False, of_map.undecided_above(seen.kr or bottom), runs + seen.runs)
+
+
+def _lower_end(
+    blocks: SingleBlocks, excitation: Excitation, p2: float, bracket: Bracket, bottom: float
+) -> tuple[float | None, int]:
+    """Return the k_r/PGA of a block below a border that surely topples, and a number of blocks.
+
+    The border is known to the width it was closed in to, by runs without an error estimate: the
+    block there may stay. A distance of 2e-11 is beyond that and means nothing to anybody. Its own
+    run tells, clear of its error; where runs cannot, an interval that is proven to topple does.
+    """
+    pga = excitation.pga_g
+    # the other end is run for the record: its peak says how near it came
+    blocks.outcome_at(bracket.upper / pga)
+    for step in CLEARANCES:
+        ratio = max(bracket.lower - step * bracket.upper, bottom) / pga
+        if blocks.outcome_at(ratio) == TOPPLED:
+            return ratio, 0
+    near = max(bottom, bracket.lower * (1.0 - BRACKET_WIDTH))
+    below = certified_map(excitation, p2=p2, bottom=near, full=True)
+    topples = below.high[below.verdict == TOPPLES]
+    if topples.size == 0:
+        return None, below.runs
+    ratio = float(topples.max()) / pga
+    blocks.outcome_at(ratio)
+    return ratio, below.runs
+
+
+def _doubts(of_map: CertifiedMap, pga: float, ends: Ends, full_map: bool) -> Iterator[str]:
+    """Yield what is not proven."""
+    if not ends.certified:
         yield (
-            f"not certified: {_reason(of_map, pga)}; {undecided:.3g} of k_r/PGA above the answer "
-            "is not proven safe"
+            f"not certified: {_reason(of_map, pga)}; {ends.undecided / pga:.3g} of k_r/PGA above "
+            "the answer is not proven safe"
         )
     elif full_map and not of_map.complete:
         # only the map below the answer is open, which the proof does not rest on
@@ -171,29 +246,6 @@ def _reason(of_map: CertifiedMap, pga_g: float) -> str:
     return "grazing contacts left intervals that no refinement decided"
 
 
-def _better(bracket: Bracket | None, scanned: tuple[float, float] | None) -> Bracket | None:
-    """The higher of the answers of the search and of a scan."""
-    if scanned is None or (bracket is not None and bracket.lower >= scanned[0]):
-        return bracket
-    return Bracket(*scanned, undecided=0.0)
-
-
-def _clear_of_error(blocks: SingleBlocks, lower: float, upper: float, limit: float) -> float:
-    """Run the critical block itself, clear of the error of its run where need be.
-
-    A step of 1e-8 further from the border costs nothing that means anything, and spares
-    an answer that is proven from being reported as undetermined. k_r/PGA throughout.
-    """
-    for step in (0.0, 1e-10, 1e-9, 5e-9):
-        ratio = max(lower - step * upper, limit)
-        if blocks.outcome_at(ratio) == TOPPLED:
-            lower = ratio
-            break
-    # the other end is run for the record: its peak says how near it came
-    blocks.outcome_at(upper)
-    return lower
-
-
 def _islands(
     excitation: Excitation, p2: float, of_map: CertifiedMap, lower: float, bottom: float
 ) -> tuple[Islands, int]:
@@ -203,16 +255,9 @@ def _islands(
         block = block_excitation(excitation, p2=p2)
         return islands_of_map(of_map, block, lower, resolution)
     # no proof is wanted of single blocks: spans as long as those of a map will do
-    block = block_excitation(excitation, p2=p2, span_ph=MAP_SPAN_PH)
+    block = block_excitation(excitation, p2=p2, span_ph=MAP_SPAN_PH, span_error=MAP_SPAN_ERROR)
     floor = surely_topples_below(block, excitation, bottom, lower)
     return islands_by_blocks(block, lower, floor, bottom, resolution)
-
-
-SCAN_POINTS = 160
-"""Blocks of a descending scan, equally spaced in ln k_r."""
-
-BORDER = 1e-9
-"""Relative width to which a border is bisected."""
 
 
 class SingleBlocks:
@@ -251,29 +296,3 @@ class SingleBlocks:
             theta_n=np.array([run.peak_rad for run in runs]) / np.arctan(strengths),
             outcome=tuple(OUTCOMES[run.outcome].value for run in runs),
         )
-
-
-def scan_down(blocks: SingleBlocks, top: float, bottom: float) -> tuple[float, float] | None:
-    """Return a toppling k_r and a safe one just above it, from the first found below `top`.
-
-    Args:
-        top: k_r at and above which nothing topples.
-        bottom: least k_r of interest.
-    """
-    safe = top
-    for kr in np.geomspace(top, bottom, SCAN_POINTS).tolist():
-        if blocks.outcome(kr) == TOPPLED:
-            break
-        safe = kr
-    else:
-        return None
-    # nothing safe was met above it
-    if kr == top:
-        return kr, top
-    while abs(kr - safe) > BORDER * max(kr, safe):
-        middle = 0.5 * (kr + safe)
-        if blocks.outcome(middle) == TOPPLED:
-            kr = middle
-        else:
-            safe = middle
-    return kr, safe

@@ -66,7 +66,8 @@ def test_what_the_cubics_miss_is_taken_into_account() -> None:
     smooth = excitation(GroundMotion(0.3 + 0.4 * t, 0.01))
     plain = np.empty((1, COLUMNS))
     fill_spans(smooth.interval_s, smooth.k_h, smooth.w, length, plain)
-    assert np.abs(plain[0, 10:]).max() < 1e-15
+    assert np.abs(plain[0, 10:18]).max() < 1e-15
+    assert plain[0, 18] < 1e-14
     np.testing.assert_allclose(plain[0, 2:10], [0.3, 0.4, 0, 0, 1, 0, 0, 0], atol=1e-13)
     assert np.abs(table[:, 10]).max() > 1e-7
     spanned = integrated(excited, p, length, 512)
@@ -85,3 +86,24 @@ def test_jumps_inside_a_span_are_exact_in_the_mean() -> None:
     )
     mean = table[:, 2] + table[:, 3] / 2 + table[:, 4] / 3 + table[:, 5] / 4
     np.testing.assert_allclose(mean * table[:, 0], area, atol=1e-15)
+
+
+def test_the_error_of_a_span_of_rough_samples_is_within_its_bound() -> None:
+    """`take_span` leaves out the spans whose bound is too great."""
+    rng = np.random.default_rng(3)
+    errors = []
+    for _ in range(300):
+        length = int(rng.choice([2, 4, 8, 16]))
+        rough = 10.0 ** rng.uniform(-2.0, 0.0) * rng.standard_normal((2, length + 1))
+        motion = GroundMotion(rng.uniform(-1.0, 1.0) + rough[0], 0.01)
+        drive = excitation(motion, GroundMotion(0.3 * rough[1].clip(-3.0), 0.01))
+        p = 10.0 ** rng.uniform(-2.5, -2.0) / (length * 0.01)
+        table = np.empty((1, COLUMNS))
+        fill_spans(drive.interval_s, drive.k_h, drive.w, length, table)
+        exact, spanned = (integrated(drive, p, each, length) for each in (0, length))
+        bound = ((p * table[0, 0]) ** 2 * table[0, 18]) ** 2
+        errors.append((abs(exact[1] - spanned[1]), bound))
+    error, bounds = np.array(errors).T
+    assert (error <= bounds + 1e-15).all()
+    # and there is something to be bounded
+    assert (error > 1e-13).sum() > 20

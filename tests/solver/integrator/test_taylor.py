@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.state import StepExcitation
-from rbfrag.solver.integrator.taylor import taylor_step
+from rbfrag.solver.integrator.taylor import ORDER, lean_step, taylor_step
 
 FloatArray = NDArray[np.float64]
 
@@ -46,3 +46,26 @@ def test_the_step_is_the_series_of_the_equation(order: int) -> None:
         assert turned == pytest.approx(float((expected / (k + 1)).sum()), abs=1e-14 * size)
         assert u_end == pytest.approx(float(expected.sum()), abs=1e-14 * size)
         assert v_end == pytest.approx(float((k * expected).sum()), abs=1e-13 * size)
+
+
+def test_a_lean_step_leaves_out_little_however_rough_the_record() -> None:
+    """The excitation may change by all of it within one step: the length alone does not tell."""
+    rng = np.random.default_rng(5)
+    u = np.empty(9)
+    lower = 0
+    for _ in range(3000):
+        ph = 10.0 ** rng.uniform(-4.0, -1.6)
+        phi, rate = rng.uniform(-0.3, 1.2), rng.uniform(-1.0, 1.0)
+        rough = 10.0 ** rng.uniform(-4.0, 0.0)
+        over = StepExcitation(
+            rng.uniform(-1.2, 1.2), rough * rng.normal(), rng.uniform(0.2, 1.8),
+            rough * rng.normal() * rng.integers(2),
+        )  # fmt: skip
+        s, c = math.sin(phi), math.cos(phi)
+        turned, u_end, _ = lean_step.py_func(u, ph * rate, ph, s, c, over)
+        lower += u[ORDER] == 0.0
+        exact, u_exact, _ = taylor_step(ORDER, u, ph * rate, ph, s, c, over)
+        assert abs(u_end - u_exact) < 6e-14 * ph + 1e-18
+        assert abs(turned - exact) < 1e-15
+    # it is lean as a rule
+    assert lower > 1000
