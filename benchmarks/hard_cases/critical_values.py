@@ -123,7 +123,7 @@ def contradictions(case: Case, result: CriticalResult, runs: int) -> Iterator[st
     else:
         assert upper is not None
         if found := toppling_above(case, drive, bottom * HIDDEN, upper, runs):
-            yield f"a block of {found / pga!r} topples, {found / bottom - 1.0:.2g} above the lower end"
+            yield f"a block of {found / pga!r} topples, {found / bottom - 1.0:.2g} above `lower`"
         if found := toppling_above(case, drive, upper, top, runs // 4):
             yield f"a block of {found / pga!r} topples above K_up"
 
