@@ -149,7 +149,8 @@ def combination_table(
     if not doubtful_pgd:
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = (
-        "p2", "yield_g", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s",
+        "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s", "pga_g", "pgv_m_s",
+        "tm_s",
     )  # fmt: skip
     others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
@@ -312,8 +313,8 @@ def _age(numerics_version: str) -> tuple[int, str]:
 def _combination_query() -> Select[Any]:
     own = (
         "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
-        "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga", "kr",
-        "y_m_s",
+        "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
+        "upper", "kr", "y_m_s",
     )  # fmt: skip
     of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *SPECTRAL_COLUMNS, "flags")
     return select(

@@ -125,7 +125,8 @@ SPECTRAL_COLUMNS = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
 class CombinationTable:
     """Critical values with the intensity of their motions: columns of equal length.
 
-    What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
+    What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``,
+    `upper`, the upper end of the bracket of `kr_over_pga`, where there is none;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
     is in doubt, unless it was asked for; spectral accelerations where they were not computed.
     `block` is JSON text, None where p² says all; `yield_g` is NaN where that names no strength.
@@ -141,6 +142,7 @@ class CombinationTable:
     status: NDArray[np.object_]
     search_limit: NDArray[np.float64]
     kr_over_pga: NDArray[np.float64]
+    upper: NDArray[np.float64]
     kr: NDArray[np.float64]
     y_m_s: NDArray[np.float64]
     pga_g: NDArray[np.float64]

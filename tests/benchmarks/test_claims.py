@@ -56,6 +56,7 @@ def table(seed: int = 1, *, slope: float = 0.72, scatter: float = 0.2) -> Combin
         status=np.full(n, "found", dtype=object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=kr / pga,
+        upper=np.full(len(p2), np.nan),
         kr=kr,
         y_m_s=y,
         pga_g=pga,

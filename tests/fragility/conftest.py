@@ -59,6 +59,7 @@ def critical_values(
         status=np.where(found, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=keep(kr / pga),
+        upper=np.full(len(p2), np.nan),
         kr=keep(kr),
         y_m_s=keep(y),
         pga_g=pga,

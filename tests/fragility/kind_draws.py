@@ -87,6 +87,7 @@ def _table(
         status=np.where(found, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01) if limit is None else limit,
         kr_over_pga=k_over_pga,
+        upper=np.full(len(p2), np.nan),
         kr=k_over_pga * pga,
         y_m_s=none,
         pga_g=pga,

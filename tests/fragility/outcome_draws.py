@@ -81,6 +81,7 @@ def drawn_outcomes(
         status=np.where(found, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=y * p / (G * pga),
+        upper=np.full(len(p2), np.nan),
         kr=y * p / G,
         y_m_s=y,
         pga_g=pga,

@@ -33,6 +33,7 @@ def critical_values(n: int = N) -> CombinationTable:
         status=np.where(found, "found", "below_limit").astype(object),
         search_limit=np.full(n, 0.01),
         kr_over_pga=keep * np.minimum(1.2 / ratio, 0.9),
+        upper=np.full(len(p2), np.nan),
         kr=keep * y / 9.80665,
         y_m_s=keep * y,
         pga_g=np.full(n, 0.5),

@@ -33,6 +33,7 @@ def table():
         status=np.where(found, "found", "below_limit").astype(object),
         search_limit=np.full(N, 0.01),
         kr_over_pga=keep * 0.5,
+        upper=np.full(N, np.nan),
         kr=keep * y / 9.80665,
         y_m_s=keep * y,
         pga_g=np.full(N, 0.5),

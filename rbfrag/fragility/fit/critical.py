@@ -53,8 +53,13 @@ def fit_lognormal(
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     usable = (data.x > 0.0) & (data.y > 0.0)
     values = {name: value[usable] for name, value in data.values.items()}
-    line = _line(form, names, values)
-    rows, start = censored_line(*line, data.observed[usable], data.event[usable])
+    line, least = _line(form, names, values), None
+    if data.least_y_m_s is not None:
+        lower = data.least_y_m_s[usable]
+        ratio = np.where(np.isfinite(lower), lower / values["y_m_s"], 1.0)
+        ends = {name: values[name] * ratio for name in ("y_m_s", "kr")}
+        least = _line(form, names, {**values, **ends})[1]
+    rows, start = censored_line(*line, data.observed[usable], data.event[usable], least)
     theta, _ = maximise(rows, start)
     # Olsen's parameters put the scatter last
     place = names.index(_LN_SIGMA)
@@ -111,7 +116,8 @@ def fit_lognormal(
         details={"sigma_ln": float(np.exp(b[place])), "exponent_m_estimated": estimate_m},
         warnings=[
             "this is the probability that the critical value is at least the block's: safe islands "
-            "below it are not seen, and the model is over-confident about outcomes"
+            "below it are not seen, and the model is over-confident about outcomes",
+            *data.between_words("count as lying there"),
         ],
     )
 

@@ -48,6 +48,9 @@ K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
 LEAST_DISPLACEMENT_M = 1e-3
 """Displacements below this count as less than it, whether zero or not: their scatter is another."""
 
+KNOWN = 1e-6
+"""Greatest relative width of a bracket that counts as one value: that of certified ones."""
+
 _CENSORED = ("below_limit", "no_motion")
 
 
@@ -95,17 +98,22 @@ class FitSource:
             **{name: v[chosen] for name, v in columns.items() if v is not None},
         )
 
-    def judged_outcomes(self, strength: FloatArray, critical: FloatArray) -> tuple[FloatArray, str]:
+    def judged_outcomes(
+        self, strength: FloatArray, critical: FloatArray, least: FloatArray
+    ) -> tuple[FloatArray, str]:
         """Return what blocks do, 1, 0 or NaN, and in words where that comes from.
 
         Args:
             strength: of the blocks, shape (n, m).
             critical: critical strength, for censored combinations its upper limit, shape (n,).
+            least: of those with a lower limit that one, NaN of others, shape (n,).
         """
         if np.isfinite(self.failed).any():
             return self.failed, "simulated outcomes"
-        failed, known = critical_outcomes(critical, self.table.status == "found", strength)
-        return np.where(known, failed, np.nan), "critical values (safe islands are not seen)"
+        observed = (self.table.status == "found") & np.isnan(least)
+        failed, known = critical_outcomes(critical, observed, strength)
+        failed = np.where(strength <= least[:, None], 1.0, np.where(known, failed, np.nan))
+        return failed, "critical values (safe islands are not seen)"
 
 
 def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> FloatArray:
@@ -208,6 +216,8 @@ class FitData:
             stand for those not known; None: each the same.
         sensitive: whether the outcomes are sensitive to the motion's last digits, shape (n, m);
             None where that is stored of none.
+        least_y_m_s: of censored rows whose critical value lies between two ends the lower one
+            [m/s], NaN of others, shape (n,); None where there is no such row.
     """
 
     kind: str
@@ -232,6 +242,7 @@ class FitData:
     fingerprint: str = ""
     weights: FloatArray | None = None
     sensitive: FloatArray | None = None
+    least_y_m_s: FloatArray | None = None
 
     @property
     def x(self) -> FloatArray:
@@ -247,6 +258,15 @@ class FitData:
     def censored(self) -> NDArray[np.bool_]:
         """Rows of which a limit is known alone, shape (n,)."""
         return np.asarray(~self.observed & np.isfinite(self.values.get("y_m_s", self.x)))
+
+    def between_words(self, treated: str) -> list[str]:
+        """Say how critical values between two ends are treated, where there are any."""
+        if self.least_y_m_s is None or not (n := int(np.isfinite(self.least_y_m_s).sum())):
+            return []
+        return [
+            f"{n} critical values are not certified, so that they lie between what was seen to "
+            f"topple and a proven bound, and {treated}"
+        ]
 
     @property
     def events(self) -> int:
@@ -284,6 +304,7 @@ class _Points:
     weights: FloatArray | None = None
     scored: NDArray[np.bool_] | None = None
     sensitive: FloatArray | None = None
+    least_y_m_s: FloatArray | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -320,6 +341,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     observed = points.observed[chosen]
     values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
     failed = np.ascontiguousarray(points.failed[chosen])
+    least = None if points.least_y_m_s is None else points.least_y_m_s[chosen]
     data = FitData(
         kind=named,
         values=values,
@@ -340,9 +362,17 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         n_excluded=int((points.observed & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
-        fingerprint=_fingerprint(keys[chosen], names[event], values, observed, failed, of_outcomes),
+        fingerprint=_fingerprint(
+            keys[chosen],
+            names[event],
+            values if least is None else {**values, "least": least},
+            observed,
+            failed,
+            of_outcomes,
+        ),
         weights=None if points.weights is None else points.weights[chosen],
         sensitive=None if points.sensitive is None else points.sensitive[chosen],
+        least_y_m_s=least,
     )
     _refuse_thin(data, method, term)
     return data
@@ -427,10 +457,15 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp needs the toppling spectrum X(p), which is stored for none of the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
-    observed = table.status == "found"
+    found = table.status == "found"
     status = table.status.astype(str)
+    # a critical value that is not certified lies between what topples and what is proven safe
+    highest = table.upper * pga_m_s2 / p
+    open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + KNOWN))
+    observed = found & ~open_above
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
-    y = np.where(observed, table.y_m_s, limit)
+    y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))
+    least = np.where(found & open_above, table.y_m_s, np.nan)
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
     of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
@@ -443,7 +478,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     scored = read = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
     if wide:
         scored, read = scored & (ratio <= Y0_OVER_PGV[-1] * (1.0 + 1e-9)), some_block
-    failed, source_of_outcomes = source.judged_outcomes(y0, y)
+    failed, source_of_outcomes = source.judged_outcomes(y0, y, least)
     some = read.any(axis=0)
     of_outcomes = method.reads == "outcomes"
     ranges = {
@@ -477,6 +512,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         ranges=ranges,
         scored=scored[:, some],
         sensitive=None if source.sensitive is None else source.sensitive[:, some],
+        least_y_m_s=least if np.isfinite(least).any() else None,
     )
 
 

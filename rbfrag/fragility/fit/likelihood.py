@@ -112,24 +112,33 @@ Standardised = tuple[Any, Any, Sequence[Any], Sequence[Any]]
 class CensoredNormal:
     """Rows at which a block just fails, or beyond which it does, with P = Φ(eta) of failing.
 
-    A found row has the density φ(eta)/σ, a censored one the probability Φ(-eta) of failing beyond.
+    A found row has the density φ(eta)/σ, a censored one the probability Φ(-eta) of failing beyond,
+    one that is known to fail between two ends the difference of theirs.
 
     Args:
         formula: of eta, from parameters and `values`.
         values: what it reads, arrays with first axis n.
         observed: False for censored rows, shape (n,).
         event: number of each row's earthquake, shape (n,).
+        nearer: the values of censored rows at the nearer of two ends between which they fail, and
+            of all others as in `values`; None where there is no such row.
     """
 
     formula: Callable[[FloatArray, Mapping[str, FloatArray]], Standardised]
     values: Mapping[str, FloatArray]
     observed: Chosen
     event: NDArray[np.intp]
+    nearer: Mapping[str, FloatArray] | None = None
 
     def only(self, chosen: Chosen) -> CensoredNormal:
         """Return some of the rows."""
-        values = {name: value[chosen] for name, value in self.values.items()}
-        return CensoredNormal(self.formula, values, self.observed[chosen], self.event[chosen])
+        values, nearer = (
+            None if part is None else {name: value[chosen] for name, value in part.items()}
+            for part in (self.values, self.nearer)
+        )
+        assert values is not None
+        observed, event = self.observed[chosen], self.event[chosen]
+        return CensoredNormal(self.formula, values, observed, event, nearer)
 
     def log_likelihood(self, b: FloatArray) -> FloatArray:
         """Return the log likelihood of each row; NaN where the scatter is not above zero."""
@@ -138,7 +147,14 @@ class CensoredNormal:
         with np.errstate(invalid="ignore"):
             eta, log_sigma, *_ = self.formula(b, self.values)
             density = -0.5 * eta * eta - log_sigma - _HALF_LN_2PI
-        return np.asarray(np.where(self.observed, density, log_ndtr(-eta)))
+            beyond = log_ndtr(-eta)
+            if self.nearer is not None:
+                eta_nearer = self.formula(b, self.nearer)[0]
+                part = np.exp(log_ndtr(-eta_nearer) - beyond)
+                # 0 for rows with one end; two far out in the tail may round to one
+                part = np.where(eta_nearer > eta, np.minimum(part, 1.0 - 1e-15), 0.0)
+                beyond = beyond + np.log1p(-part)
+        return np.asarray(np.where(self.observed, density, beyond))
 
     def derivatives(
         self, b: FloatArray, times: FloatArray | None = None
@@ -147,7 +163,7 @@ class CensoredNormal:
 
         Elsewhere the information leaves out what is zero in the mean.
         """
-        from scipy.special import log_ndtr
+        from scipy.special import log_ndtr, ndtr
 
         eta, _, *both = self.formula(b, self.values)
         n, w = self.observed.size, 1.0 if times is None else times
@@ -157,7 +173,23 @@ class CensoredNormal:
         second = w * np.where(self.observed, 1.0, hazard * (hazard - eta))
         of_sigma = (w * self.observed)[:, None] * sigma_by
         score = first @ by - of_sigma.sum(axis=0)
-        return score, (by * second[:, None]).T @ by + of_sigma.T @ sigma_by
+        information = (by * second[:, None]).T @ by + of_sigma.T @ sigma_by
+        if self.nearer is not None:
+            # what a second end changes of a censored row: of ln[Φ(-eta) - Φ(-eta')]
+            eta_nearer, _, nearer_by, _ = self.formula(b, self.nearer)
+            rows = np.flatnonzero(~self.observed & (eta_nearer > eta))
+            by_n = np.column_stack([np.broadcast_to(c, n)[rows] for c in nearer_by])
+            by_u, e_u, e_n, weight = by[rows], eta[rows], eta_nearer[rows], (w * np.ones(n))[rows]
+            width = ndtr(-e_u) - ndtr(-e_n)
+            width = np.maximum(width, np.finfo(float).tiny)
+            r_u, r_n = (np.exp(-0.5 * e * e - _HALF_LN_2PI) / width for e in (e_u, e_n))
+            slope = r_n[:, None] * by_n - r_u[:, None] * by_u
+            score += weight @ slope - first[rows] @ by_u
+            curved = (slope * weight[:, None]).T @ slope
+            curved += (by_n * (weight * r_n * e_n)[:, None]).T @ by_n
+            curved -= (by_u * (weight * r_u * e_u)[:, None]).T @ by_u
+            information += curved - (by_u * second[rows][:, None]).T @ by_u
+        return score, information
 
 
 def olsen(theta: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
@@ -182,7 +214,11 @@ def from_olsen(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def censored_line(
-    columns: FloatArray, y: FloatArray, observed: Chosen, event: NDArray[np.intp]
+    columns: FloatArray,
+    y: FloatArray,
+    observed: Chosen,
+    event: NDArray[np.intp],
+    least: FloatArray | None = None,
 ) -> tuple[CensoredNormal, FloatArray]:
     """Return the likelihood of y = columns · β + σ·normal, and Olsen's parameters to start from.
 
@@ -191,10 +227,13 @@ def censored_line(
         y: responses; for censored points the value they lie below, shape (n,).
         observed: False for censored points, shape (n,).
         event: number of each point's earthquake, shape (n,).
+        least: of censored points that lie above a value that one, of others `y`, shape (n,); None
+            where there are none.
     """
     beta = np.linalg.lstsq(columns[observed], y[observed], rcond=None)[0]
     h = 1.0 / max(float((y[observed] - columns[observed] @ beta).std()), 1e-12)
-    rows = CensoredNormal(olsen, {"columns": columns, "y": y}, observed, event)
+    nearer = None if least is None else {"columns": columns, "y": least}
+    rows = CensoredNormal(olsen, {"columns": columns, "y": y}, observed, event, nearer)
     return rows, np.append(beta * h, h)
 
 

@@ -390,8 +390,9 @@ def _log_density(b: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _warnings(data: FitData, fit: LineFit, x: FloatArray, unstable: int) -> list[str]:
-    result = []
-    n_censored = int(data.censored.sum())
+    result = data.between_words("are left out of this fit")
+    between = 0 if data.least_y_m_s is None else int(np.isfinite(data.least_y_m_s).sum())
+    n_censored = int(data.censored.sum()) - between
     if n_censored:
         result.append(
             f"{n_censored} combinations without a critical value above the search limit are left "

@@ -112,3 +112,36 @@ def test_a_formula_in_its_own_parameters_has_the_same_maximum():
     other, settled = maximise(rows, np.array([0.0, 0.5, 0.0]), tolerance=1e-15)
     assert settled
     assert other == pytest.approx(b, rel=1e-6)
+
+
+def test_values_known_between_two_ends_count_as_intervals():
+    """Against an independent likelihood; a quarter of the values is known to ± 0.4 only."""
+    columns, y, found, event = drawn()
+    random = np.random.default_rng(3)
+    between = found & (random.random(y.size) < 0.25)
+    least, upper = y - random.uniform(0.0, 0.4, y.size), y + random.uniform(0.0, 0.4, y.size)
+    top, exact = np.where(between, upper, y), found & ~between
+    bottom = np.where(between, least, top)
+    rows, start = censored_line(columns, top, exact, event, bottom)
+    theta, settled = maximise(rows, start)
+    assert settled
+
+    def independent(b):
+        mean, sigma = columns @ b[:-1], np.exp(b[-1])
+        below = norm.cdf(top, mean, sigma) - np.where(between, norm.cdf(bottom, mean, sigma), 0.0)
+        return np.where(exact, norm.logpdf(y, mean, sigma), np.log(below))
+
+    b, _ = from_olsen(theta)
+    assert rows.log_likelihood(theta) == pytest.approx(independent(b), rel=1e-9)
+    free = minimize(lambda b: -independent(b).sum(), [0, 1, 0], method="Nelder-Mead",
+                    options={"xatol": 1e-10, "fatol": 1e-12, "maxiter": 9999})  # fmt: skip
+    assert b == pytest.approx(free.x, abs=2e-6)
+    # the information is the curvature of the likelihood
+    h, steps = 1e-5, np.eye(3) * 1e-5
+    curvature = [
+        (rows.derivatives(theta + s)[0] - rows.derivatives(theta - s)[0]) / (2 * h) for s in steps
+    ]
+    assert -np.array(curvature) == pytest.approx(rows.derivatives(theta)[1], rel=1e-6, abs=1e-4)
+    # as if they were exact at their lower ends the line would lie too low
+    low, _ = from_olsen(maximise(*censored_line(columns, bottom, found, event))[0])
+    assert low[0] < b[0] - 0.02

@@ -233,3 +233,29 @@ def test_earthquakes_of_a_single_point_do_not_break_the_resamples(draw):
     report = fit(rows_of(table, np.array(chosen)), term="pgv")
     assert report.events == 4
     assert np.all(np.isfinite(report.model.row.covariance))
+
+
+@pytest.mark.parametrize(("method", "words"), [("lognormal", "lying there"), ("wls", "left out")])
+def test_a_value_without_certificate_is_read_as_an_interval(draw, method, words):
+    """The lower end alone would make blocks look weaker than they may be."""
+    table = draw(censor=True)
+    open_above = np.random.default_rng(1).random(table.y_m_s.size) < 0.3
+    factor = np.where(open_above, 0.6, 1.0)
+    upper = np.where(open_above, 1.3, 1.0 + 1e-9) * table.kr_over_pga
+    part = {name: getattr(table, name) * factor for name in ("kr_over_pga", "kr", "y_m_s")}
+    exact = fit(table, term="pgv", method=method)
+    report = fit(replace(table, **part, upper=upper), term="pgv", method=method)
+    as_exact = fit(replace(table, **part), term="pgv", method=method)
+    assert any(words in each for each in report.warnings)
+    assert report.n == int(((table.status == "found") & ~open_above).sum())
+    name, slope = list(report.coefficients)[:2]
+    # the line comes back, and would lie too low by lower ends
+    for each in (name, slope):
+        error = 4.0 * report.standard_errors[each]
+        assert abs(report.coefficients[each] - exact.coefficients[each]) < error
+
+    def median(fitted):
+        c = fitted.coefficients
+        return c[name] + c[slope] * (np.log(0.4) if method == "lognormal" else 0.4)
+
+    assert median(as_exact) < median(exact) - 3.0 * abs(median(report) - median(exact))
