@@ -457,15 +457,15 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp needs the toppling spectrum X(p), which is stored for none of the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
-    found = table.status == "found"
+    searched = table.status == "found"
     status = table.status.astype(str)
     # a critical value that is not certified lies between what topples and what is proven safe
     highest = table.upper * pga_m_s2 / p
     open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + KNOWN))
-    observed = found & ~open_above
+    observed = searched & ~open_above
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
     y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))
-    least = np.where(found & open_above, table.y_m_s, np.nan)
+    least = np.where(searched & open_above, table.y_m_s, np.nan)
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
     of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
