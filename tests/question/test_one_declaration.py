@@ -23,13 +23,13 @@ import numpy as np
 import rbfrag
 from rbfrag.question.fields import declared
 from rbfrag.service.app import make_app
-from rbfrag.service.settings import Settings
+from rbfrag.service.settings import ServiceSettings
 from rbfrag.db.location import REFERENCE
 
 single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, hardness=40.0)
 many = rbfrag.predict(np.array([3.0, 3.0]), 0.1, pgv_m_s=0.6, hardness=40.0)
 shape = rbfrag.predict(height_m=2.0, width_m=0.4, pgv_m_s=0.6, hardness=40.0)
-schema = make_app(Settings(db=str(REFERENCE))).openapi()
+schema = make_app(ServiceSettings(db=str(REFERENCE))).openapi()
 print(json.dumps({
     "same": single.probability == rbfrag.predict(3.0, 0.1, pgv_m_s=0.6).probability,
     "warnings": [single.warnings, many.warnings, shape.warnings],
