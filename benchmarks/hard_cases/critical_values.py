@@ -86,7 +86,7 @@ def hard_to_certify(rng: np.random.Generator) -> Iterator[Case]:
         yield Case(strong, p2, vertical_of(motion, rng) if rng.integers(2) else None)
 
 
-def toppling_above(case: Case, drive: Excitation, low: float, high: float, runs: int) -> float:
+def toppling_above(case: Case, excited: Excitation, low: float, high: float, runs: int) -> float:
     """Return the strongest k_r between two that topples by brute force, 0 for none.
 
     Half of the blocks are equally spaced in ln k_r, half are drawn.
@@ -97,34 +97,34 @@ def toppling_above(case: Case, drive: Excitation, low: float, high: float, runs:
     spaced = low * (high / low) ** ((np.arange(runs // 2) + 0.5) / (runs // 2))
     drawn = rng.uniform(low, high, runs - runs // 2)
     kr = np.sort(np.concatenate([spaced, drawn]))[::-1]
-    for k in kr[topple(drive.time_s, drive.k_h, drive.w, case.p2**0.5, kr)].tolist():
-        if truth(drive, p2=case.p2, kr=k).outcome == "toppled":
+    for k in kr[topple(excited.time_s, excited.k_h, excited.w, case.p2**0.5, kr)].tolist():
+        if truth(excited, p2=case.p2, kr=k).outcome == "toppled":
             return float(k)
     return 0.0
 
 
 def contradictions(case: Case, result: CriticalResult, runs: int) -> Iterator[str]:
     """Yield what an answer gets wrong."""
-    drive = case.excitation()
-    pga = drive.pga_g
+    excited = case.excitation()
+    pga = excited.pga_g
     bottom = result.search_limit * pga
-    top = max(drive.max_q, bottom)
+    top = max(excited.max_q, bottom)
     if result.lower is not None:
-        if truth(drive, p2=case.p2, kr=result.lower * pga).outcome != "toppled":
+        if truth(excited, p2=case.p2, kr=result.lower * pga).outcome != "toppled":
             yield f"the block at the lower end {result.lower!r} does not topple"
         bottom = result.lower * pga
     upper = None if result.upper is None else result.upper * pga
-    if upper is not None and truth(drive, p2=case.p2, kr=upper).outcome == "toppled":
+    if upper is not None and truth(excited, p2=case.p2, kr=upper).outcome == "toppled":
         yield f"the block at the upper end {result.upper!r} topples"
     if result.certified:
         above = bottom if upper is None else upper
-        if found := toppling_above(case, drive, above * (1.0 + 1e-12), top, runs):
+        if found := toppling_above(case, excited, above * (1.0 + 1e-12), top, runs):
             yield f"a block of {found / pga!r} topples above a certified bracket"
     else:
         assert upper is not None
-        if found := toppling_above(case, drive, bottom * HIDDEN, upper, runs):
+        if found := toppling_above(case, excited, bottom * HIDDEN, upper, runs):
             yield f"a block of {found / pga!r} topples, {found / bottom - 1.0:.2g} above `lower`"
-        if found := toppling_above(case, drive, upper, top, runs // 4):
+        if found := toppling_above(case, excited, upper, top, runs // 4):
             yield f"a block of {found / pga!r} topples above K_up"
 
 

@@ -104,11 +104,11 @@ def critical(
     )  # fmt: skip
     # condition 1 of the proof
     if excitation.jump_node < excitation.w.size:
-        thrown = (
+        jump = (
             f"1 + k_v <= 0 at {excitation.time_s[excitation.jump_node]:.3f} s: the vertical motion "
             "throws every block; search with the horizontal motion alone"
         )
-        return replace(answer, status="outside_model", warnings=(*answer.warnings, thrown))
+        return replace(answer, status="outside_model", warnings=(*answer.warnings, jump))
     # no block starts whose k_r no q exceeds: with vertical motion q may exceed PGA
     bottom = search_limit * pga
     if pga == 0.0 or excitation.max_q <= bottom:

@@ -40,7 +40,7 @@ class SlidingBlocks:
     """Blocks on a level plane under one excitation.
 
     Args:
-        slide_m: displacement [m] of the block of a yield acceleration [g]; NaN where it is thrown.
+        slide_m: displacement [m] of the block of a yield acceleration [g]; NaN after a jump.
     """
 
     excited: Excitation
@@ -52,7 +52,7 @@ class SlidingBlocks:
         return {}
 
     def displacement_m(self, ky_over_pga: float) -> float:
-        """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
+        """Return the permanent displacement down a level plane [m]; NaN after a jump."""
         if ky_over_pga not in self.known:
             self.known[ky_over_pga] = self.slide_m(self.excited, ky_over_pga * self.excited.pga_g)
         return self.known[ky_over_pga]
