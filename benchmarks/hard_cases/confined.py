@@ -1,0 +1,40 @@
+"""Confined topples through to rest or fall, beside a free block on stiff springs."""
+
+from __future__ import annotations
+
+import sys
+from itertools import islice
+
+from benchmarks.hard_cases import Row
+from rbfrag.solver.results import Outcome
+from tests.physics.confined_draws import confined_topples
+
+COUNT = 20
+SEED = 1931
+
+
+def rows() -> list[Row]:
+    """Run the cases."""
+    wrong = within = others = 0
+    for number, each in enumerate(islice(confined_topples(SEED), COUNT)):
+        answer = each.answer
+        if answer.error_estimate is None:
+            others += 1
+            continue
+        springs = each.on_springs()
+        falls = answer.outcome is Outcome.TOPPLED
+        if each.ends_as(springs) and (falls or each.is_covered(springs)):
+            within += 1
+            continue
+        wrong += 1
+        print(
+            f"confined {number}: {answer.outcome}, {answer.peak_theta_rad} rad; springs "
+            f"{-springs.turned_rad.min()!r}; error estimate {answer.error_estimate:.1e}",
+            file=sys.stderr,
+        )
+    return [Row("confined topples to rest or fall", "free block on stiff springs", COUNT, wrong,
+                within, others)]  # fmt: skip
+
+
+if __name__ == "__main__":
+    print(*rows(), sep="\n")

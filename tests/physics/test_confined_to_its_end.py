@@ -1,0 +1,32 @@
+"""Confined topples followed to rest or to the fall, beside a free block on springs."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+from rbfrag.solver.results import Outcome
+from tests.physics.confined_draws import confined_topples
+
+COUNT = 20
+
+
+def test_a_confined_block_goes_on_to_rest_or_fall() -> None:
+    falls = covered = by_a_hundredth = stays = 0
+    for each in islice(confined_topples(5), COUNT):
+        answer = each.answer
+        assert answer.outcome in (Outcome.STABLE, Outcome.TOPPLED)
+        if answer.error_estimate is None:  # whether it falls is open
+            continue
+        springs = each.on_springs()
+        assert each.ends_as(springs)
+        if answer.outcome is Outcome.TOPPLED:
+            falls += 1
+            continue
+        stays += 1
+        covered += each.is_covered(springs)
+        by_a_hundredth += each.is_covered(springs, 0.01)
+    assert falls >= 3
+    assert falls + stays >= COUNT - 2
+    assert covered == stays
+    # an estimate that is never needed would cover as many
+    assert by_a_hundredth < stays
