@@ -1,4 +1,7 @@
-"""Confined topples through to rest or fall, beside a free block on stiff springs."""
+"""Confined topples through to rest or fall, beside a free block on stiff springs.
+
+Wrong is another end, or a peak that is off by more than the error estimate.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ from benchmarks.hard_cases import Row
 from rbfrag.solver.results import Outcome
 from tests.physics.confined_draws import confined_topples
 
-COUNT = 20
-SEED = 1931
+COUNT = 200
+SEED = 77
 
 
 def rows() -> list[Row]:
@@ -18,7 +21,7 @@ def rows() -> list[Row]:
     wrong = within = others = 0
     for number, each in enumerate(islice(confined_topples(SEED), COUNT)):
         answer = each.answer
-        if answer.error_estimate is None:
+        if answer.error_estimate is None or answer.outcome is Outcome.UNDETERMINED:
             others += 1
             continue
         springs = each.on_springs()
