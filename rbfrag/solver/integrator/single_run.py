@@ -205,7 +205,7 @@ def cross_interval(
         grown = math.exp(step.growth) if step.growth > 1.0 else exponential_bound(step.growth)
         # Gronwall: what was wrong at the start grows at most so, what the step adds is added
         error = error * grown + step.truncation + step.rounding
-        drift += drift_of_step(ph, error, step.truncation, step.theta)
+        drift += drift_of_step(ph, error, step.theta)
         if lifting:
             # a threshold exceeded by less than rounding may seem to pull the block back
             lifting = False

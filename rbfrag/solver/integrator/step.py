@@ -23,16 +23,20 @@ def step_errors(
     state: State,
     shaking: StepExcitation,
     turned: float,
-    highest: tuple[float, float, float],
+    highest: tuple[float, float, float, float],
 ) -> tuple[float, float, float]:
     """Estimate what one step does to the error of its start, and adds to it.
+
+    At order 8 truncation and rounding together were no less than what the step adds to
+    |error of theta| + |error of theta'/p| in all of a million drawn steps; this is measured, not
+    proven. A series of lower order may end before the first terms in theta³: there it is a guess.
 
     Args:
         order: degree N of U.
         ph: p times the step length.
         shaking: over the step.
         turned: theta(1) - theta(0).
-        highest: U[N - 2], U[N - 1] and U[N].
+        highest: U[N - 3], U[N - 2], U[N - 1] and U[N].
 
     Returns:
         Exponent by which an error grows at most; truncation; rounding.
@@ -43,23 +47,29 @@ def step_errors(
     stiffness = w_size * abs(state.cos)
     stiffness += a_size * abs(state.sin)
     growth = ph * max(1.0, stiffness)
-    # the first two omitted terms, from u[k+2] ~ (p·h)² D u[k]/((k+1)(k+2)): one
-    # alone is fooled, since from rest under constant a every other one vanishes
-    omitted = 16.0 * ph * (a_size + w_size) / (order * (order + 1))
-    truncation = omitted * (abs(highest[2]) + abs(highest[1]))
-    # and the terms in theta³, which from rest come three places apart
-    truncation += abs(highest[0] * turned) / ph
-    size = a_size * abs(state.cos) + w_size * (abs(state.sin) + abs(turned))
+    # What is omitted begins with U[N + 1]. The linear equation gives it P D U[N - 1]/(N (N + 1))
+    # and P D' U[N - 2]/(N (N + 1)), ...
+    linear = 8.0 * ph * (a_size + w_size) / (order * order)
+    truncation = linear * (abs(highest[2]) + abs(highest[1]))
+    # ... and products of angles give it what a linear one has not. From rest under a rising k_h
+    # they come three places apart and last for three, so that they show in U[N]; under a constant
+    # one four places, and only U[N - 3] theta² tells their size. The factors are those that hold
+    # in some million drawn steps
+    size = ph * (abs(state.rate) + ph * (a_size * abs(state.cos) + w_size * abs(state.sin)))
+    truncation += (0.0625 * abs(highest[3]) + 0.25 * abs(highest[0]) * (size * size)) / ph
+    # theta, theta'/p and the sine are rounded where they are stored, theta'' where k_h drives it;
+    # what gravity takes back, w sin(phi), is less than the rounding of the sine itself
     rounding = MACHINE_EPSILON * (
-        2.0 * (abs(state.theta + turned) + abs(state.rate) + abs(state.sin)) + 4.0 * ph * size
+        2.0 * (abs(state.theta + turned) + abs(state.rate) + abs(state.sin))
+        + 4.0 * ph * a_size * abs(state.cos)
     )
     return growth, truncation, rounding
 
 
 @within
-def drift_of_step(ph: float, error: float, truncation: float, theta_end: float) -> float:
+def drift_of_step(ph: float, error: float, theta_end: float) -> float:
     """Return what a step adds to the error of theta: theta' errs by `error`, theta by rounding."""
-    return ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
+    return ph * error + 2.0 * MACHINE_EPSILON * abs(theta_end)
 
 
 class StepRules(NamedTuple):
@@ -106,7 +116,7 @@ def take_step(
     u_start = ph * state.rate
     # exact up to its truncation where k_h and k_v are straight lines: it ends at a kink
     turned, u_end, v_end = taylor_step(order, u, u_start, ph, state.sin, state.cos, shaking)
-    highest = (u[order - 2], u[order - 1], u[order])
+    highest = (u[order - 3], u[order - 2], u[order - 1], u[order])
     growth, truncation, rounding = step_errors(order, ph, state, shaking, turned, highest)
     return StepResult(
         state.theta + turned, turned, u_start, u[1], u_end, v_end, growth, truncation, rounding

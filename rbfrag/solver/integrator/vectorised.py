@@ -54,10 +54,10 @@ PH, SIN, COS, K_H, DK_H, W, DW, THETA, RATE, ERROR, DRIFT, PEAK, LEAST_Q, APART 
 TAKEN = 14
 
 # ... and of what it gives. (Arrays of their own would have to be told apart at each step.)
-TURNED, U_START, U_END, V_START, V_END, U6, U7, U8, SIN_END, COS_END, ALONE, FALLS = (
-    row * BATCH for row in range(12)
+TURNED, U_START, U_END, V_START, V_END, U5, U6, U7, U8, SIN_END, COS_END, ALONE, FALLS = (
+    row * BATCH for row in range(13)
 )
-GIVEN = 12
+GIVEN = 13
 
 SLOT = np.dtype(
     [
@@ -78,7 +78,7 @@ def take_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
     for j in range(batch):
         u0 = x[PH + j] * x[RATE + j]
         shaking = StepExcitation(x[K_H + j], x[DK_H + j], x[W + j], x[DW + j])
-        turned, u_end, v_end, u1, _, _, _, _, u6, u7, u8 = series(
+        turned, u_end, v_end, u1, _, _, _, u5, u6, u7, u8 = series(
             ORDER, u0, x[PH + j], x[SIN + j], x[COS + j], shaking
         )
         s_end, c_end = small_turn(x[SIN + j], x[COS + j], turned)
@@ -87,6 +87,7 @@ def take_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
         y[U_END + j] = u_end
         y[V_START + j] = u1
         y[V_END + j] = v_end
+        y[U5 + j] = u5
         y[U6 + j] = u6
         y[U7 + j] = u7
         y[U8 + j] = u8
@@ -105,10 +106,10 @@ def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
         theta_end = theta + turned
         state = State(theta, x[RATE + j], x[SIN + j], x[COS + j])
         shaking = StepExcitation(x[K_H + j], x[DK_H + j], x[W + j], x[DW + j])
-        highest = (y[U6 + j], y[U7 + j], y[U8 + j])
+        highest = (y[U5 + j], y[U6 + j], y[U7 + j], y[U8 + j])
         growth, truncation, rounding = step_errors(ORDER, ph, state, shaking, turned, highest)
         error = x[ERROR + j] * exponential_bound(growth) + truncation + rounding
-        drift = x[DRIFT + j] + drift_of_step(ph, error, truncation, theta_end)
+        drift = x[DRIFT + j] + drift_of_step(ph, error, theta_end)
         u_end = y[U_END + j]
         u_start = y[U_START + j]
         v_start = y[V_START + j]
