@@ -69,8 +69,10 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
         )  # fmt: skip
         if result.status != "found" or result.lower is None or result.upper is None:
             continue
+        # without certificate the upper end is K_up; above the lower one there is a border, too
+        upper = result.upper if result.certified else result.lower * (1.0 + 1e-9)
         excited = one.excited()
-        pairs = [(result.lower * excited.pga_g, result.upper * excited.pga_g)]
+        pairs = [(result.lower * excited.pga_g, upper * excited.pga_g)]
         said = result.intervals.outcome
         for m in rng.permutation(max(len(said) - 2, 0)).tolist():
             if len(pairs) > OF_ONE_MAP:
