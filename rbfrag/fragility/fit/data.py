@@ -497,8 +497,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         fitted = read[:, some] & ~method.block.at_rest.holds(blocks)
         # few blocks lie far down
         for name in method.block.options if fitted.any() else ():
-            least = np.quantile(blocks[name][fitted], 1.0 - INSIDE)
-            ranges[name] = np.where(fitted & (blocks[name] >= least), blocks[name], np.nan)
+            covered = np.quantile(blocks[name][fitted], 1.0 - INSIDE)
+            ranges[name] = np.where(fitted & (blocks[name] >= covered), blocks[name], np.nan)
     return _Points(
         values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
         observed=observed,
