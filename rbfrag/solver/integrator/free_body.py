@@ -18,6 +18,7 @@ from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.impulses import (
     CONVERGED,
+    LANDING_M_S,
     ContactArrays,
     Corners,
     Velocity,
@@ -35,9 +36,6 @@ not within `FREE_MOST_S` of rest after the record."""
 HEEL, TOE, ON_BASE, ON_BACK, LANDS = 1, 2, 4, 8, 16
 """Bits of what touches in a step: heel and toe on the base, another corner there, any corner on the
 back plane; and that the block falls on its whole base."""
-
-LANDING_M_S = 1e-3
-"""Speed of a corner from which its impact counts as one."""
 
 FREE_MOST_S = 60.0
 """Time after the record for which a motion that does not end is followed [s]."""

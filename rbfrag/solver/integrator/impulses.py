@@ -17,8 +17,8 @@ from rbfrag.solver.integrator.compiled import inner_kernel
 from rbfrag.solver.results import FloatArray
 
 SWEEPS_MAX = 400
-"""Gauss-Seidel sweeps of one step. All are taken only where two corners stick while the planes push
-out what rounding put below them, which no velocity does exactly for both."""
+"""Gauss-Seidel sweeps of one step. All are taken only where friction at two corners is about to
+stop a block between its planes (`_of_two`)."""
 
 CONVERGED = 1e-10
 """Change of velocity in a sweep, over that by gravity in a step, at which they have converged."""
@@ -26,12 +26,18 @@ CONVERGED = 1e-10
 SINGULAR = 1e-9
 """Pivot at which the linear equations are taken not to decide."""
 
+LANDING_M_S = 1e-3
+"""Speed of a corner from which its impact counts as one."""
+
 UNKNOWNS_MOST = 3
 """Impulses that are unknown at most: as many as there are degrees of freedom."""
 
 OPEN, DOWN, UP, STUCK = range(4)
 """What a corner does: it does not push; it pushes and slips up or down its plane, so that
 friction is down or up it; it pushes and sticks."""
+
+_WAYS = 8
+"""Ways for two corners to push: each slips down or up its plane or sticks, but not both stick."""
 
 
 class Corners(NamedTuple):
@@ -174,9 +180,13 @@ def after_impulses(
         tried = tried and same
         if same and not tried:
             tried = True
-            decided, velocity = _solved(corners, work, active, per_inertia, free)
+            decided, velocity = _solved(corners, work, active, per_inertia, free, tolerance)
             if decided:
                 return velocity
+    else:
+        decided, velocity = _of_two(corners, work, active, per_inertia, free, tolerance)
+        if decided:
+            return velocity
     return Velocity(vx, vy, spin)
 
 
@@ -221,10 +231,64 @@ def _of_one(
 
 
 @inner_kernel
-def _solved(
-    corners: Corners, work: ContactArrays, active: int, per_inertia: float, free: Velocity
+def _of_two(
+    corners: Corners,
+    work: ContactArrays,
+    active: int,
+    per_inertia: float,
+    free: Velocity,
+    tolerance: float,
 ) -> tuple[bool, Velocity]:
-    """Solve for the impulses of corners that do what the last two sweeps say.
+    """Solve for the impulses of two corners that push, trying all that they may do.
+
+    Where friction at both is about to stop the block between its planes, sweeps come ever closer to
+    what the corners do, ever more slowly, and name it wrongly until then. That both stick is not
+    tried: four impulses that bring three speeds to nought lie on a straight line, and Coulomb's law
+    holds on a part of it, at whose ends one corner's friction is at its limit.
+
+    Returns:
+        Whether Coulomb's law holds for one of the ways; and the velocity.
+    """
+    first = second = -1
+    for k in range(active):
+        if work.does[k] == OPEN:
+            continue
+        if work.approach[k] > LANDING_M_S and work.least[k] > 0.0:  # it rebounds
+            return False, free
+        if first < 0:
+            first = k
+        elif second < 0:
+            second = k
+        else:
+            return False, free
+    if second < 0:
+        return False, free
+    for way in range(2 * _WAYS):
+        if way == _WAYS:
+            # no velocity lets two corners that stick out of their planes: they stay there
+            work.least[first] = min(work.least[first], 0.0)
+            work.least[second] = min(work.least[second], 0.0)
+        # DOWN, UP and STUCK of both in turn, without STUCK twice
+        work.does[first], work.does[second] = 1 + way % _WAYS // 3, 1 + way % _WAYS % 3
+        decided, velocity = _solved(corners, work, active, per_inertia, free, tolerance)
+        if decided:
+            return True, velocity
+    return False, free
+
+
+@inner_kernel
+def _solved(
+    corners: Corners,
+    work: ContactArrays,
+    active: int,
+    per_inertia: float,
+    free: Velocity,
+    slack: float,
+) -> tuple[bool, Velocity]:
+    """Solve for the impulses of corners that do what is said of them.
+
+    Args:
+        slack: slip with its friction that is rounding [m/s].
 
     Returns:
         Whether there is one solution, which keeps to Coulomb's law; and the velocity.
@@ -236,7 +300,7 @@ def _solved(
     if not _eliminated(work.equations, n):
         return False, free
     velocity = _substituted(work, n, free)
-    if not _keeps_coulomb(corners, work, active, velocity):
+    if not _keeps_coulomb(corners, work, active, velocity, slack):
         return False, free
     _put_impulses(work, active)
     return True, velocity
@@ -328,7 +392,9 @@ def _substituted(work: ContactArrays, n: int, free: Velocity) -> Velocity:
 
 
 @inner_kernel
-def _keeps_coulomb(corners: Corners, work: ContactArrays, active: int, velocity: Velocity) -> bool:
+def _keeps_coulomb(
+    corners: Corners, work: ContactArrays, active: int, velocity: Velocity, slack: float
+) -> bool:
     """Whether impulses and velocity are such that each corner may do what it is taken to do."""
     vx, vy, spin = velocity
     row = 0
@@ -350,7 +416,7 @@ def _keeps_coulomb(corners: Corners, work: ContactArrays, active: int, velocity:
         else:
             # friction opposes the slip
             slips = vx * ny - vy * nx + spin * work.moment_t[k]
-            if slips > 0.0 if does == DOWN else slips < 0.0:
+            if slips > slack if does == DOWN else slips < -slack:
                 return False
         row += 2 if does == STUCK else 1
     return True

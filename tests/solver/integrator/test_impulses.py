@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from numba import njit
 
 from rbfrag.solver.integrator.impulses import Corners, Velocity, after_impulses, work_of
@@ -63,3 +64,32 @@ def test_impulses_push_and_rub_as_coulomb_says() -> None:
                 assert math.isclose(grip, -math.copysign(friction[i] * push, slip), rel_tol=1e-9)
         assert np.allclose(np.array(free) + total, after, rtol=0.0, atol=1e-15)
     assert min(doing.values()) > 50, doing
+
+
+@pytest.mark.parametrize(
+    ("momentum", "stops"), [((0.0, 0.0, 0.0), True), ((4.3e-4, -8e-6, -2.2e-4), False)]
+)
+def test_friction_at_two_corners_stops_a_block_that_leans(
+    momentum: tuple[float, float, float], stops: bool
+) -> None:
+    # toe on the base and a corner on the back plane of a block that springs hold: 400 sweeps end
+    # halfway, with the one corner sticking and the other slipping, which keeps the block creeping
+    normals = np.array([[0.0, 1.0], [0.96864718, -0.24844041]])
+    friction, per_inertia = np.array([0.69088655, 0.46140033]), 0.4407776
+    corners = Corners(*np.zeros((2, 2)), *normals.T.copy(), np.zeros(2), friction, np.ones(2))
+    work = work_of(corners)
+    work.pair[:], work.friction[:] = [0, 1], friction
+    work.moment_n[:], work.moment_t[:] = [-0.04410462, 2.31161677], [2.34752807, 1.66009085]
+    dip, speed = 0.15339, 9.80665 * 2e-4
+    free = np.array([speed * math.sin(dip), -speed * math.cos(dip), 0.0]) + momentum
+    after = compiled(corners, work, 2, per_inertia, Velocity(*free), TOLERANCE * speed)
+    assert (work.across > 0.0).all()
+    for i, (nx, ny) in enumerate(normals):
+        slip = after.vx * ny - after.vy * nx + after.spin * work.moment_t[i]
+        assert abs(after.vx * nx + after.vy * ny + after.spin * work.moment_n[i]) < 1e-15
+        assert abs(work.along[i]) <= friction[i] * work.across[i] * (1.0 + 1e-12)
+        if stops:
+            assert abs(slip) < 1e-15
+        else:
+            grip = -math.copysign(friction[i] * work.across[i], slip)
+            assert math.isclose(work.along[i], grip, rel_tol=1e-9)
