@@ -23,7 +23,13 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.processing import DEFAULT_HIGH_PASS, HighPass, counts_as_uncorrected, processed
+from rbfrag.motions.processing import (
+    DEFAULT_HIGH_PASS,
+    HighPass,
+    counts_as_uncorrected,
+    processed,
+    says_corrected,
+)
 from rbfrag.motions.quality import quality_flags
 
 AS_SUPPLIED = "as supplied"
@@ -51,6 +57,7 @@ class AddReport(Tabular):
         failed: files that were left out, each with its reason.
         warnings: sentences about what was added: the same samples in two files, one trace
             stored with two kinds of processing, a recording with several sampling intervals.
+        not_read: columns of the metadata that nothing is read from.
     """
 
     added: tuple[int, ...]
@@ -58,6 +65,7 @@ class AddReport(Tabular):
     processed: tuple[int, ...]
     failed: tuple[FailedFile, ...]
     warnings: tuple[str, ...]
+    not_read: tuple[str, ...]
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return id and state of every motion, and the file and reason of each that failed."""
@@ -85,6 +93,8 @@ class _Additions:
 
     suite: str | None
     high_pass: HighPass | None
+    processing: str
+    not_read: tuple[str, ...]
     added: list[int] = field(default_factory=list)
     known: list[int] = field(default_factory=list)
     processed: list[int] = field(default_factory=list)
@@ -112,6 +122,7 @@ def add_motions(
     metadata: str | os.PathLike[str] | None = None,
     units: str | None = None,
     dt_s: float | None = None,
+    processing: str = "",
     raw: bool = False,
     allow_partial: bool = False,
     high_pass: HighPass = DEFAULT_HIGH_PASS,
@@ -132,6 +143,8 @@ def add_motions(
         units: unit of files that do not state it; one that states another is read by what it
             states, with a warning, and refused where it is the only file.
         dt_s: sampling interval [s] of text files that hold accelerations only.
+        processing: what was done to records of which no metadata say it, ``corrected`` or
+            ``uncorrected``; it may say otherwise than their format, and metadata that do need it.
         raw: store every record as its file has it; uncorrected ones are flagged.
         allow_partial: read files whose header states another number of samples than follow;
             their motions are flagged `partial`.
@@ -153,7 +166,9 @@ def add_motions(
     checked_name(suite or "", "the suite")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
-    run = _Additions(suite, None if raw else high_pass)
+    says_corrected(processing)
+    not_read = () if stated is None else stated.not_read
+    run = _Additions(suite, None if raw else high_pass, processing, not_read)
     if stated is not None:
         run.failed += [
             FailedFile(
@@ -255,7 +270,7 @@ def _files(
 def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) -> _Stored:
     motion, stated = trace.motion, trace.stated
     flags: list[str] = []
-    uncorrected = counts_as_uncorrected(motion, stated.processing)
+    uncorrected = counts_as_uncorrected(motion, stated.processing, run.processing)
     filtered = uncorrected and run.high_pass is not None
     if uncorrected and run.high_pass is not None:
         motion = processed(motion, run.high_pass)
@@ -282,6 +297,7 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
         flags.append("direction_guessed")
     words = (
         stated.processing
+        or run.processing
         or {None: AS_SUPPLIED, True: "corrected", False: "uncorrected"}[trace.motion.is_corrected]
     )
     motion_id, new = add_motion(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError, checked_name
+from rbfrag.motions.processing import says_corrected
 from rbfrag.motions.text.file import read_text
 from rbfrag.motions.units import acceleration_unit
 
@@ -18,7 +19,12 @@ COLUMNS = (
     "file", "trace_index", "event_id", "units", "file_units", "is_vertical", "companion_group",
     "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s",
 )  # fmt: skip
-"""The columns that are read; only ``file`` must be there, and others are ignored."""
+"""The columns that are read; only ``file`` must be there."""
+
+OTHER_NAMES = {"unit": "units"}
+"""Other names of columns."""
+
+_FEWEST_LETTERS, _MOST_EDITS = 6, 2
 
 NAMES = ("event_id", "companion_group", "earthquake", "station", "component")
 """Columns of names, whose length is bounded."""
@@ -72,10 +78,12 @@ class MotionMetadata:
 
     Args:
         rows: every row, in the table's order.
+        not_read: columns that are none of :data:`COLUMNS`.
     """
 
     path: str
     rows: tuple[TraceMetadata, ...]
+    not_read: tuple[str, ...]
     _by_file: Mapping[Path, tuple[TraceMetadata, ...]] = field(repr=False, compare=False)
 
     def file(self, path: str | os.PathLike[str]) -> list[TraceMetadata]:
@@ -140,7 +148,8 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         place: tuple(sorted(traces, key=lambda row: row.trace_index or 0))
         for place, traces in by_file.items()
     }
-    return MotionMetadata(os.fspath(path), tuple(rows), by_place)
+    not_read = tuple(name for name in header if name and name not in COLUMNS)
+    return MotionMetadata(os.fspath(path), tuple(rows), not_read, by_place)
 
 
 def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:
@@ -157,6 +166,7 @@ def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:
 
 def _header(table: Path, cells: list[str], line: int) -> list[str]:
     header = [cell.strip().lower() for cell in cells]
+    header = [OTHER_NAMES.get(name, name) for name in header]
     if "file" not in header:
         shown = ", ".join(header[:8])
         raise MotionFileError(
@@ -168,7 +178,29 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
     for name in COLUMNS:
         if header.count(name) > 1:
             raise MotionFileError(table, f"the column {name!r} is there twice", line=line)
+    for text in header:
+        if text in COLUMNS or sum(map(str.isalpha, text)) < _FEWEST_LETTERS:
+            continue
+        for name in COLUMNS:
+            if _edits(text, name) <= _MOST_EDITS:
+                raise MotionFileError(
+                    table,
+                    f"{text[:60]}: did you mean {name}? Rename the column: one that is not read "
+                    "must have a name of its own",
+                    line=line,
+                )
     return header
+
+
+def _edits(one: str, other: str) -> int:
+    """Return how many letters must be put in, taken out or replaced to make one text the other."""
+    before = list(range(len(other) + 1))
+    for i, a in enumerate(one, 1):
+        row = [i]
+        for j, b in enumerate(other):
+            row.append(min(row[j] + 1, before[j + 1] + 1, before[j] + (a != b)))
+        before = row
+    return before[-1]
 
 
 def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
@@ -202,11 +234,12 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
     vertical = text("is_vertical")
     if vertical.lower() not in _TRUTH:
         raise MotionFileError(table, f"is_vertical {vertical!r} must be 0 or 1", line=line)
-    if text("units"):
-        try:
+    try:
+        says_corrected(text("processing"))
+        if text("units"):
             acceleration_unit(text("units"))
-        except InputError as error:
-            raise MotionFileError(table, str(error), line=line) from None
+    except InputError as error:
+        raise MotionFileError(table, str(error), line=line) from None
     most = LARGEST_MAGNITUDE
     return TraceMetadata(
         line=line,

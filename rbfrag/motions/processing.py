@@ -27,7 +27,23 @@ MOST_SAMPLES = 20_000_000
 
 LARGEST_PGA_G = 1e100
 
-_UNCORRECTED = re.compile(r"\b(?:uncorrected|unfiltered|unprocessed|raw)\b", re.IGNORECASE)
+STATED = {
+    "corrected": True,
+    "baseline corrected": True,
+    "v2 corrected": True,
+    "uncorrected": False,
+    "unfiltered": False,
+    "unprocessed": False,
+    "offset removed": False,
+    "raw": False,
+    "v1 uncorrected": False,
+}
+"""What is said of the processing of a record in words, and whether it is corrected then. An offset
+alone removed leaves the drift."""
+
+_SPECTRA = "v3"
+
+_REMARK = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 
 
 @dataclass(frozen=True)
@@ -63,21 +79,65 @@ DEFAULT_HIGH_PASS = HighPass()
 """The procedure that `rbfrag motions add` applies to uncorrected records."""
 
 
-def counts_as_uncorrected(motion: GroundMotion, stated: str = "") -> bool:
+def says_corrected(words: str) -> bool | None:
+    """Return whether a record is corrected by what is said of its processing; None for nothing.
+
+    The leading word or phrase of :data:`STATED` decides; case, hyphens and what stands in brackets
+    do not matter, and what follows is a remark.
+
+    Raises:
+        InputError: it begins with another word.
+    """
+    plain = " ".join(_REMARK.sub(" ", words).lower().replace("-", " ").split())
+    if not plain:
+        return None
+    if plain.partition(" ")[0] == _SPECTRA:
+        raise InputError(
+            f"processing {words[:60]!r}: volume 3 holds spectra, no accelerations; take the record "
+            "of volume 2"
+        )
+    for phrase, corrected in STATED.items():
+        if plain.startswith(phrase) and not plain[len(phrase) :][:1].isalnum():
+            return corrected
+    raise InputError(
+        f"processing {words[:60]!r} does not tell whether the record is corrected: begin with one "
+        f"of {', '.join(STATED)}; what follows is a remark"
+    )
+
+
+def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str = "") -> bool:
     """Return whether a record is to be processed before it is integrated.
 
-    What a metadata table states outranks the file: words with `uncorrected`, `unfiltered`,
-    `unprocessed` or `raw` mean yes, any other words no. Where it states nothing, the file
-    decides: its header, or its format where that holds uncorrected records only (volume 1,
-    K-NET, KiK-net, CWB, UNAM, NSMN). A file that does not say is taken as corrected.
+    Where nothing is stated, the file decides: its header, or its format where that holds
+    uncorrected records only (volume 1, K-NET, KiK-net, CWB, UNAM, NSMN). A file that does not say
+    is taken as corrected.
 
     Args:
         motion: as its file has it.
-        stated: what a metadata table says of its processing.
+        stated: what a metadata table says of its processing, as :func:`says_corrected` reads it.
+        confirmed: what the caller says of it, who may say otherwise than the file.
+
+    Raises:
+        InputError: what is stated is none of the words, or contradicts the file or the caller.
     """
-    if stated.strip():
-        return bool(_UNCORRECTED.search(stated))
-    return motion.is_corrected is False
+    by_table, by_caller = says_corrected(stated), says_corrected(confirmed)
+    if by_table is not None and by_caller is not None and by_table != by_caller:
+        raise InputError(
+            f"the metadata say {stated[:60]!r} of its processing, and processing = "
+            f"{confirmed[:60]!r} is given: correct one of them",
+            fields=("processing",),
+        )
+    corrected = by_caller if by_table is None else by_table
+    if corrected is None:
+        return motion.is_corrected is False
+    if by_caller is None and motion.is_corrected not in (None, corrected):
+        format_says = "corrected" if motion.is_corrected else "uncorrected"
+        raise InputError(
+            f"by its header or format the record is {format_says}, and the metadata say "
+            f"{stated[:60]!r}: correct the metadata, or say so again by processing",
+            fields=("processing",),
+        )
+    return not corrected
 
 
 def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> GroundMotion:

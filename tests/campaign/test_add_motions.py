@@ -150,13 +150,20 @@ def test_metadata_decide(tmp_path: Path, db: Path) -> None:
     write_at2(tmp_path / "raw.AT2", shaking(1))
     volume_1(tmp_path / "good.V1", "L1")
     table = tmp_path / "meta.csv"
-    table.write_text("file,processing\nraw.AT2,Uncorrected\ngood.V1,corrected by hand\n")
+    table.write_text("file,processing,operator\nraw.AT2,Uncorrected,\ngood.V1,corrected by hand,\n")
     report = add_motions([tmp_path], db=db, metadata=table)
-    found = {row.source_file: row for row in rows(db)}
-    assert found["raw.AT2"].processing_applied is not None
-    assert found["good.V1"].processing_applied is None
-    assert found["good.V1"].processing == "corrected by hand"
-    assert report.processed == (found["raw.AT2"].id,)
+    (row,) = rows(db)
+    assert row.source_file == "raw.AT2"
+    assert row.processing_applied is not None
+    assert report.processed == (row.id,)
+    assert report.not_read == ("operator",)
+    # the format holds uncorrected records only: who knows better says so twice
+    (bad,) = report.failed
+    assert "by its header or format the record is uncorrected" in bad.reason
+    add_motions(tmp_path / "good.V1", db=db, metadata=table, processing="corrected")
+    good = next(row for row in rows(db) if row.source_file == "good.V1")
+    assert good.processing_applied is None
+    assert good.processing == "corrected by hand"
 
 
 def test_other_settings_are_stored(tmp_path: Path, db: Path) -> None:

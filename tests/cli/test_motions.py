@@ -33,6 +33,7 @@ def test_add_says_what_it_processed(shell: Shell, recording: Path) -> None:
     answer = shell.json("motions", "add", recording)
     assert answer == {
         "added": [1, 2, 3], "known": [], "processed": [1, 2, 3], "failed": [], "warnings": [],
+        "not_read": [],
     }  # fmt: skip
     rows = shell.json("motions", "list")
     assert set(rows[0]) >= LIST_KEYS

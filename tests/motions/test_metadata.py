@@ -39,6 +39,24 @@ def test_every_column(tmp_path: Path) -> None:
     assert (traced.station, traced.component) == ("CLS", "UP")
     assert traced.dt_s == 0.005
     assert traced.line == 2
+    assert read_metadata(path).not_read == ("notes",)
+
+
+def test_a_column_that_is_nearly_one_is_refused(tmp_path: Path) -> None:
+    for wrong, right in (("proccesing", "processing"), ("magnitud", "magnitude"),
+                         ("trace index", "trace_index"), ("eventid", "event_id")):  # fmt: skip
+        with pytest.raises(MotionFileError, match=f"{wrong}: did you mean {right}"):
+            read_metadata(table(tmp_path, f"file,{wrong}\na.AT2,1\n"))
+    read = read_metadata(table(tmp_path, "file,unit,operator,rsn,rank\na.AT2,gal,me,1,2\n"))
+    assert read.rows[0].units == "gal"
+    assert read.not_read == ("operator", "rsn", "rank")
+
+
+def test_words_that_do_not_tell_of_the_processing_are_refused(tmp_path: Path) -> None:
+    path = table(tmp_path, "file,processing\na.AT2,corrected\nb.AT2,uncorected\n")
+    with pytest.raises(MotionFileError, match="begin with one of corrected") as caught:
+        read_metadata(path)
+    assert caught.value.line == 3
 
 
 def test_file_alone_states_nothing(tmp_path: Path) -> None:

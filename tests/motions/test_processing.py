@@ -124,23 +124,49 @@ def test_settings_refused(settings: dict[str, float]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("is_corrected", "stated", "answer"),
+    ("is_corrected", "stated", "confirmed", "answer"),
     [
-        (None, "", False),
-        (True, "", False),
-        (False, "", True),
-        (True, "uncorrected (Vol 1)", True),
-        (None, "offset removed, unfiltered", True),
-        (None, "Raw", True),
-        (False, "corrected", False),
-        (False, "drawn anew", False),
+        (None, "", "", False),
+        (True, "", "", False),
+        (False, "", "", True),
+        (None, "offset removed, unfiltered", "", True),
+        (None, "Raw", "", True),
+        (None, "Uncorrected; mean must be removed", "", True),
+        (None, "baseline (tilt) corrected, uncorrected displacement", "", False),
+        (None, "Baseline-Corrected", "", False),
+        (False, "V1 uncorrected", "", True),
+        (True, "corrected (Vol 2)", "", False),
+        (None, "", "uncorrected", True),
+        (False, "corrected by hand", "corrected", False),
+        (False, "", "corrected", False),
     ],
 )
-def test_what_is_stated_outranks_the_file(
-    is_corrected: bool | None, stated: str, answer: bool
+def test_the_leading_words_say_whether_it_is_corrected(
+    is_corrected: bool | None, stated: str, confirmed: str, answer: bool
 ) -> None:
     motion = GroundMotion(np.ones(3), DT_S, is_corrected=is_corrected)
-    assert counts_as_uncorrected(motion, stated) is answer
+    assert counts_as_uncorrected(motion, stated, confirmed) is answer
+
+
+@pytest.mark.parametrize(
+    ("is_corrected", "stated", "confirmed", "reason"),
+    [
+        (None, "uncorected", "", "begin with one of corrected"),
+        (None, "drawn anew", "", "begin with one of corrected"),
+        (None, "correctedness", "", "begin with one of corrected"),
+        (None, "V3", "", "spectra"),
+        (True, "uncorrected (Vol 1)", "", "by its header or format the record is corrected"),
+        (False, "corrected", "", "by its header or format the record is uncorrected"),
+        (None, "corrected", "raw", "correct one of them"),
+        (None, "", "by hand", "begin with one of corrected"),
+    ],
+)
+def test_other_words_and_contradictions_are_refused(
+    is_corrected: bool | None, stated: str, confirmed: str, reason: str
+) -> None:
+    motion = GroundMotion(np.ones(3), DT_S, is_corrected=is_corrected)
+    with pytest.raises(InputError, match=reason):
+        counts_as_uncorrected(motion, stated, confirmed)
 
 
 @pytest.mark.parametrize(("first_word", "corrected"), [("Corrected", True), ("Uncorrected", False)])

@@ -57,6 +57,12 @@ def add(
         "relative to the table's folder.",
         metavar="CSV",
     ),
+    processing: str = option(
+        "What was done to the records where no metadata say it, corrected or uncorrected; also "
+        "where their format says otherwise.",
+        "",
+        metavar="WORDS",
+    ),
     raw: bool = option(
         "Store every record as its file has it; uncorrected ones are flagged.", False
     ),
@@ -85,6 +91,7 @@ def add(
             metadata=metadata,
             units=reading.units,
             dt_s=reading.dt,
+            processing=processing,
             raw=raw,
             allow_partial=allow_partial,
             on_file=bar.show,
@@ -100,6 +107,8 @@ def add(
                 "left out": len(report.failed),
             }
         )
+        if report.not_read:
+            print(f"not read: {', '.join(report.not_read)}")
     print_warnings(report.warnings)
     for bad in report.failed:
         print(f"left out: {bad.path}: {bad.reason}", file=sys.stderr)
