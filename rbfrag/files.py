@@ -60,6 +60,23 @@ def as_path(given: object, name: str, what: str) -> Path:
     )
 
 
+NO_FILE = "a device, pipe or socket, which may have no end"
+
+
+def is_endless(source: Path) -> bool:
+    """Return whether a path that is there is neither a file nor a folder."""
+    return source.exists() and not source.is_file() and not source.is_dir()
+
+
+def bounded_bytes(source: Path, most_bytes: int) -> bytes | None:
+    """Return the content of a file; None if it is larger, whatever its folder says of its size."""
+    if source.stat().st_size > most_bytes:
+        return None
+    with source.open("rb") as file:
+        content = file.read(most_bytes + 1)
+    return content if len(content) <= most_bytes else None
+
+
 @contextmanager
 def reading(source: Path, what: str) -> Iterator[None]:
     """Say in words why a file cannot be read.
@@ -74,12 +91,13 @@ def reading(source: Path, what: str) -> Iterator[None]:
     try:
         if source.is_dir():
             raise InputError(f"{source} is a folder: name a file with {what} in it")
-        if source.is_file():
-            with source.open("rb") as file:
-                packed = packed_as(file.read(6))
-            workbook = source.suffix.lower() == WORKBOOK
-            if packed is not None and not (workbook and packed == "zip"):
-                raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
+        if is_endless(source):
+            raise InputError(f"{source} is {NO_FILE}: save {what} to a file, and name that")
+        with source.open("rb") as file:
+            packed = packed_as(file.read(6))
+        workbook = source.suffix.lower() == WORKBOOK
+        if packed is not None and not (workbook and packed == "zip"):
+            raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
         yield
     except FileNotFoundError:
         raise InputError(f"{source}: no such file; name a file with {what}") from None
@@ -105,10 +123,12 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
     """
     source = as_path(path, "path", f"a file with {what}")
     with reading(source, what):
-        size = source.stat().st_size
-        if size > most_bytes:
-            raise InputError(f"{source} has {size} bytes: larger than {what} can be")
-        text = source.read_bytes().decode("utf-8-sig")
+        content = bounded_bytes(source, most_bytes)
+        if content is None:
+            raise InputError(
+                f"{source} has more than {most_bytes} bytes: {what} cannot be so large"
+            )
+        text = content.decode("utf-8-sig")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
         raise InputError(f"{source} is empty: name a file with {what}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.files import as_path, reading
+from rbfrag.files import MOST_BYTES, as_path, bounded_bytes, reading
 from rbfrag.solver.block.mesh_block import CONTACT_MM, MassProperties, MeshBlock, mesh_block
 
 if TYPE_CHECKING:
@@ -119,7 +119,9 @@ def _triangles(source: Path) -> Trimesh:
     from trimesh.exchange.load import load_mesh
 
     with reading(source, "a mesh"):
-        content = source.read_bytes()
+        content = bounded_bytes(source, MOST_BYTES)
+    if content is None:
+        raise InputError(f"{source} has more than {MOST_BYTES} bytes: a block needs no such mesh")
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it warns of is said here
     try:
         mesh = load_mesh(

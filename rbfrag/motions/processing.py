@@ -88,16 +88,16 @@ def says_corrected(words: str) -> bool | None:
     Raises:
         InputError: it begins with another word.
     """
-    plain = " ".join(_REMARK.sub(" ", words).lower().replace("-", " ").split())
-    if not plain:
+    said = " ".join(_REMARK.sub(" ", words).lower().replace("-", " ").split())
+    if not said:
         return None
-    if plain.partition(" ")[0] == _SPECTRA:
+    if said.partition(" ")[0] == _SPECTRA:
         raise InputError(
             f"processing {words[:60]!r}: volume 3 holds spectra, no accelerations; take the record "
             "of volume 2"
         )
     for phrase, corrected in STATED.items():
-        if plain.startswith(phrase) and not plain[len(phrase) :][:1].isalnum():
+        if said.startswith(phrase) and not said[len(phrase) :][:1].isalnum():
             return corrected
     raise InputError(
         f"processing {words[:60]!r} does not tell whether the record is corrected: begin with one "

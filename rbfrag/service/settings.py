@@ -80,6 +80,9 @@ def _refused(field: str, value: object, why: str) -> InputError:
 VARIABLE = "RBFRAG_TOKEN"
 """Environment variable with the token."""
 
+_LONGEST_TOKEN_FILE = 1024
+"""Characters of it that are read."""
+
 _TOKEN = re.compile(r"[A-Za-z0-9._~+/=-]{16,512}")
 
 
@@ -96,7 +99,8 @@ def read_token(file: str | None) -> str | None:
     else:
         source = file
         try:
-            token = Path(file).read_text(encoding="ascii").strip()
+            with Path(file).open(encoding="ascii") as stream:
+                token = stream.read(_LONGEST_TOKEN_FILE).strip()
         except (OSError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not ASCII text"
             raise _refused("token_file", file, f"cannot be read: {reason}") from None

@@ -135,6 +135,7 @@ from rbfrag.errors import MissingExtraError
 from tests.block_tables import read_columns
 from rbfrag.exchange.tables.files import table_path
 table_path("a.csv")
+open("a.parquet", "w").close()
 for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", ("kr",))):
     try:
         act()

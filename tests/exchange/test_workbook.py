@@ -201,6 +201,7 @@ sys.modules["openpyxl"] = None
 from rbfrag.errors import MissingExtraError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.tables.files import table_path
+open("a.xlsx", "w").close()
 for act in (lambda: table_path("a.xlsx"), lambda: read_blocks("a.xlsx")):
     try:
         act()

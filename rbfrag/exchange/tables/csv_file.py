@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import MissingExtraError
+from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns, blank_rows
 from rbfrag.exchange.tables.parts import (
     Dialect,
@@ -39,6 +39,8 @@ def dialect_of(origin: Path) -> Dialect:
     """Return how a file is written, of its header and its first cells."""
     with origin.open("rb") as file:
         start = file.read(_PEEK)
+    if b"\0" in start:
+        raise InputError(f"{origin} is binary, not text: name a block table, saved as CSV")
     lines = start.removeprefix(_BOM).decode("utf-8", "replace").splitlines() or [""]
 
     def rows(delimiter: str) -> list[list[str]]:

@@ -25,6 +25,9 @@ from rbfrag.files import output_path, reading, written_whole
 SUFFIXES = (".csv", ".xlsx", ".parquet")
 """File types of a table of blocks."""
 
+MOST_BYTES = 1 << 36
+"""Larger tables are refused: a thousand million blocks need no more."""
+
 _LARGE = 1 << 20
 """Bytes of CSV that are worth loading pyarrow for, which takes a third of a second."""
 
@@ -70,11 +73,14 @@ def open_table(
             f"{path.suffix!r}"
         )
     stack.enter_context(_reading(path))
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise InputError(f"{path} has {size} bytes: no block table is so large")
     if suffix == ".xlsx":
         return open_workbook(path, stack, sheet)
     if suffix == ".parquet":
         return open_parquet(path, stack)
-    return open_csv(path, stack, fast=path.is_file() and path.stat().st_size > _LARGE)
+    return open_csv(path, stack, fast=size > _LARGE)
 
 
 @contextmanager

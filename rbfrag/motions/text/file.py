@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
-from rbfrag.files import packed_as
+from rbfrag.files import NO_FILE, bounded_bytes, is_endless, packed_as
 
 LARGEST_FILE_BYTES = 512 * 1024**2
 MOST_DIGITS = 12
@@ -30,12 +30,14 @@ def read_text(path: Path) -> str:
     try:
         if path.is_dir():
             raise MotionFileError(path, "this is a folder, not a file: name a file in it")
-        size = path.stat().st_size
-        if size > LARGEST_FILE_BYTES:
+        if is_endless(path):
+            raise MotionFileError(path, f"this is {NO_FILE}: save the record to a file")
+        raw = bounded_bytes(path, LARGEST_FILE_BYTES)
+        if raw is None:
+            largest = LARGEST_FILE_BYTES / 1024**2
             raise MotionFileError(
-                path, f"{size / 1024**2:.0f} MiB are too large for an accelerogram in text"
+                path, f"more than {largest:.0f} MiB are too large for an accelerogram in text"
             )
-        raw = path.read_bytes()
     except FileNotFoundError:
         raise MotionFileError(path, "there is no such file: check the path") from None
     except OSError as error:
