@@ -88,16 +88,16 @@ def says_corrected(words: str) -> bool | None:
     Raises:
         InputError: it begins with another word.
     """
-    said = " ".join(_REMARK.sub(" ", words).lower().replace("-", " ").split())
-    if not said:
+    leading = " ".join(_REMARK.sub(" ", words).lower().replace("-", " ").split())
+    if not leading:
         return None
-    if said.partition(" ")[0] == _SPECTRA:
+    if leading.partition(" ")[0] == _SPECTRA:
         raise InputError(
             f"processing {words[:60]!r}: volume 3 holds spectra, no accelerations; take the record "
             "of volume 2"
         )
     for phrase, corrected in STATED.items():
-        if said.startswith(phrase) and not said[len(phrase) :][:1].isalnum():
+        if leading.startswith(phrase) and not leading[len(phrase) :][:1].isalnum():
             return corrected
     raise InputError(
         f"processing {words[:60]!r} does not tell whether the record is corrected: begin with one "
