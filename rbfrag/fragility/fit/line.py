@@ -114,34 +114,28 @@ def powers(x: FloatArray, degree: int) -> FloatArray:
 
 
 def fit_variance(
-    bins: Bins,
-    squared_residuals: FloatArray,
-    multiplicity: FloatArray,
-    degree: int,
-    previous: FloatArray | None,
+    bins: Bins, squared_residuals: FloatArray, multiplicity: FloatArray, degree: int
 ) -> FloatArray:
-    """Return v0, v1[, v2] [m²/s²] from the bin variances of the residuals.
+    """Return v0, v1[, v2] [m²/s²]: non-negative least squares through the bin variances.
 
-    Non-negative least squares with weights n_j/v(x_j)², the inverse variance of a bin
-    variance of normal residuals, so that bins of weak motions count as much as strong ones.
+    All bins count alike, as in the dissertation: with the inverse variance of a bin variance as its
+    weight, weak motions alone would set the line, and the scatter of strong ones would be half of
+    what it is.
 
     Args:
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
         multiplicity: how many times each point counts (a resampled earthquake counts
             several times or not at all).
         degree: degree of v(x).
-        previous: v0, v1[, v2] of the iteration before; None for equal relative weights.
     """
     from scipy.optimize import nnls
 
-    counts, centres, spread = bin_variances(bins, squared_residuals, multiplicity)
+    _, centres, spread = bin_variances(bins, squared_residuals, multiplicity)
     columns = powers(centres, degree)
     floor = FLOOR_FRACTION * spread[spread > 0.0].min()
-    scale = spread if previous is None else columns @ previous
-    scale = np.maximum(scale, floor) / np.sqrt(counts)
     # Columns of like size keep the active set free of rounding.
     size = np.abs(columns).max(axis=0)
-    solution, _ = nnls(columns / (scale[:, None] * size), (spread - floor) / scale)
+    solution, _ = nnls(columns / size, spread - floor)
     coefficients: FloatArray = solution / size
     coefficients[0] += floor
     return coefficients
@@ -202,7 +196,7 @@ def iterate(
     while not stable and iterations < MOST_ITERATIONS:
         iterations += 1
         residuals = y - line[0] - line[1] * x
-        fitted = fit_variance(bins, residuals * residuals, multiplicity, degree, variance)
+        fitted = fit_variance(bins, residuals * residuals, multiplicity, degree)
         values = columns @ fitted
         new_line = weighted_line(x, y, multiplicity / values)
         stable = variance is not None and bool(

@@ -132,18 +132,24 @@ def test_exact_bin_variances_give_the_polynomial_back(truth):
     x = np.repeat(np.linspace(0.05, 2.0, 20), 20)
     bins = Bins(x, np.arange(20) * 20)
     squared = sum(v * x**k for k, v in enumerate(truth)) * (398 / 400)
-    ones = np.ones(400)
-    first = fit_variance(bins, squared, ones, len(truth) - 1, None)
-    again = fit_variance(bins, squared, ones, len(truth) - 1, first)
-    assert first == pytest.approx(truth, rel=1e-8)
-    assert again == pytest.approx(truth, rel=1e-8)
+    assert fit_variance(bins, squared, np.ones(400), len(truth) - 1) == pytest.approx(
+        truth, rel=1e-8
+    )
+
+
+def test_strong_motions_set_the_variance_as_much_as_weak_ones():
+    # of a variance that grows with the square, a straight line through the bins is that of
+    # ordinary least squares: weights would bend it to the weak motions
+    x = np.repeat(np.linspace(0.05, 2.0, 20), 20)
+    result = fit_variance(Bins(x, np.arange(20) * 20), 0.05 * x * x, np.ones(400), 1)
+    assert result[1] == pytest.approx(0.05 * (400 / 398) * (x**3).sum() / (x**2).sum(), rel=1e-4)
 
 
 def test_variance_stays_positive_where_a_free_fit_would_not():
     x = np.repeat(np.linspace(0.05, 2.0, 20), 20)
     bins = Bins(x, np.arange(20) * 20)
     squared = 0.02 * (x - 0.04)  # a straight fit would be negative at zero
-    result = fit_variance(bins, squared, np.ones(400), 1, None)
+    result = fit_variance(bins, squared, np.ones(400), 1)
     assert result[0] == pytest.approx(FLOOR_FRACTION * squared.min() * 400 / 398, rel=1e-12)
     assert result[1] > 0.0
 
@@ -153,6 +159,6 @@ def test_a_point_that_counts_twice_equals_two_points():
     x = np.sort(random.uniform(0.1, 1.0, 200))
     squared = random.exponential(x)
     twice = np.repeat(np.arange(200), 2)
-    single = fit_variance(Bins(x, np.arange(10) * 20), squared, np.full(200, 2.0), 1, None)
-    double = fit_variance(Bins(x[twice], np.arange(10) * 40), squared[twice], np.ones(400), 1, None)
+    single = fit_variance(Bins(x, np.arange(10) * 20), squared, np.full(200, 2.0), 1)
+    double = fit_variance(Bins(x[twice], np.arange(10) * 40), squared[twice], np.ones(400), 1)
     assert single == pytest.approx(double, rel=1e-10)
