@@ -1,8 +1,8 @@
 """Fits of what blocks did: the methods that read outcomes.
 
-A generalised linear model of binary outcomes on a grid that does not depend on the outcome. Every
-combination weighs the same, however many of its outcomes are known. Blocks that mechanics says
-cannot fail are not fitted: P is 0.
+A generalised linear model of binary outcomes on a grid that does not depend on the outcome. A block
+of unknown outcome is stood for by those of its combination that are known. Blocks that mechanics
+says cannot fail are not fitted: P is 0.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class OutcomeRows:
     """The rows of a fit, and where they stand on the grid.
 
     Args:
-        data: features, outcomes, weights and earthquakes.
+        data: features, outcomes, weights and earthquakes; blocks that are judged and not fitted
+            have the weight 0.
         place: flat index on the grid (n, m) of each row.
         bounded: whether mechanics forbids the block, on the grid.
         bounded_failed: known outcomes that failed although mechanics forbids it (vertical motion,
@@ -68,7 +69,8 @@ def fit_outcomes(
     """Fit a method that reads outcomes."""
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     rows = outcome_rows(data, method, term, names)
-    failures = int((rows.data.outcome > 0.5).sum())
+    fitted = rows.data.only(rows.data.weights > 0.0)
+    failures = int((fitted.outcome > 0.5).sum())
     if 0 < failures < FEWEST_FAILURES:
         raise FitError(
             f"{failures} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
@@ -77,7 +79,7 @@ def fit_outcomes(
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
         try:
-            b, cr1, naive = fit_by_statsmodels(rows.data)
+            b, cr1, naive = fit_by_statsmodels(fitted)
             variances = np.concatenate([np.diag(cr1), np.diag(naive)])
         except np.linalg.LinAlgError:
             variances = np.array([np.nan])
@@ -89,13 +91,13 @@ def fit_outcomes(
             f"parameters of method {method.name} apart: simulate more block sizes (p²) or "
             "earthquakes, or fit a method of fewer parameters, such as logistic"
         )
-    steps = jackknife_steps(rows.data, b)
+    steps = jackknife_steps(fitted, b)
 
     def resampled(times: FloatArray) -> FloatArray:
         drawn = times > 0.0
-        return maximise(rows.data.only(drawn), b, times=times[drawn], tolerance=1e-7)[0]
+        return maximise(fitted.only(drawn), b, times=times[drawn], tolerance=1e-7)[0]
 
-    samples = bootstrap(rows.data.event, resampled, replicates=REPLICATES, seed=seed)
+    samples = bootstrap(fitted.event, resampled, replicates=REPLICATES, seed=seed)
     estimates = Estimates(
         names, b, steps, samples, seed,
         {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
@@ -114,7 +116,7 @@ def fit_outcomes(
         ln_residual=residual,
         details={
             "link": method.link.name,
-            "n_outcomes": int(rows.data.outcome.size),
+            "n_outcomes": int(fitted.outcome.size),
             "n_toppled": failures,
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_failed,
@@ -140,8 +142,8 @@ def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> 
 def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ...]) -> OutcomeRows:
     """Return the known outcomes with their features."""
     form, shape = method.forms[term.name], data.failed.shape
-    positive = data.read & (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
-    known = positive & np.isfinite(data.failed)
+    positive = (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
+    known = positive & (data.read | data.scored) & np.isfinite(data.failed)
     bounded = np.zeros(shape, dtype=np.bool_)
     for bound in form.bounds:
         bounded |= np.broadcast_to(bound.holds(data.blocks), shape)
@@ -153,10 +155,14 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     finite = np.isfinite(columns).all(axis=1)
     place, columns = place[finite], columns[finite]
     row = place // shape[1]
-    weights = data.read.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    weights = data.read.sum(axis=1) / np.maximum((known & data.read).sum(axis=1), 1)
     failed = data.failed.ravel()[place]
     rows = Binomial(
-        method.link, np.ascontiguousarray(columns), failed, weights[row], data.event[row]
+        method.link,
+        np.ascontiguousarray(columns),
+        failed,
+        np.where(data.read.ravel()[place], weights[row], 0.0),
+        data.event[row],
     )
     return OutcomeRows(rows, place, bounded, int((data.failed[bounded] > 0.5).sum()))
 
