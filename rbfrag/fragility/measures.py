@@ -203,6 +203,9 @@ STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m")
 MEASURES = frozenset({*STATED, "xp_m_s"})
 """The names of all measures."""
 
+ALONE = ("pgv_m_s", "sa10_g", "pga_g")
+"""Measures that a shipped model reads alone, by falling skill."""
+
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number of the shaking: what the dissertation compares."""
 

@@ -328,7 +328,8 @@ class Form:
         formula: eta before the size factor and its slopes, from the parameters, values by name and
             functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
-            (docs/evidence/model-choice.md).
+            (docs/evidence/model-choice.md); those after 0 are there to be compared with, and
+            answer by themselves only where no other does.
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.

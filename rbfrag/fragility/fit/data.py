@@ -502,8 +502,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     }
     if not of_outcomes:
         ranges = {
-            name: v if name == "kr" else np.where(observed, v, np.nan)
-            for name, v in ranges.items()
+            name: v if name == "kr" else np.where(observed, v, np.nan) for name, v in ranges.items()
         }
     blocks = {**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]}
     if method.block.adjust is not None:
