@@ -175,7 +175,10 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"), "SA(2): no model reads it alone: use one of PGV, SA(1), PGA"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"),
+            "SA(2): no model reads it alone: use one of PGV, SA(1), PGA",
+        ),
         (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "use one of PGV, SA(1), PGA"),
         (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),

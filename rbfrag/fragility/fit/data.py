@@ -171,14 +171,9 @@ def read_source(
         },
     )
     if grid.outcome.shape[1] == 0 and block.points == "strengths":
-        k, failed = _nothing_known(table)
-        return replace(source, k_over_pga=k, failed=failed, displacement_m=None)
+        none = FitSource.of_table(table)
+        return replace(source, k_over_pga=none.k_over_pga, failed=none.failed, displacement_m=None)
     return source
-
-
-def _nothing_known(table: CombinationTable) -> tuple[FloatArray, FloatArray]:
-    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
-    return k, np.full(k.shape, np.nan)
 
 
 def _number_of(block: str | None, name: str) -> float:

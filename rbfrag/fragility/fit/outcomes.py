@@ -1,8 +1,7 @@
 """Fits of what blocks did: the methods that read outcomes.
 
-A generalised linear model of binary outcomes on a grid that does not depend on the outcome. A block
-of unknown outcome is stood for by those of its combination that are known. Blocks that mechanics
-says cannot fail are not fitted: P is 0.
+A generalised linear model of binary outcomes on a grid that does not depend on the outcome; every
+block that is read counts the same. Blocks that mechanics says cannot fail are not fitted: P is 0.
 """
 
 from __future__ import annotations
@@ -154,15 +153,9 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     columns = np.column_stack([np.broadcast_to(f, place.size) for f in features])
     finite = np.isfinite(columns).all(axis=1)
     place, columns = place[finite], columns[finite]
-    row = place // shape[1]
-    weights = data.read.sum(axis=1) / np.maximum((known & data.read).sum(axis=1), 1)
-    failed = data.failed.ravel()[place]
+    failed, read = data.failed.ravel()[place], data.read.ravel()[place].astype(np.float64)
     rows = Binomial(
-        method.link,
-        np.ascontiguousarray(columns),
-        failed,
-        np.where(data.read.ravel()[place], weights[row], 0.0),
-        data.event[row],
+        method.link, np.ascontiguousarray(columns), failed, read, data.event[place // shape[1]]
     )
     return OutcomeRows(rows, place, bounded, int((data.failed[bounded] > 0.5).sum()))
 
@@ -196,8 +189,7 @@ def _warnings(data: FitData, rows: OutcomeRows, estimates: Estimates) -> list[st
     if unknown:
         result.append(
             f"{unknown} of {int(data.read.sum())} blocks of the grid have no outcome (not stored, "
-            "or closer to critical than the error of a run): they are left out, and each "
-            "combination keeps its weight"
+            "or closer to critical than the error of a run): they are left out"
         )
     if (estimates.samples.std(axis=0, ddof=1) > 2.0 * estimates.errors).any():
         result.append(
