@@ -95,7 +95,7 @@ def test_a_model_is_judged_on_what_it_has_not_seen(
     turned = replace(source, failed=np.where(one[:, None], 1.0 - source.failed, source.failed))
     again = predicted(turned, MODELS["bounded-pgv_pga"])
     assert names.size == pgv_pga.event.max() + 1
-    same = np.isclose(again.p, pgv_pga.p, rtol=1e-6)
+    same = np.isclose(again.p, pgv_pga.p, rtol=0.0, atol=1e-3)
     turned_events = np.isin(pgv_pga.event, np.unique(event[one]))
     assert same[turned_events].all()
     assert not same[~turned_events].all()

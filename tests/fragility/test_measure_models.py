@@ -124,7 +124,7 @@ def test_retired_models_name_their_successors(name: str, successor: str) -> None
 
 def test_blocks_beyond_those_that_were_fitted_are_told() -> None:
     for kr in (0.019, 1.01):
-        answer = predict(3.0, kr, pgv_m_s=1.5, db=REFERENCE)
+        answer = predict(3.0, kr, pgv_m_s=4.0, db=REFERENCE)
         assert isinstance(answer, Prediction)
         assert not answer.in_domain
         assert any("fitted range 0.02 to 1" in text for text in answer.warnings)

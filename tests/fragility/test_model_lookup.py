@@ -202,4 +202,4 @@ def test_the_first_fitted_is_no_default_by_being_first(scored):
 def test_the_number_of_a_model_without_critical_values_is_that_of_its_outcomes():
     listed = {each["name"]: each for each in model_list(stored_rows(REFERENCE))}
     assert listed["rocking-pgv_pga"]["n"] == 140_989
-    assert listed["bounded-pgv"]["n"] == 3095
+    assert listed["bounded-pgv_kr"]["n"] == 8579

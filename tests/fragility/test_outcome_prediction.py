@@ -185,7 +185,7 @@ def test_a_motion_is_answered_by_its_spectrum():
         assert one.intensity_m_s == x
         eta = 4.1 + 3.2 * math.log(x / one.y_m_s)
         eta += 1.3 * math.log(math.sqrt(3.0) * x / (motion.pga_g * G))
-        eta *= math.sqrt(3.0) ** 0.3
+        eta *= math.sqrt(3.0) ** 0.18
         assert one.probability == pytest.approx(1 / (1 + math.exp(-eta)), rel=1e-9)
         assert predict(3.0, 0.05, motion=motion, polarity=name, model=model) == one
     assert both.probability == 0.5 * (both.forward.probability + both.reverse.probability)
