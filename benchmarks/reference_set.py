@@ -225,7 +225,8 @@ CLASSES: tuple[tuple[str, str, tuple[float, ...]], ...] = (
 """What the page counts motions by: words, column, edges."""
 
 
-_NGA = "gerardjoreilly/Infilled-RC-Building-Database"
+SOURCES = {"motions_nga": "gerardjoreilly/Infilled-RC-Building-Database"}
+"""Where the records of folders come from whose manifest does not say so."""
 
 
 def measured(connection: Connection) -> list[dict[str, str]]:
@@ -283,7 +284,9 @@ def provenance(
             str(sum(not int(row["is_vertical"]) for row in some)),
             str(sum(int(row["is_vertical"]) for row in some)),
             str(len({row["event_id"] for row in some})),
-            ", ".join(sorted({row.get("source_repo", _NGA) for row in some})),
+            ", ".join(
+                sorted({row.get("source_repo") or SOURCES.get(name, "not stated") for row in some})
+            ),
         ]
         for name, some in sorted(sets.items())
     ]
