@@ -6,8 +6,7 @@ import re
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import ALONE, SPECTRAL
-from rbfrag.hazards.curve import ANSWERED
+from rbfrag.fragility.measures import SPECTRAL
 
 _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
@@ -58,7 +57,8 @@ def requested_measure(imt: str) -> tuple[str, IntensityType]:
     """Return the measure that is asked for, as `predict` calls it, and its meaning."""
     kind = openquake_type(imt, "imt")
     name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
-    if name not in ALONE:
-        text = f"imt = {imt}: no model reads it alone: use one of {ANSWERED}"
+    if name is None:
+        known = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
+        text = f"imt = {imt}: no model reads it: use one of {known}"
         raise InputError(text, fields=("imt",))
     return name, kind
