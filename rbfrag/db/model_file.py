@@ -205,10 +205,14 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-def held_out_loss(row: ModelRow) -> float:
-    """Return the log loss of a model on earthquakes left out; infinite where it has none."""
+def held_out_loss(row: ModelRow, of: str = "") -> float:
+    """Return the log loss of a model on earthquakes left out; infinite where it has none.
+
+    Args:
+        of: ``_kr05`` for that of blocks of k_r >= 0.05; empty for that of all that it is judged on.
+    """
     scores = row.diagnostics.get("scores")
-    value = scores.get("log_loss_held_out") if isinstance(scores, Mapping) else None
+    value = scores.get(f"log_loss_held_out{of}") if isinstance(scores, Mapping) else None
     return float(value) if isinstance(value, int | float) else math.inf
 
 

@@ -21,7 +21,7 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             "n": fitted_number(row.diagnostics),
             "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
             "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
-            "log_loss_kr05": _scores(row).get("log_loss_held_out_kr05"),
+            "log_loss_kr05": loss if (loss := held_out_loss(row, "_kr05")) < math.inf else None,
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
@@ -29,11 +29,6 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
         }
         for row in rows
     ]
-
-
-def _scores(row: ModelRow) -> Mapping[str, Any]:
-    scores = row.diagnostics.get("scores")
-    return scores if isinstance(scores, Mapping) else {}
 
 
 def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:

@@ -488,7 +488,6 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     of_outcomes = method.reads == "outcomes"
     ranges = {
         "p2": table.p2,
-        "kr": np.tile(KR, (x.size, 1)),
         "intensity_m_s": x,
         "y_m_s": np.where(read, y0, np.nan)[:, some] if of_outcomes else y,
         "tm_s": table.tm_s,
@@ -496,9 +495,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         **ratio_columns({**given, "p": p}),
     }
     if not of_outcomes:
-        ranges = {
-            name: v if name == "kr" else np.where(observed, v, np.nan) for name, v in ranges.items()
-        }
+        ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
+    ranges["kr"] = np.tile(KR, (x.size, 1))
     blocks = {**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]}
     if method.block.adjust is not None:
         method.block.adjust(blocks, arrays())
