@@ -236,7 +236,7 @@ def score_table(found: Mapping[str, Predicted]) -> str:
             strong = all_blocks.kr_from(STRONG_KR)
             cell += [
                 _with_error(*clustered_mean(_losses(real), real.event)), f"{skill:+.2f}",
-                "{:.2f} ± {:.2f}".format(*real.slope), f"{strong.ratio:.2f}",
+                _slope(real), f"{strong.ratio:.2f}",
             ]  # fmt: skip
         cells.append(cell)
     head = [
@@ -267,10 +267,13 @@ def class_table(found: Mapping[str, Predicted], *, by_size: bool = False) -> str
         for low, high in pairwise(KR_CLASSES):
             chosen = [one.kr_from(low, high) for one in known.values()]
             classes.append((f"$k_r$ {low:g} to {high:g}", chosen))
-    cells = [
-        [words, *("{:.2f} ± {:.2f}".format(*one.slope) for one in some)] for words, some in classes
-    ]
+    cells = [[words, *(_slope(one) for one in some)] for words, some in classes]
     return markdown((["slope", *(f"`{name}`" for name in known)], cells))
+
+
+def _slope(blocks: Predicted) -> str:
+    slope, error = blocks.slope
+    return f"{slope:.2f} ± {error:.2f}" if math.isfinite(slope) else "–"
 
 
 def marks(name: str, aims: Aims, found: Predicted) -> Iterator[Mark]:
