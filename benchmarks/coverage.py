@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from benchmarks.held_out import MODELS, Outcomes, Study, read, studied
+from benchmarks.held_out import MODELS, Study, read, studied
 from benchmarks.joint_failures import PUBLISHED, dependence_columns
 from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, write_table
@@ -78,13 +78,10 @@ class Coverage:
         return np.asarray(self.held.mean(axis=2).std(axis=1, ddof=1) / self.held.shape[1] ** 0.5)
 
 
-def coverage(
-    data: Outcomes, model: Study, law: Dependence, *, sets: int = SETS, seed: int = 0
-) -> Coverage:
+def coverage(model: Study, law: Dependence, *, sets: int = SETS, seed: int = 0) -> Coverage:
     """Return what the intervals of a model hold where it is the truth.
 
     Args:
-        data: the blocks.
         model: the fit that outcomes are drawn from.
         law: what blocks of one earthquake share.
         sets: how many times outcomes of all blocks are drawn and fitted.
@@ -95,7 +92,7 @@ def coverage(
     usable = np.flatnonzero((p > BETWEEN[0]) & (p < BETWEEN[1]))
     held = np.zeros((len(INTERVALS), sets, BLOCKS), dtype=np.bool_)
     half = np.zeros((sets, BLOCKS))
-    drawn = _outcomes(JointSampler(law, data.placement(model.block)), p, sets, generator)
+    drawn = _outcomes(JointSampler(law, model.placement), p, sets, generator)
     for number, failed in enumerate(drawn):
         fitted = replace(rows, outcome=failed)
         b = maximise(fitted, model.b, tolerance=1e-9)[0]
@@ -169,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         law = PUBLISHED[name]
         if chosen.estimated:
             law = PairTables.of(*dependence_columns(data, model)).likeliest()
-        result[name] = coverage(data, model, law, sets=chosen.sets, seed=chosen.seed)
+        result[name] = coverage(model, law, sets=chosen.sets, seed=chosen.seed)
     table = f"{coverage_table(result)}\n\n{acceptance_table(marks(result))}"
     print(table, flush=True)
     if chosen.write:

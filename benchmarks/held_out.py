@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rbfrag.db.engine import opened_database
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
 from rbfrag.fragility.fit.data import (
+    KR,
     Y0_OVER_PGV,
     FitData,
     FitSource,
@@ -40,7 +41,7 @@ STEP = float(np.log(Y0_OVER_PGV[1] / Y0_OVER_PGV[0]))
 """Of the grid of y/PGV, in ln y."""
 
 MODELS = {
-    "pgv": ("bounded", "pgv"),
+    "pgv": ("bounded", "pgv_kr"),
     "pgv_pga": ("bounded", "pgv_pga"),
     "pgv_pga_tm": ("bounded", "pgv_pga_tm"),
     "record": ("record", "xp"),
@@ -116,6 +117,7 @@ def outcomes(source: FitSource) -> Outcomes:
     y = _y_m_s(source)
     ratio = y / table.pgv_m_s[:, None]
     within = (ratio > Y0_OVER_PGV[0] * 0.999999) & (ratio < Y0_OVER_PGV[-1] * 1.000001)
+    within &= source.k_over_pga * table.pga_g[:, None] >= KR[0]
     known = np.isfinite(source.failed) & within
     row = np.nonzero(known)[0]
 
@@ -123,9 +125,6 @@ def outcomes(source: FitSource) -> Outcomes:
         return np.unique(values[row], return_inverse=True)[1].astype(np.intp)
 
     event = numbers(table.event_id.astype(str))
-    size = np.bincount(event)
-    fold = np.empty(size.size, dtype=np.intp)
-    fold[np.argsort(-size, kind="stable")] = np.arange(size.size) % FOLDS  # dealt by size
     measures = {"pgv": table.pgv_m_s, "pga": table.pga_g, "tm": table.tm_s, "p2": table.p2}
     return Outcomes(
         keys=tuple(_keys(source, row, y[known])),
@@ -134,11 +133,19 @@ def outcomes(source: FitSource) -> Outcomes:
         site=numbers(source.recording),
         motion=numbers(table.motion_id),
         polarity=np.where(table.polarity == "forward", 1, -1)[row],
-        fold=fold[event],
+        fold=folds(event),
         strength=np.rint(np.log(ratio[known] / Y0_OVER_PGV[0]) / STEP).astype(np.intp),
         value={"y": y[known], "p": np.sqrt(table.p2[row])}
         | {name: column[row] for name, column in measures.items()},
     )
+
+
+def folds(event: Labels) -> Labels:
+    """Return the number of the part that each row's earthquake is in; they are dealt by size."""
+    size = np.bincount(event)
+    fold = np.empty(size.size, dtype=np.intp)
+    fold[np.argsort(-size, kind="stable")] = np.arange(size.size) % FOLDS
+    return np.asarray(fold[event])
 
 
 def _y_m_s(source: FitSource) -> FloatArray:
@@ -190,7 +197,6 @@ class Study:
         name: of the model.
         data: the rows of the fit.
         rows: their outcomes with features.
-        block: which block of the study each of these rows is, shape (rows,).
         b: the parameters, shape (k,).
         steps: those of leaving each earthquake out, shape (G, k).
         own: P of every block of the study by the fit without its earthquake, shape (n,).
@@ -199,7 +205,6 @@ class Study:
     name: str
     data: FitData
     rows: OutcomeRows
-    block: Labels
     b: FloatArray
     steps: FloatArray
     own: FloatArray
@@ -208,6 +213,18 @@ class Study:
     def errors(self) -> FloatArray:
         """CR3 errors of the parameters, shape (k,)."""
         return np.sqrt(np.diag(cr3(self.steps)))
+
+    @property
+    def placement(self) -> Placement:
+        """Where the fitted blocks stand."""
+        data, place = self.data, self.rows.place
+        row = place // data.failed.shape[1]
+        assert data.recording is not None
+        return Placement(
+            np.log(data.grid("p").ravel()[place]), np.log(data.grid("y_m_s").ravel()[place]),
+            data.event[row], data.recording[row], data.motion[row],
+            data.polarity[row].astype(np.intp),
+        )  # fmt: skip
 
 
 def studied(source: FitSource, blocks: Outcomes, name: str, method: Method | None = None) -> Study:
@@ -227,40 +244,4 @@ def studied(source: FitSource, blocks: Outcomes, name: str, method: Method | Non
     rows = outcome_rows(data, method, term, parameter_names(method, term))
     b = most_likely(rows.data)
     own = blocks.joined(predictions(source, data, rows.held_out(b)))
-    number = by_block(source, data, rows.place, np.arange(rows.place.size))
-    block = np.array([number.get(key, -1) for key in blocks.keys])
-    fitted = np.full(rows.place.size, -1, dtype=np.intp)
-    fitted[block[block >= 0]] = np.flatnonzero(block >= 0)
-    return Study(name, data, rows, fitted, b, jackknife_steps(rows.data, b), own)
-
-
-@dataclass(frozen=True)
-class Published:
-    """What an earlier study of the same outcomes, by other code, found of a model.
-
-    Args:
-        b: the parameters.
-        errors: their CR3 errors.
-        log_loss: of earthquakes left out.
-        log_loss_before: the same of the form without a factor over block size.
-    """
-
-    b: tuple[float, ...]
-    errors: tuple[float, ...]
-    log_loss: float
-    log_loss_before: float
-
-
-PUBLISHED = {
-    "pgv": Published(
-        (-1.120, 2.662, 2.161, 0.042, -0.266), (0.480, 0.284, 0.443, 0.088, 0.033), 0.1652, 0.1698
-    ),
-    "pgv_pga": Published(
-        (2.509, 2.284, 4.192, 2.386, 2.783), (0.435, 0.253, 0.422, 0.356, 0.238), 0.1522, 0.1532
-    ),
-    "pgv_pga_tm": Published(
-        (2.938, 2.282, 4.255, 2.635, 1.582, 1.253),
-        (0.368, 0.263, 0.346, 0.383, 0.301, 0.143), 0.1480, 0.1493,
-    ),
-    "record": Published((3.111, 3.816, 1.064), (0.242, 0.394, 0.073), 0.0882, 0.0887),
-}  # fmt: skip
+    return Study(name, data, rows, b, jackknife_steps(rows.data, b), own)

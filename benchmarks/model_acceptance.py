@@ -41,10 +41,14 @@ class Mark:
         return words if self.also is None else f"{words}, {self.also[0]}"
 
     @property
+    def reached(self) -> bool:
+        """Whether it is."""
+        return self.low <= self.value <= self.high and (self.also is None or self.also[1])
+
+    @property
     def cell(self) -> str:
         """The value with whether it is reached."""
-        reached = self.low <= self.value <= self.high and (self.also is None or self.also[1])
-        return f"{self.value:.4g}" if reached else f"**{self.value:.4g}, missed**"
+        return f"{self.value:.4g}" if self.reached else f"**{self.value:.4g}, missed**"
 
 
 def acceptance_table(marks: Sequence[Mark]) -> str:

@@ -1,32 +1,36 @@
-"""Which fragility model predicts best:  python -m benchmarks.model_choice [--db DATABASE]
+"""How good models are on earthquakes left out:  python -m benchmarks.model_choice [--db DATABASE]
 
-Every method on every measure is judged by earthquakes that it was not fitted to, and beside the
-plain table of what share of the blocks fails at each strength and size. The reference that is
-shipped has all that is read. Two minutes of processor time; --aims prints the aims alone. --write
-keeps the tables, in docs/evidence/model-choice.md or benchmarks/results.
+Every model is fitted to 15 of 16 parts of the earthquakes and judged on the other, on blocks of
+k_r >= 0.02 and of k_r >= 0.05. --aims prints what is aimed at beside what is reached, and the exit
+status is then 1 where an aim is missed; --kind and --model choose. The database has to hold what
+the models read: the reference has that of toppling and sliding. --write keeps the tables, in
+docs/evidence/model-choice.md or benchmarks/results.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.held_out import MODELS, PUBLISHED, Outcomes, Study, predictions, read, studied
+from benchmarks.held_out import STEP, folds
 from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
+from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.errors import FitError
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
-from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource
-from rbfrag.fragility.fit.fitting import Fitted, fit_source, methods_of_kind
-from rbfrag.fragility.fit.likelihood import Binomial, most_likely
+from rbfrag.fragility.fit.data import REAL_KR, Y0_OVER_PGV, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.fit.likelihood import Binomial, maximise, most_likely
+from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
 from rbfrag.fragility.fit.scores import CLIP
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.method import LOGIT, TOPPLING_BLOCK, Method
+from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.methods import method_named
 
 FloatArray = NDArray[np.float64]
@@ -35,58 +39,114 @@ Mask = NDArray[np.bool_]
 
 PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
 
-MIDDLE = (Y0_OVER_PGV >= 0.3) & (Y0_OVER_PGV <= 1.5)
-"""Strengths of the grid at which outcomes are not nearly decided."""
+KR_CLASSES = (0.02, 0.05, 0.1, 0.2, 0.4, 1.0)
+"""Edges of the classes of k_r that slopes are told by."""
 
-SHARES = "table of shares"
-"""The name of what the models are compared with."""
+STRONG_KR = 0.2
+"""From here on predicted failures are compared with observed ones."""
 
-PAIRS = (
-    (SHARES, "pgv"),
-    ("pgv", "pgv_pga"),
-    ("pgv_pga", "pgv_pga_tm"),
-    ("pgv_pga_tm", "record"),
-    ("pgv", "pgv_kr"),
-    ("pga_sa03_sa10_sa30", "pgv"),
-    ("pga_sa10", "pga_sa03_sa10_sa30"),
-    ("sa10", "pga_sa10"),
-    ("sa03", "sa10"),
-    ("pga", "sa10"),
-    ("pga_tm", "pgv"),
-    ("logistic pgv", "pgv"),
-)
-"""Models that are compared with one another, the worse one first."""
+LOSS_WITHIN, SLOPE_WITHIN = 0.002, 0.05
+"""How near a log loss and a slope have to be to those that the forms were chosen by."""
+
+
+@dataclass(frozen=True)
+class Aims:
+    """What is aimed at, of one model; losses and slopes are those of the study of its form.
+
+    Args:
+        method: how it is fitted.
+        term: what it reads.
+        kind: response kind.
+        loss: log loss; of blocks known by k_r from 0.02 on.
+        loss_kr05: log loss from k_r = 0.05 on.
+        slope_kr05: calibration slope from there on.
+        strong: least and greatest ratio of predicted to observed failures of strong blocks.
+        kr_slopes: slopes by class of `KR_CLASSES`, as many as were measured.
+        size_slopes: least and greatest slope of a size p².
+    """
+
+    method: str
+    term: str
+    kind: str = "toppling"
+    loss: float | None = None
+    loss_kr05: float | None = None
+    slope_kr05: float | None = None
+    strong: tuple[float, float] | None = None
+    kr_slopes: tuple[float, ...] = ()
+    size_slopes: tuple[float, float] | None = None
+
+
+_STRONG = (0.8, 1.35)
+
+MODELS: dict[str, Aims] = {
+    "bounded-pgv_kr": Aims("bounded", "pgv_kr", "toppling", 0.1295, 0.1078, 0.87, _STRONG),
+    "bounded-pgv_pga": Aims("bounded", "pgv_pga", "toppling", 0.1128, 0.0860, 0.92, _STRONG),
+    "bounded-pgv_pga_tm": Aims("bounded", "pgv_pga_tm", "toppling", 0.1075, 0.0797, 0.96, _STRONG),
+    "bounded-pgv_pga_sa10_sa30": Aims(
+        "bounded", "pgv_pga_sa10_sa30", "toppling", 0.1068, 0.0784, 0.98, _STRONG,
+        (1.05, 1.02, 0.91, 0.85), (0.93, 1.17),
+    ),
+    "logistic-sa10": Aims("logistic", "sa10", "toppling", 0.1890, 0.1408, 1.02, (0.7, 1.35)),
+    "bounded-pga": Aims("bounded", "pga", "toppling", 0.2495, 0.1695, 0.98, _STRONG),
+    "bounded-pga_sa10": Aims("bounded", "pga_sa10", "toppling", 0.1495, 0.1043, 1.07, _STRONG),
+    "bounded-pga_sa03_sa10_sa30": Aims(
+        "bounded", "pga_sa03_sa10_sa30", "toppling", 0.1311, 0.0931, 1.03, _STRONG
+    ),
+    "record-xp": Aims("record", "xp", "toppling", 0.0265, 0.0108, 1.08, _STRONG),
+    "wls-pgv": Aims("wls", "pgv"),
+    "logistic-pga_tm": Aims("logistic", "pga_tm"),
+    "logistic-pgd_tm": Aims("logistic", "pgd_tm"),
+}  # fmt: skip
+"""The models that are judged, by the names that they are stored under."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Blocks of a study by what tables sort them by, all of length n.
+class Predicted:
+    """What a model said of blocks of earthquakes that it had not seen, all of length n.
 
     Args:
+        p: probability of failure.
         failed: 1 or 0.
         event: number of the earthquake.
-        p2: squared frequency parameter [1/s²].
-        strength: number of y/PGV in its grid.
+        kr: strength; None of blocks that are not known by it.
+        p2: size [1/s²], likewise.
+        shares: share of the blocks of the same y/PGV and size that failed in other earthquakes.
     """
 
+    p: FloatArray
     failed: FloatArray
     event: Labels
-    p2: FloatArray
-    strength: Labels
+    kr: FloatArray | None = None
+    p2: FloatArray | None = None
+    shares: FloatArray | None = None
 
-    @classmethod
-    def of(cls, data: Outcomes) -> Rows:
-        """Return the blocks of a study."""
-        return cls(data.failed, data.event, data.value["p2"], data.strength)
+    def only(self, chosen: Mask) -> Predicted:
+        """Return some of the blocks."""
+        columns = (self.p, self.failed, self.event, self.kr, self.p2, self.shares)
+        return Predicted(*(None if c is None else c[chosen] for c in columns))  # type: ignore[arg-type]
+
+    def kr_from(self, least: float, below: float = math.inf) -> Predicted:
+        """Return the blocks of some strengths."""
+        assert self.kr is not None
+        return self.only((self.kr >= least) & (self.kr < below))
 
     @property
-    def middle(self) -> Mask:
-        """Whether a block is of a strength that decides nothing, shape (n,)."""
-        return np.asarray(MIDDLE[self.strength])
+    def loss(self) -> float:
+        """Mean log loss."""
+        return float(log_losses(self.p, self.failed).mean())
 
+    @property
+    def slope(self) -> tuple[float, float]:
+        """Calibration slope with its error; not a number where P tells all outcomes apart."""
+        failed = self.failed > 0.5
+        if not failed.any() or failed.all() or self.p[failed].min() > self.p[~failed].max():
+            return math.nan, math.nan
+        return calibration_slope(self.p, self.failed, self.event)
 
-Predicted = Mapping[str, FloatArray]
-"""P of each block by model, by a fit without its earthquake; NaN where a model has none."""
+    @property
+    def ratio(self) -> float:
+        """Predicted over observed failures."""
+        return float(self.p.sum() / self.failed.sum())
 
 
 def log_losses(p: FloatArray, failed: FloatArray) -> FloatArray:
@@ -118,319 +178,131 @@ def calibration_slope(p: FloatArray, failed: FloatArray, event: Labels) -> tuple
     return float(b[1]), float(np.sqrt(cr3(jackknife_steps(rows, b))[1, 1]))
 
 
-def table_of_shares(rows: Rows) -> FloatArray:
-    """Return the share of other earthquakes' blocks of the same strength and size that failed.
+def table_of_shares(failed: FloatArray, event: Labels, cell: Labels) -> FloatArray:
+    """Return the share of other earthquakes' blocks of the same cell that failed.
 
     Half a failure in one more block is counted in, so that no share is 0 or 1.
     """
-    size = np.unique(rows.p2, return_inverse=True)[1]
-    cell = size * MIDDLE.size + rows.strength
-    shape = (int(rows.event.max()) + 1, int(cell.max()) + 1)
-    place = rows.event * shape[1] + cell
+    shape = (int(event.max()) + 1, int(cell.max()) + 1)
+    place = event * shape[1] + cell
     n = np.bincount(place, minlength=shape[0] * shape[1]).reshape(shape)
-    failed = np.bincount(place, rows.failed, minlength=shape[0] * shape[1]).reshape(shape)
-    others, failures = n.sum(axis=0) - n, failed.sum(axis=0) - failed
-    return np.asarray(((failures + 0.5) / (others + 1.0)).ravel()[place])
+    failures = np.bincount(place, failed, minlength=shape[0] * shape[1]).reshape(shape)
+    others, of_others = n.sum(axis=0) - n, failures.sum(axis=0) - failures
+    return np.asarray(((of_others + 0.5) / (others + 1.0)).ravel()[place])
 
 
-@dataclass(frozen=True)
-class Score:
-    """How well a model predicts.
+def predicted(source: FitSource, aims: Aims) -> Predicted:
+    """Return what a model says of earthquakes left out: by folds, or one by one.
 
-    Args:
-        log_loss: mean, with its standard error clustered by earthquake.
-        brier: mean squared error.
-        slope: of calibration, with its standard error.
-        middle: log loss at the strengths of the undecided middle.
-        skill_log: 1 less log loss over that of the table of shares, of the same blocks.
-        skill_middle: the same of the log loss in the middle.
+    One by one are left out those of methods that read no outcomes.
     """
+    method, term = method_named(aims.method), TERMS[aims.term]
+    if method.reads == "outcomes":
+        data = fit_data(source, method, term, kind=aims.kind)
+        rows = outcome_rows(data, method, term, parameter_names(method, term))
+        best, fold = most_likely(rows.data), folds(data.event)[rows.place // data.failed.shape[1]]
+        grid = np.zeros(rows.bounded.shape)
+        for own in (fold == number for number in range(fold.max() + 1)):
+            b = maximise(rows.data.only(~own), best, tolerance=1e-9)[0]
+            grid.flat[rows.place[own]] = rows.data.only(own).probability(b)
+    else:
+        fitted = fit_source(source, term, method, kind=aims.kind, shared=False)
+        data, grid = fitted.data, fitted.result.held_out
+    judged = data.judged
+    known = judged.known
+    event = np.broadcast_to(data.event[:, None], known.shape)[known]
+    failed = judged.failed[known]
+    if not {"kr", "p2"} <= set(data.blocks):
+        return Predicted(grid[known], failed, event)
+    kr, p2 = (data.grid(name)[known] for name in ("kr", "p2"))
+    ratio = (data.grid("y_m_s") / data.grid("pgv_m_s"))[known]
+    strength = np.rint(np.log(ratio / Y0_OVER_PGV[0]) / STEP).astype(np.intp)
+    size = np.unique(p2, return_inverse=True)[1].astype(np.intp)
+    shares = table_of_shares(failed, event, size * (int(strength.max()) + 1) + strength)
+    return Predicted(grid[known], failed, event, kr, p2, shares)
 
-    log_loss: tuple[float, float]
-    brier: float
-    slope: tuple[float, float]
-    middle: float
-    skill_log: float
-    skill_middle: float
 
-
-def score(rows: Rows, p: FloatArray, shares: FloatArray) -> Score:
-    """Return the scores of a model, of the blocks that it predicts."""
-    known, failed = np.isfinite(p), rows.failed
-    loss, plain = log_losses(p, failed), log_losses(shares, failed)
-    middle = known & rows.middle
-    return Score(
-        log_loss=clustered_mean(loss, rows.event),
-        brier=float(((p - failed) ** 2)[known].mean()),
-        slope=calibration_slope(p[known], failed[known], rows.event[known]),
-        middle=float(loss[middle].mean()),
-        skill_log=float(1.0 - loss[known].mean() / plain[known].mean()),
-        skill_middle=float(1.0 - loss[middle].mean() / plain[middle].mean()),
-    )
-
-
-def score_table(scores: Mapping[str, Score]) -> str:
+def score_table(found: Mapping[str, Predicted]) -> str:
     """Return the scores of models, best first."""
-    head = ["model", "log loss", "calibration slope", "undecided middle", "skill"]
-    order = sorted(scores, key=lambda name: scores[name].log_loss[0])
-    cells = [
-        [
-            name,
-            f"{one.log_loss[0]:.4f} ± {one.log_loss[1]:.4f}",
-            f"{one.slope[0]:.2f} ± {one.slope[1]:.2f}",
-            f"{one.middle:.3f}",
-            f"{one.skill_log:+.3f}",
-        ]
-        for name, one in ((name, scores[name]) for name in order)
-    ]
-    return markdown((head, cells))
-
-
-def difference_table(
-    rows: Rows, predicted: Predicted, pairs: Sequence[tuple[str, str]] = PAIRS
-) -> str:
-    """Return by how much the second model of each pair beats the first."""
     cells = []
-    for worse, better in pairs:
-        gain = log_losses(predicted[worse], rows.failed)
-        gain = gain - log_losses(predicted[better], rows.failed)
-        mean, error = clustered_mean(gain, rows.event)
-        cells.append([f"{better} over {worse}", f"{mean:.4f} ± {error:.4f}"])
-    return markdown((["gain in log loss", "mean, error by earthquakes"], cells))
-
-
-def class_table(rows: Rows, predicted: Predicted, names: Sequence[str]) -> str:
-    """Return log loss and calibration slope by block size."""
-    cells = []
-    for p2 in np.unique(rows.p2)[::-1]:
-        line = [f"p² = {p2:g} 1/s²"]
-        for name in names:
-            here = (rows.p2 == p2) & np.isfinite(predicted[name])
-            p, failed = predicted[name][here], rows.failed[here]
-            slope, error = calibration_slope(p, failed, rows.event[here])
-            line.append(f"{log_losses(p, failed).mean():.3f}, {slope:.2f} ± {error:.2f}")
-        cells.append(line)
-    return markdown((["log loss, slope", *names], cells))
-
-
-def class_slopes(rows: Rows, p: FloatArray) -> FloatArray:
-    """Return the calibration slope of each block size."""
-    slopes = []
-    for p2 in np.unique(rows.p2):
-        here = rows.p2 == p2
-        slopes.append(calibration_slope(p[here], rows.failed[here], rows.event[here])[0])
-    return np.array(slopes)
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A model of the study.
-
-    Args:
-        name: of the model.
-        own: P of each block by a fit without its earthquake, shape (n,).
-        parameters: value, clustered error and naive error of each by its name.
-        domain: range of each variable that the fit covers.
-    """
-
-    name: str
-    own: FloatArray
-    parameters: Mapping[str, tuple[float, float, float]]
-    domain: Mapping[str, tuple[float, float]]
-
-
-def best_methods() -> dict[str, Method]:
-    """Return the method that answers for each measure, by the name of the measure."""
-    known = methods_of_kind(TOPPLING_BLOCK.kind)
-    return {
-        term: min((m for m in known if term in m.forms), key=lambda m: m.forms[term].rank)
-        for term in TERMS
-        if any(term in m.forms for m in known)
-    }
-
-
-def all_models(source: FitSource, data: Outcomes) -> dict[str, Model]:
-    """Fit every method on every measure that it goes with; the best of a measure has its name."""
-    best, result = best_methods(), {}
-    for method in methods_of_kind(TOPPLING_BLOCK.kind):
-        for term in method.forms:
-            name = term if best[term] == method else f"{method.name} {term}"
-            name = "record" if name == "xp" else name
-            try:
-                result[name] = model(source, data, name, method, term)
-            except FitError as error:
-                print(f"{name}: {error}", flush=True)
-    free = "lognormal pgv, M free"
-    lognormal = method_named("lognormal")
-    result[free] = of_critical(source, data, free, lognormal, "pgv", estimate_m=True)
-    return result
-
-
-def model(source: FitSource, data: Outcomes, name: str, method: Method, term: str) -> Model:
-    """Return one model of the study."""
-    if method.reads != "outcomes":
-        return of_critical(source, data, name, method, term)
-    study = studied(source, data, term, method)
-    return of_outcomes(name, study, method.forms[term].parameters)
-
-
-def of_outcomes(name: str, study: Study, parameters: Sequence[str]) -> Model:
-    """Return a model that was fitted to what blocks did."""
-    naive = np.sqrt(np.diag(np.linalg.inv(study.rows.data.derivatives(study.b)[1])))
-    values = zip(study.b.tolist(), study.errors.tolist(), naive.tolist(), strict=True)
-    named = dict(zip(parameters, values, strict=False))  # the exponent is not fitted
-    return Model(name, study.own, named, study.data.domain)
-
-
-def of_critical(
-    source: FitSource,
-    data: Outcomes,
-    name: str,
-    method: Method,
-    term: str,
-    *,
-    estimate_m: bool = False,
-) -> Model:
-    """Return a model that was fitted to critical values."""
-    fitted = critical_fit(source, method, term, estimate_m=estimate_m)
-    report = fitted.report
-    naive = report.details.get("naive_standard_errors") or {}
-    assert isinstance(naive, dict)
-    return Model(
-        name,
-        data.joined(predictions(source, fitted.data, fitted.result.held_out)),
-        {
-            name: (value, report.standard_errors[name], naive.get(name, np.nan))
-            for name, value in report.coefficients.items()
-        },
-        fitted.data.domain,
-    )
-
-
-def critical_fit(source: FitSource, method: Method, term: str, *, estimate_m: bool) -> Fitted:
-    """Fit a method of critical values."""
-    return fit_source(source, TERMS[term], method, estimate_m=estimate_m, shared=False)
-
-
-def coefficient_table(models: Mapping[str, Model]) -> str:
-    """Return the parameters with clustered errors, and how much larger these are than naive ones.
-
-    Those of an earlier study stand beside them where it has some.
-    """
-    cells = []
-    for name, one in models.items():
-        earlier = PUBLISHED.get(name)
-        for i, (parameter, (value, error, naive)) in enumerate(one.parameters.items()):
-            cells.append([
-                name, parameter, f"{value:.4f}", f"{error:.4f}",
-                f"{error / naive:.1f}" if naive > 0.0 else "",
-                f"{earlier.b[i]:.3f} ± {earlier.errors[i]:.3f}" if earlier else "",
-            ])  # fmt: skip
-    head = ["model", "parameter", "value", "clustered error", "over the naive one", "earlier"]
-    return markdown((head, cells))
-
-
-def domain_table(models: Mapping[str, Model]) -> str:
-    """Return the range of each variable and ratio, with the models that it is that of."""
-    covering: dict[tuple[str, float, float], list[str]] = {}
-    for name, one in models.items():
-        for variable, ends in one.domain.items():
-            covering.setdefault((variable, *ends), []).append(name)
-    cells = [
-        [f"`{variable}`", f"{low:.3g} to {high:.3g}", ", ".join(names)]
-        for (variable, low, high), names in sorted(covering.items())
-    ]
-    return markdown((["variable", "range", "models"], cells))
-
-
-def exponent_table(source: FitSource) -> str:
-    """Return M of y = k_r g/p^M against PGV by range of p²."""
-    cells = []
-    for words, chosen in (
-        ("p² ≤ 1", source.table.p2 <= 1.0),
-        ("p² ≥ 3", source.table.p2 >= 3.0),
-        ("all", source.table.p2 > 0.0),
-    ):
-        some, lognormal = source.only(chosen), method_named("lognormal")
-        report = critical_fit(some, lognormal, "pgv", estimate_m=True).report
-        m, error = report.coefficients["m_minus_1"], report.standard_errors["m_minus_1"]
-        cells.append([words, f"{1.0 + m:.3f}", f"{error:.3f}", str(report.n)])
-    return markdown((["blocks", "M", "clustered error", "critical values"], cells))
-
-
-def data_table(data: Outcomes) -> str:
-    """Return what the blocks come from."""
-    event = data.event[np.unique(data.motion, return_index=True)[1]]
-    motions = np.sort(np.bincount(event))[::-1]
-    of_half = int(np.searchsorted(np.cumsum(motions), 0.5 * motions.sum()) + 1)
-    share = motions / motions.sum()
-    cells = [
-        ["horizontal motions", str(int(motions.sum()))],
-        ["recording sites", str(np.unique(data.site).size)],
-        ["earthquakes", str(motions.size)],
-        ["earthquakes that hold half of the motions", str(of_half)],
-        ["earthquakes of two motions or fewer", str(int((motions <= 2).sum()))],
-        ["earthquakes of equal weight that would say as much, 1/Σ share²",
-         f"{1.0 / (share @ share):.1f}"],
-        ["outcomes of blocks", f"{data.failed.size:,}"],
+    for name, all_blocks in sorted(found.items(), key=lambda item: item[1].loss):
+        term = TERMS[MODELS[name].term]
+        cell = [f"`{name}`", ", ".join(term.inputs)]
+        cell.append(_with_error(*clustered_mean(_losses(all_blocks), all_blocks.event)))
+        if all_blocks.kr is not None and all_blocks.shares is not None:
+            real = all_blocks.kr_from(REAL_KR)
+            assert real.shares is not None
+            skill = 1.0 - real.loss / log_losses(real.shares, real.failed).mean()
+            strong = all_blocks.kr_from(STRONG_KR)
+            cell += [
+                _with_error(*clustered_mean(_losses(real), real.event)), f"{skill:+.2f}",
+                _slope(real), f"{strong.ratio:.2f}",
+            ]  # fmt: skip
+        cells.append(cell)
+    head = [
+        "model", "reads", "log loss, $k_r$ ≥ .02", "log loss, $k_r$ ≥ .05", "skill", "slope",
+        "predicted/observed, $k_r$ ≥ .2",
     ]  # fmt: skip
-    return markdown((["", "number"], cells))
+    return markdown((head, [cell + [""] * (len(head) - len(cell)) for cell in cells]))
 
 
-SKILL_AIMS = {
-    "pgv": (-0.01, -0.01),
-    "pgv_pga": (0.06, 0.06),
-    "pgv_pga_tm": (0.085, 0.09),
-    "record": (0.43, 0.47),
-}
-"""Least skill that is aimed at: of all strengths, and of the middle."""
-
-NOT_ABOVE = 0.00005
-"""A log loss of four published digits is not exceeded by less than this."""
+def _losses(blocks: Predicted) -> FloatArray:
+    return log_losses(blocks.p, blocks.failed)
 
 
-def marks(rows: Rows, predicted: Predicted, scores: Mapping[str, Score]) -> list[Mark]:
-    """Return the aims, with what is reached."""
-    aims = []
-    for name in MODELS:
-        slopes, one = class_slopes(rows, predicted[name]), scores[name]
-        before = PUBLISHED[name].log_loss_before + NOT_ABOVE
-        low, middle = SKILL_AIMS[name]
-        aims += [
-            Mark(name, "least calibration slope of a block size", 0.9, 1.1, float(slopes.min())),
-            Mark(name, "greatest calibration slope of a block size", 0.9, 1.1, float(slopes.max())),
-            Mark(name, "calibration slope", 0.95, 1.05, one.slope[0]),
-            Mark(name, "log loss, of the form without h(p)", -np.inf, before, one.log_loss[0]),
-            Mark(name, "skill", low, np.inf, one.skill_log),
-            Mark(name, "skill in the middle", middle, np.inf, one.skill_middle),
-        ]
-    return aims
+def _with_error(value: float, error: float) -> str:
+    return f"{value:.4f} ± {error:.4f}"
 
 
-def study(source: FitSource, data: Outcomes, *, aims_alone: bool = False) -> dict[str, str]:
-    """Return every table of the page by its name."""
-    rows = Rows.of(data)
-    shares = table_of_shares(rows)
-    if aims_alone:
-        own = {name: studied(source, data, name).own for name in MODELS}
-        scores = {name: score(rows, own[name], shares) for name in MODELS}
-        return {"aims": acceptance_table(marks(rows, own, scores))}
-    models = all_models(source, data)
-    predicted = {SHARES: shares} | {name: one.own for name, one in models.items()}
-    scores = {name: score(rows, p, shares) for name, p in predicted.items()}
-    of_a_measure = [name for name in models if name in {*best_methods(), "record"}]
-    main = {name: scores[name] for name in (SHARES, *of_a_measure)}
-    return {
-        "scores": score_table(main),
-        "classes": class_table(rows, predicted, tuple(MODELS)),
-        "differences": difference_table(rows, predicted),
-        "aims": acceptance_table(marks(rows, predicted, scores)),
-        "data": data_table(data),
-        "others": score_table({name: one for name, one in scores.items() if name not in main}),
-        "domain": domain_table({name: models[name] for name in of_a_measure}),
-        "coefficients": coefficient_table(models),
-        "exponent": exponent_table(source),
-    }
+def class_table(found: Mapping[str, Predicted], *, by_size: bool = False) -> str:
+    """Return the slope of each class of k_r, or of each size."""
+    classes: list[tuple[str, list[Predicted]]] = []
+    known = {name: one for name, one in found.items() if one.kr is not None}
+    if by_size:
+        sizes = np.unique(np.concatenate([one.p2 for one in known.values() if one.p2 is not None]))
+        for p2 in sizes[::-1]:
+            chosen = [one.only(np.isclose(one.p2, p2)) for one in known.values()]  # type: ignore[arg-type]
+            classes.append((f"$p^2$ = {p2:g} 1/s²", chosen))
+    else:
+        for low, high in pairwise(KR_CLASSES):
+            chosen = [one.kr_from(low, high) for one in known.values()]
+            classes.append((f"$k_r$ {low:g} to {high:g}", chosen))
+    cells = [[words, *(_slope(one) for one in some)] for words, some in classes]
+    return markdown((["slope", *(f"`{name}`" for name in known)], cells))
+
+
+def _slope(blocks: Predicted) -> str:
+    slope, error = blocks.slope
+    return f"{slope:.2f} ± {error:.2f}" if math.isfinite(slope) else "–"
+
+
+def marks(name: str, aims: Aims, found: Predicted) -> Iterator[Mark]:
+    """Yield what is aimed at, with what is reached."""
+    of_kr = found.kr is not None
+
+    def loss(words: str, asked: float, one: Predicted) -> Mark:
+        return Mark(name, words, asked - LOSS_WITHIN, asked + LOSS_WITHIN, round(one.loss, 4))
+
+    def slope(words: str, asked: float, one: Predicted) -> Mark:
+        reached = round(one.slope[0], 2)
+        return Mark(name, words, asked - SLOPE_WITHIN, asked + SLOPE_WITHIN, reached)
+
+    if aims.loss is not None:
+        yield loss("log loss, k_r ≥ 0.02" if of_kr else "log loss", aims.loss, found)
+    if aims.loss_kr05 is not None:
+        yield loss("log loss, k_r ≥ 0.05", aims.loss_kr05, found.kr_from(REAL_KR))
+    if aims.slope_kr05 is not None:
+        yield slope("slope, k_r ≥ 0.05", aims.slope_kr05, found.kr_from(REAL_KR))
+    if aims.strong is not None:
+        words = f"predicted over observed failures, k_r ≥ {STRONG_KR:g}"
+        yield Mark(name, words, *aims.strong, round(found.kr_from(STRONG_KR).ratio, 2))
+    for asked, (low, high) in zip(aims.kr_slopes, pairwise(KR_CLASSES), strict=False):
+        yield slope(f"slope, k_r {low:g} to {high:g}", asked, found.kr_from(low, high))
+    if aims.size_slopes is not None and found.p2 is not None:
+        of_sizes = [found.only(found.p2 == p2).slope[0] for p2 in np.unique(found.p2)]
+        low, high = aims.size_slopes[0] - SLOPE_WITHIN, aims.size_slopes[1] + SLOPE_WITHIN
+        for words, value in (("least", min(of_sizes)), ("greatest", max(of_sizes))):
+            yield Mark(name, f"{words} slope of a size", low, high, round(value, 2))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -438,11 +310,37 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--db", default=str(REFERENCE), help="database with outcomes of the grid")
     options.add_argument("--aims", action="store_true", help="only the table of aims")
+    options.add_argument("--kind", help="only models of one kind")
+    options.add_argument("--model", action="append", help="only the named models")
     chosen = options.parse_args(arguments)
-    for name, table in study(*read(chosen.db), aims_alone=chosen.aims).items():
+    models = {
+        name: aims
+        for name, aims in MODELS.items()
+        if chosen.kind in (None, aims.kind) and name in (chosen.model or MODELS)
+        if not chosen.aims or aims.loss is not None
+    }
+    found, sources = {}, {}
+    with opened_database(chosen.db, read_only=True) as engine, engine.connect() as connection:
+        for name, aims in models.items():
+            if aims.kind not in sources:
+                block = method_named(aims.method).block
+                sources[aims.kind] = read_source(connection, block, kind=aims.kind)
+            found[name] = predicted(sources[aims.kind], aims)
+    reached = [mark for name, one in found.items() for mark in marks(name, models[name], one)]
+    tables = {"aims": acceptance_table(reached)}
+    if not chosen.aims:
+        shown = {name: one for name, one in found.items() if models[name].loss is not None}
+        tables |= {
+            "scores": score_table(found),
+            "strengths": class_table(shown),
+            "sizes": class_table(shown, by_size=True),
+        }
+    for name, table in tables.items():
         print(f"## {name}\n\n{table}\n", flush=True)
         if chosen.write:
             write_table(PAGE, name, table)
+    if chosen.aims and not all(mark.reached for mark in reached):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":

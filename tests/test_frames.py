@@ -59,7 +59,7 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
     file = tmp_path / "curve.csv"
     file.write_text(CURVE)
     (curve,) = rbfrag.read_hazard_curves(file)
-    settings = {"component": "single", "model": "bounded-pgv"}
+    settings = {"component": "single", "model": "bounded-pgv_kr"}
     for given in (file, str(file), [file], [curve]):
         assert rbfrag.hazard(given, 3.0, 0.1, **settings).annual_rate == (
             rbfrag.hazard(curve, 3.0, 0.1, **settings).annual_rate

@@ -176,6 +176,16 @@ def _finite(value: Any) -> float:
     return number
 
 
+RETIRED = {
+    "bounded-pgv": "bounded-pgv_kr",
+    "lognormal-pgv": "bounded-pgv_kr",
+    "logistic-sa03": "bounded-pga_sa03_sa10_sa30 (with PGA and SA(1.0), SA(3.0))",
+    "logistic-sa20": "logistic-sa10 (with SA(1.0))",
+    "logistic-sa30": "logistic-sa10 (with SA(1.0))",
+}
+"""What answers in the place of models that were shipped once."""
+
+
 def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     """Return the sentence for a model that is not there.
 
@@ -183,6 +193,8 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
         name: the name asked for; None for the default.
         where: the database as the user names it.
     """
+    if name in RETIRED:
+        return f"there is no model {name!r} any more: use {RETIRED[name]} in its place"
     if not known:
         return f"{where} holds no model yet: make one by rbfrag fit"
     if name is None:
@@ -193,10 +205,14 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-def held_out_loss(row: ModelRow) -> float:
-    """Return the log loss of a model on earthquakes left out; infinite where it has none."""
+def held_out_loss(row: ModelRow, of: str = "") -> float:
+    """Return the log loss of a model on earthquakes left out; infinite where it has none.
+
+    Args:
+        of: ``_kr05`` for that of blocks of k_r >= 0.05; empty for that of all that it is judged on.
+    """
     scores = row.diagnostics.get("scores")
-    value = scores.get("log_loss_held_out") if isinstance(scores, Mapping) else None
+    value = scores.get(f"log_loss_held_out{of}") if isinstance(scores, Mapping) else None
     return float(value) if isinstance(value, int | float) else math.inf
 
 

@@ -76,8 +76,7 @@ def block_functions(
     Args:
         numbers: what a model reads of them, by field, shape (m,) each; NaN of an option for the
             block's own.
-        measure: ``pgv_m_s``, ``pga_g``, ``sa03_g``, ``sa10_g``, ``sa20_g`` or ``sa30_g``, which
-            a model reads alone.
+        measure: ``pgv_m_s``, ``pga_g`` or ``sa10_g``, which a model reads alone.
         kind: how they fail; None for what they are given by.
         one_class: the blocks stand for one class: one function, their mean, of one name.
         answering: model and db, as in :func:`rbfrag.predict`.

@@ -167,7 +167,7 @@ RATIOS: tuple[Ratio, ...] = (
         "",
         ("pgd_m", "pgv_m_s", "tm_s"),
         lambda v: v["pgd_m"] * 2.0 * math.pi / (v["pgv_m_s"] * v["tm_s"]),
-        (1.22, 110.0),
+        (1.18, 110.0),
     ),
     *_sa_ratios(),
 )

@@ -219,6 +219,9 @@ def _suited_in(
             f"the measures that one of them needs, or fit a model "
             f"of {' or '.join(possible)}"
         )
+    # those that are kept for comparison answer where there is no other, or where one was chosen
+    usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
+    best = usual or best
     most = max(model.term.level for model in best.values())
     return sorted(
         best.values(),

@@ -201,6 +201,8 @@ class BlockParameters:
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
+        safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
+            of them safe by mechanics.
         points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
             blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
@@ -219,6 +221,7 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
+    safe_steps: int = 0
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 
@@ -277,6 +280,8 @@ NOT_LIFTED = Bound(
 )
 TOPPLING_BLOCK = BlockParameters(
     ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
+    # the stored grid ends at 4 PGV, and no excursion from rest exceeds 2 PGV
+    safe_steps=10,
     support="the block is taken to be backed by a slope; one that stands free rocks about both "
     "edges and overturns in weaker shaking",
 )  # fmt: skip
@@ -323,12 +328,11 @@ class Form:
         formula: eta before the size factor and its slopes, from the parameters, values by name and
             functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
-            (docs/evidence/model-choice.md).
+            (docs/evidence/model-choice.md); those after 0 are there to be compared with, and
+            answer by themselves only where no other does.
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
-        wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
-            judged on the part of it that the other forms read and are judged on too.
         terms: what each parameter multiplies in the sum that the formula is of, as mathtext; "1"
             for nothing, empty for a parameter beside the sum.
         equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
@@ -342,7 +346,6 @@ class Form:
     bounds: tuple[Bound, ...] = ()
     start: tuple[float, ...] = ()
     size_factor: SizeFactor | None = None
-    wide: bool = False
     terms: tuple[str, ...] = ()
     equation: str = "<sum>"
     where: str = ""

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rbfrag.db.model_file import ModelRow, held_out_loss
+from rbfrag.fragility.measures import TERMS
 
 
 def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
@@ -18,7 +19,9 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
                 for each in ("name", "kind", "term", "method", "is_default")
             },
             "n": fitted_number(row.diagnostics),
+            "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
             "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
+            "log_loss_kr05": loss if (loss := held_out_loss(row, "_kr05")) < math.inf else None,
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.fragility.measures import ALONE, SPECTRAL
 from rbfrag.frames import Tabular
 from rbfrag.question.shaking import doubts_about, doubts_about_rates
 from rbfrag.solver.results import FloatArray
@@ -18,7 +18,7 @@ from rbfrag.solver.results import FloatArray
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
 
-ANSWERED = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
+ANSWERED = "PGV, SA(1), PGA"
 """The measures whose curves are answered, each by a model of that very measure."""
 
 
@@ -83,11 +83,11 @@ class HazardCurve(Tabular):
 
     @property
     def known_as(self) -> str | None:
-        """Name of the measure in `predict`; None where no model reads it."""
-        if self.measure != "sa_g":
-            return self.measure
-        of_period = (name for period, name in SPECTRAL.items() if self.is_of(period))
-        return next(of_period, None)
+        """Name of the measure in `predict`; None where no model reads it alone."""
+        name = self.measure
+        if name == "sa_g":
+            name = next((each for period, each in SPECTRAL.items() if self.is_of(period)), name)
+        return name if name in ALONE else None
 
     def is_of(self, period_s: float) -> bool:
         """Return whether the levels are spectral accelerations of a period [s]."""

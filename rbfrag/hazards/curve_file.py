@@ -13,6 +13,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, is_number, json_document, number_at, source_text
+from rbfrag.fragility.measures import ALONE
 from rbfrag.hazards.conversions import velocity_conversion
 from rbfrag.hazards.curve import (
     ANSWERED,
@@ -126,10 +127,6 @@ def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCu
     )
 
 
-BEST_FIRST = ("pgv_m_s", "sa10_g", "sa20_g", "sa30_g", "sa03_g", "pga_g")
-"""Measures by falling skill of the models that read them alone (docs/evidence/model-choice.md)."""
-
-
 def suited_curves(
     curves: list[HazardCurve], *, converted_period_s: float | None = None
 ) -> list[HazardCurve]:
@@ -150,7 +147,7 @@ def suited_curves(
         if chosen:
             return chosen
     else:
-        for name in BEST_FIRST:
+        for name in ALONE:
             chosen = [curve for curve in curves if curve.known_as == name]
             if chosen:
                 return [_with_choice(curve, names) for curve in chosen]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.hazards.curve import ANSWERED
 
 _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
@@ -59,6 +58,7 @@ def requested_measure(imt: str) -> tuple[str, IntensityType]:
     kind = openquake_type(imt, "imt")
     name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
     if name is None:
-        text = f"imt = {imt}: no model reads it: use one of {ANSWERED}"
+        known = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
+        text = f"imt = {imt}: no model reads it: use one of {known}"
         raise InputError(text, fields=("imt",))
     return name, kind

@@ -120,9 +120,8 @@ def _measure(
 def _no_model(curve: HazardCurve) -> str:
     also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
     converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
-    return (
-        f"{curve.source}: no model reads {curve.imt}: give a curve of one of {ANSWERED}{converted}"
-    )
+    wanted = f"give a curve of one of {ANSWERED}{converted}"
+    return f"{curve.source}: no model reads {curve.imt} alone: {wanted}"
 
 
 def ends_in_words(

@@ -68,6 +68,10 @@ def plot_calibration(
 
 
 def _scores(scores: Mapping[str, float]) -> str:
-    known = (("log loss", "log_loss_held_out"), ("Brier", "brier_held_out"))
+    known = (
+        ("log loss", "log_loss_held_out"),
+        ("from $k_r$ = 0.05", "log_loss_held_out_kr05"),
+        ("Brier", "brier_held_out"),
+    )
     texts = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]
     return f" ({', '.join(texts)})" if texts else ""

@@ -18,7 +18,7 @@ from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
-ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa03", "sa10", "sa20", "sa30", "pga_tm", "pgd_tm")
+ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa10", "pga_tm", "pgd_tm")
 """Terms that are one number."""
 
 MORE_TERMS = ("pgv_pga", "pgv_pga_tm")

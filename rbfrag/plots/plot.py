@@ -125,10 +125,7 @@ def chart(
     return plot_chart(chosen, out, held)
 
 
-VARIED = {
-    "pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa03": "sa03_g", "sa10": "sa10_g",
-    "sa20": "sa20_g", "sa30": "sa30_g",
-}  # fmt: skip
+VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
 """What a curve may run over."""
 
 
@@ -165,7 +162,7 @@ def curve(
         p2: frequency parameter p² of the block [1/s²], if it is not given by name.
         kr: its toppling yield acceleration coefficient, likewise.
         out: as for :func:`fit`; it may be given by name.
-        over: what the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30; None for pgv, or
+        over: what the curve runs over: pgv, pga, pgd or sa10; None for pgv, or
             what the model reads first.
         beside: gives other fragilities to compare with, by name, for the measure that the curve
             runs over.

@@ -40,4 +40,4 @@ def test_models_and_motions(shell: Shell, tmp_path: Path) -> None:
     assert offered("rbfrag motions show --db own.db ") == ["1", "2", "3"]
     assert offered("rbfrag respond --db own.db 2") == ["2"]
     assert offered("rbfrag respond --db nowhere.db 2") == []
-    assert "bounded-pgv" in offered("rbfrag models show bounded-p")  # those that are shipped
+    assert "bounded-pgv_kr" in offered("rbfrag models show bounded-p")  # those that are shipped

@@ -109,14 +109,20 @@ def test_an_exported_curve_is_drawn_beside_its_origin(
 
 
 def test_a_lognormal_model_is_written_as_such(shell: Shell) -> None:
-    # the reference that is shipped holds one
-    options = ("--p2", "3", "--kr", "0.1", "--model", "lognormal-pgv")
+    of_line = model_row(
+        "pgv", name="lognormal-pgv", method="lognormal",
+        coefficients={"ln_median": -0.41, "slope": 0.95, "ln_sigma": -1.25},
+        covariance=tuple(tuple(1e-3 * (i == j) for j in range(3)) for i in range(3)),
+    )  # fmt: skip
+    with opened_database("line.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, of_line)
+    options = ("--p2", "3", "--kr", "0.1", "--db", "line.db")
     for kind, file in (("nrml", "a.xml"), ("pelicun", "a.csv")):
         told = shell.json("export", kind, *options, "--out", file)
         assert (told["lognormal"], told["largest_grid_error"]) == (1, 0.0)
     (nrml,), (pelicun,) = read_nrml("a.xml"), read_pelicun("a.csv")
     x = np.geomspace(0.1, 5.0, 200)
-    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x, model="lognormal-pgv").probability
+    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x, db="line.db").probability
     for found in (nrml, pelicun):
         assert found.is_lognormal
         assert np.abs(found.at(x) - expected).max() < 2e-9
@@ -175,7 +181,10 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"), "stored toppling model works with sa20_g"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"),
+            "--sa20 is given: a prediction needs --pgv, or --sa10",
+        ),
         (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "PGV, PGA, SA(0.3), SA(1), SA(2)"),
         (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),

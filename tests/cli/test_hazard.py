@@ -231,10 +231,10 @@ def test_plot(shell: Shell, curve: Path) -> None:
     ("text", "options", "words"),
     [
         ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model reads SA(0.5): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3), or"
+         "no model reads SA(0.5) alone: give a curve of one of PGV, SA(1), PGA, or"
          " turn it into PGV with --convert bommer_alarcon_2006"),
         ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "no model reads SA(0.75): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3)"),
+         "no model reads SA(0.75) alone: give a curve of one of PGV, SA(1), PGA"),
         ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
          "no stored toppling model works with pga_g"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert-sigma", "0.5"),

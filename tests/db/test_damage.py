@@ -161,10 +161,11 @@ def test_every_prediction_verifies_its_model(tmp_path: Path, column: str) -> Non
     path = tmp_path / "models.db"
     with opened_database(path, create=True) as engine, engine.begin() as connection:
         save_model(connection, row)
-    assert 0.0 < rbfrag.predict(3.0, 0.1, pgv_m_s=0.5, pga_g=0.4, db=path).probability < 1.0
+    shaking = {"pgv_m_s": 0.5, "pga_g": 0.4, "sa_g": {1.0: 0.4, 3.0: 0.1}}
+    assert 0.0 < rbfrag.predict(3.0, 0.1, **shaking, db=path).probability < 1.0
     altered = {"form": "form + 1", "is_default": "NOT is_default"}.get(column, f"{column} || ' '")
     _raw(path, f"UPDATE fragility_model SET {column} = {altered}")
     with pytest.raises(DatabaseError, match=f"model {row.name} is damaged .*its digest differs"):
-        rbfrag.predict(3.0, 0.1, pgv_m_s=0.5, pga_g=0.4, db=path)
+        rbfrag.predict(3.0, 0.1, **shaking, db=path)
     with opened_database(path, read_only=True) as engine, engine.connect() as connection:
         assert {found.table for found in check_database(connection)} == {"fragility_model"}

@@ -92,7 +92,7 @@ def test_held_out_probabilities_are_those_of_separate_fits():
     rest = fit_data(others, record, TERMS["xp"])
     b = most_likely(outcome_rows(rest, record, TERMS["xp"], names_of_fit).data)
     i = int(np.flatnonzero(own)[0])
-    for j in (0, 8, 15):
+    for j in np.flatnonzero(data.read[i])[::5]:
         values = {name: float(data.grid(name)[i, j]) for name in data.blocks}
         form = record.forms["xp"]
         if any(bound.holds(values) for bound in form.bounds):
@@ -103,27 +103,62 @@ def test_held_out_probabilities_are_those_of_separate_fits():
         assert fitted.result.held_out[i, j] == pytest.approx(expected, rel=1e-5)
 
 
-def test_unknown_outcomes_leave_each_combination_its_weight():
+def test_unknown_outcomes_are_left_out():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
     failed = source.failed.copy()
     failed[::2, :5] = np.nan
+    data = fit_data(replace(source, failed=failed), method_named("logistic"), TERMS["pgv"])
     rows = rows_of(replace(source, failed=failed), "logistic", "pgv")
-    per_combination = np.bincount(rows.place // 25, rows.data.weights)
-    assert per_combination == pytest.approx(25.0)
+    known = data.read & np.isfinite(data.failed)
+    assert rows.data.weights.sum() == known.sum() < data.read.sum()
+    assert set(rows.data.weights.tolist()) == {0.0, 1.0}
 
 
-def test_weaker_blocks_of_the_stored_grid_are_left_to_models_without_pgv():
+def test_fits_read_blocks_as_rock_has_them_and_are_judged_on_the_grid():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
-    expected = fit(source, term="pgv", method="logistic")
     weaker = source.k_over_pga[:, :1] * np.geomspace(0.0215, 0.1, 11)[:-1] / 0.1
     wider = replace(
         source,
         k_over_pga=np.column_stack([weaker, source.k_over_pga]),
         failed=np.column_stack([np.ones(weaker.shape), source.failed]),
     )
-    report = fit(wider, term="pgv", method="logistic")
-    assert report.coefficients == expected.coefficients
-    assert report.scores == expected.scores
+    data = fit_data(wider, method_named("logistic"), TERMS["pgv"])
+    kr, ratio = data.grid("kr"), data.grid("y_m_s") / data.grid("pgv_m_s")
+    assert (kr[data.read] >= 0.02).all()
+    assert (kr[data.read] <= 1.0).all()
+    assert data.domain["kr"] == (0.02, 1.0)
+    assert np.array_equal(data.read, (kr >= 0.02) & (kr <= 1.0))
+    # ten steps above the grid, all of them safe, and ten below it
+    assert ratio.max() == pytest.approx(4.0 * 40.0 ** (10.0 / 24.0))
+    steps = np.diff(np.log(ratio), axis=1)
+    assert steps == pytest.approx(np.full_like(steps, np.log(40.0) / 24.0), rel=1e-3)
+    above, below = ratio > 4.0 * (1.0 + 1e-9), ratio < 0.1 * (1.0 - 1e-9)
+    assert (data.read & above).sum() > 100 < (data.read & below).sum()
+    assert (data.failed[above] == 0.0).all()
+    # judged is what was run on the grid, also blocks that are too strong to be read
+    judged = data.judged.known
+    assert np.array_equal(judged, (kr >= 0.02) & ~above & ~below)
+    assert (judged & ~data.read).sum() > 10
+    real = data.judged_real
+    assert real is not None
+    assert np.array_equal(real.known, judged & (kr >= 0.05))
+    # what is judged and not read has no part in a fit
+    rows = rows_of(wider, "logistic", "pgv")
+    unread = ~data.read.ravel()[rows.place]
+    assert unread.sum() == (judged & ~data.read).sum()
+    assert (rows.data.weights[unread] == 0.0).all()
+    b = most_likely(rows.data)
+    assert b == pytest.approx(most_likely(rows.data.only(~unread)), rel=1e-9)
+    scores = fit_source(wider, TERMS["pgv"], method_named("logistic"), shared=False).report.scores
+    assert scores["log_loss_held_out_kr05"] != scores["log_loss_held_out"]
+
+
+def test_where_nothing_was_run_nothing_is_added():
+    source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
+    failed = source.failed.copy()
+    failed[0] = np.nan
+    data = fit_data(replace(source, failed=failed), method_named("logistic"), TERMS["pgv"])
+    assert np.isnan(data.failed).all(axis=1).sum() == 1
 
 
 def broken(source: FitSource, kind: str) -> FitSource:
@@ -135,7 +170,8 @@ def broken(source: FitSource, kind: str) -> FitSource:
         grid = np.broadcast_to(np.arange(25) < 12, source.failed.shape)
         return replace(source, failed=grid.astype(float))
     few = np.zeros_like(source.failed)
-    few[:7, 0] = 1.0
+    kr = source.k_over_pga * source.table.pga_g[:, None]
+    few.flat[np.flatnonzero((kr > 0.05) & (kr < 0.5))[:7]] = 1.0
     return replace(source, failed=few)
 
 
@@ -159,7 +195,7 @@ def test_what_does_not_go_together_is_refused():
     with pytest.raises(InputError, match=r"record does not go with the term pgv: it fits xp"):
         fit(source, term="pgv", method="record")
     with pytest.raises(InputError, match=r"bounded keeps M = 1.*logistic, lognormal"):
-        fit(source, term="pgv", method="bounded", estimate_m=True)
+        fit(source, term="pgv_kr", method="bounded", estimate_m=True)
     no_spectrum = replace(source, xp_m_s=np.full(source.xp_m_s.size, np.nan))
     with pytest.raises(FitError, match=r"needs the toppling spectrum X\(p\).*rbfrag simulate"):
         fit(no_spectrum, term="xp", method="record")

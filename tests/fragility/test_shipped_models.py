@@ -1,4 +1,4 @@
-"""The shipped models: those of the specification, level over size, smooth and monotone."""
+"""The shipped models: smooth and monotone, with their intervals."""
 
 from __future__ import annotations
 
@@ -8,14 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
-from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
-from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
-from rbfrag.fragility.fit.scores import calibration, log_loss
 from rbfrag.fragility.intervals import quantiles_of
-from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
@@ -24,64 +19,10 @@ from rbfrag.fragility.prediction_array import PredictionArray
 
 FloatArray = NDArray[np.float64]
 
-# Section 1 of the specification: b, CR3 errors, held-out log loss in 16 folds of earthquakes. The
-# reference holds one earthquake more (48), which moves b by up to .002 and errors by up to .003.
-SPECIFIED = {
-    "bounded-pgv": (
-        (-1.120, 2.662, 2.161, 0.042, -0.266), (0.480, 0.284, 0.443, 0.088, 0.033), 0.1652,
-    ),
-    "bounded-pgv_pga": (
-        (2.509, 2.284, 4.192, 2.386, 2.783), (0.435, 0.253, 0.422, 0.356, 0.238), 0.1522,
-    ),
-    "bounded-pgv_pga_tm": (
-        (2.938, 2.282, 4.255, 2.635, 1.582, 1.253), (0.368, 0.263, 0.346, 0.383, 0.301, 0.143),
-        0.1480,
-    ),
-    "record-xp": ((3.111, 3.816, 1.064), (0.242, 0.394, 0.073), 0.0882),
-}  # fmt: skip
-
 
 @cache
 def shipped() -> dict[str, FragilityModel]:
     return {row.name: FragilityModel.from_row(row) for row in read_models(REFERENCE)}
-
-
-@cache
-def source() -> FitSource:
-    with opened_database(REFERENCE, read_only=True) as engine, engine.connect() as connection:
-        return read_source(connection)
-
-
-@pytest.mark.parametrize("name", SPECIFIED)
-def test_coefficients_and_errors_are_those_of_the_specification(name: str) -> None:
-    b, errors, _ = SPECIFIED[name]
-    model = shipped()[name]
-    assert model.parameters == pytest.approx(b, abs=0.0025)
-    stated = model.row.diagnostics["standard_errors"]
-    assert isinstance(stated, dict)
-    assert list(stated.values()) == pytest.approx(errors, abs=0.0035)
-    assert np.sqrt(np.diag(model.row.covariance)) == pytest.approx(errors, abs=0.0035)
-    assert model.row.dependence is not None
-
-
-@cache
-def held_out(name: str) -> tuple[FitData, FloatArray]:
-    model = shipped()[name]
-    method, term = method_named(model.method.name), TERMS[model.term.name]
-    data = fit_data(source(), method, term)
-    rows: OutcomeRows = outcome_rows(data, method, term, parameter_names(method, term))
-    return data, rows.held_out(np.array(model.parameters))
-
-
-@pytest.mark.parametrize("name", SPECIFIED)
-def test_every_size_is_calibrated_on_earthquakes_left_out(name: str) -> None:
-    data, p = held_out(name)
-    judged, p2 = data.judged, data.grid("p2")
-    assert log_loss(p, judged.failed, judged.known) == pytest.approx(SPECIFIED[name][2], abs=3e-4)
-    assert 0.95 <= calibration(p, judged.failed, judged.known).slope <= 1.05
-    for size in (30.0, 10.0, 3.0, 1.0, 0.3, 0.1):
-        own = judged.known & (np.abs(p2 - size) < 1e-9 * size)
-        assert 0.90 <= calibration(p, judged.failed, own).slope <= 1.10, size
 
 
 # Dense grids: k_r, PGV (X(p)) and p² in steps of 1 %, from where the fit has its first block

@@ -14,19 +14,15 @@ from tests.fragility.conftest import model as model
 from tests.fragility.conftest import row as row
 
 COEFFICIENTS: dict[str, tuple[str, tuple[float, ...]]] = {
-    "pgv_kr": ("bounded", (-0.817, 0.128, -0.240, 2.410, 2.113, -1.211)),
-    "sa10": ("logistic", (-3.006, 0.348, -0.275, 3.618, -0.412, -2.700)),
-    "sa20": ("logistic", (-2.019, 0.388, -0.206, 3.106, -0.449, -3.771)),
-    "sa30": ("logistic", (-1.400, 0.425, -0.168, 2.860, -0.500, -4.602)),
-    "sa03": ("logistic", (-0.589, 0.280, -0.168, 2.372, 0.107, -2.711)),
-    "pga": ("bounded", (-3.897, 1.627, -0.160, 1.659)),
-    "pga_sa10": ("bounded", (-2.964, 2.038, -0.235, 2.727, 1.895, -0.327)),
+    "pgv_kr": ("bounded", (-0.988, 2.461, 1.808, -0.176, -1.314)),
+    "sa10": ("logistic", (-3.335, 0.524, -0.424, 3.717, -0.458, -2.271)),
+    "pga": ("bounded", (-3.407, 1.602, -0.224, 1.351, -0.420)),
+    "pga_sa10": ("bounded", (-2.853, 1.882, -0.266, 2.455, 1.666, -0.333)),
     "pga_sa03_sa10_sa30": (
-        "bounded",
-        (-3.323, 2.719, -0.261, 3.149, 0.068, 0.172, 0.981, 0.038, 1.004, -0.363),
+        "bounded", (-2.381, 1.955, -0.338, 2.889, 0.280, 0.928, 0.990, -0.455)
     ),
-}
-"""Method and coefficients of models of the measures that a hazard is given in, fitted to 265
+}  # fmt: skip
+"""Method and coefficients of models of the measures that a hazard is given in, fitted to 749
 recorded motions."""
 
 

@@ -69,6 +69,10 @@ def test_it_gives_the_same_eta(method: str, term: str) -> None:
                 ("03", 0.3, "sa03_g"), ("1", 1.0, "sa10_g"), ("3", 3.0, "sa30_g"),
             )
         },
+        **{
+            f"w{name}": math.log(v[sa] * g * period / (2.0 * math.pi) / v["pgv_m_s"])
+            for name, period, sa in (("1", 1.0, "sa10_g"), ("3", 3.0, "sa30_g"))
+        },
     }  # fmt: skip
     variance = [line for line in lines if r"\sigma^2 =" in line]
     if variance:

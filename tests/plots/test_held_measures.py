@@ -43,9 +43,9 @@ NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
 WITH_TM = model_of("pgv_pga_tm", (*NAMES, "b_ln_zt"), (3.6, 1.9, 4.8, 3.0, 1.4, 1.2), "bounded")
 WITH_PGA = model_of("pgv_pga", NAMES, (3.1, 1.9, 4.7, 2.7, 2.5), "bounded")
 OF_SIZE = model_of(
-    "pgv",
-    ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
-    (-1.1, 2.7, 2.2, 0.04, -0.27),
+    "pgv_kr",
+    ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p_squared", "b_strength"),
+    (-1.0, 2.5, 1.8, -0.18, -1.3),
     "bounded",
 )
 ALONE = model_of("pgv", ("c0", "c1", "v0", "v1"), (0.002, 0.72, 1e-4, 2e-3), "wls")

@@ -51,9 +51,9 @@ def fit(
     *,
     term: str = option(
         "Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
-        "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p); pgv_kr: "
-        "PGV with the block's strength; pga; sa03, sa10, sa20, sa30: spectral acceleration at 0.3, "
-        "1, 2, 3 s; pga_sa10 and pga_sa03_sa10_sa30: PGA with these.",
+        "pgv_pga, pgv_pga_tm and pgv_pga_sa10_sa30: PGV with PGA (and Tm, or spectral "
+        "accelerations at 1 and 3 s); xp: the toppling spectrum X(p); pgv_kr: PGV with the block's "
+        "strength; pga; sa10; pga_sa10 and pga_sa03_sa10_sa30: PGA with these.",
         ...,
         show_default=False,
     ),
@@ -138,7 +138,12 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
         yield f"{data}."
         return
     ends = f" ({rounded(around[0])} to {rounded(around[1])} by earthquakes)" if around else ""
-    yield f"{data}; on those left out its log loss is {rounded(score)}{ends}, the less the better."
+    real = report.scores.get("log_loss_held_out_kr05")
+    of_real = "" if real is None else f", {rounded(real)} of blocks of k_r >= 0.05"
+    yield (
+        f"{data}; on those left out its log loss is {rounded(score)}{ends}{of_real}, the less the "
+        "better."
+    )
 
 
 def _print_all(report: FitReport) -> None:

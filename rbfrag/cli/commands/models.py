@@ -28,8 +28,9 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 
     The log loss is that of earthquakes left out, the smaller the better among the models of a kind:
     of those that what is given suffices for, the best answers, or the default, the one that was
-    chosen or else the best of all, if no other reads more of the motion. Without a database the
-    models that are shipped are listed.
+    chosen or else the best of all, if no other reads more of the motion. Of blocks known by k_r it
+    is that of k_r >= 0.02, and beside it that of k_r >= 0.05. Without a database the models that
+    are shipped are listed.
     """
     from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
@@ -44,10 +45,13 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
         f"first: {default or 'none'}."
     )
     print()
-    shown = ("name", "kind", "term", "method", "is_default", "log_loss", "events", "created")
+    shown = ("name", "kind", "reads", "log_loss", "log_loss_kr05", "is_default", "events")
     print_table(
-        ("name", "kind", "term", "method", "default", "log_loss", "earthquakes", "fitted"),
-        [tuple(each[name] for name in shown) for each in listed],
+        ("name", "for", "reads", "log_loss", "from k_r 0.05", "default", "earthquakes"),
+        [
+            tuple(", ".join(each[name]) if name == "reads" else each[name] for name in shown)
+            for each in listed
+        ],
     )
 
 

@@ -89,7 +89,7 @@ def plot_curve(
     given: options.Block,
     held: options.Measures,
     over: str | None = option(
-        "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
+        "What the curve runs over: pgv, pga, pgd or sa10. Default: pgv, or what "
         "--model reads first."
     ),
     answering: options.Answering,

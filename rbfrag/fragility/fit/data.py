@@ -35,12 +35,15 @@ FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
-Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
-"""Blocks that models are judged on, as y0/PGV; of weaker blocks of the stored grid, and of stronger
-ones, which are safe, only the fits of wide forms know."""
+KR = (0.02, 1.0)
+"""k_r of the weakest and the strongest block that fits read: no rock stands at one degree."""
 
-WIDER_STEPS = 10
-"""Blocks that the fits of wide forms read above those."""
+REAL_KR = 0.05
+"""Scores are also stated of the blocks from this k_r on, as most rock blocks are."""
+
+Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
+"""The grid of blocks that fits are judged on, as y0/PGV, from `KR[0]` on. They also read the weaker
+ones that are stored, and safe ones above, nearly all of which are decided where PGV is known."""
 
 K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
 """The same of blocks that the record is scaled to."""
@@ -168,14 +171,9 @@ def read_source(
         },
     )
     if grid.outcome.shape[1] == 0 and block.points == "strengths":
-        k, failed = _nothing_known(table)
-        return replace(source, k_over_pga=k, failed=failed, displacement_m=None)
+        none = FitSource.of_table(table)
+        return replace(source, k_over_pga=none.k_over_pga, failed=none.failed, displacement_m=None)
     return source
-
-
-def _nothing_known(table: CombinationTable) -> tuple[FloatArray, FloatArray]:
-    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
-    return k, np.full(k.shape, np.nan)
 
 
 def _number_of(block: str | None, name: str) -> float:
@@ -204,8 +202,8 @@ class FitData:
             intensity, so that those of two fits belong together by this alone.
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
-        read: which of them this fit may read, same shape.
-        scored: which of these it is judged on, same shape.
+        read: which of them this fit reads, same shape.
+        scored: which it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
         n_excluded: found combinations left out because the term is not defined.
@@ -281,6 +279,14 @@ class FitData:
             known &= self.weights > 0.0
         failed = np.where(known, self.failed, 0.0)
         return ScoredBlocks(failed, known, self.event, self.outcomes, self.weights)
+
+    @property
+    def judged_real(self) -> ScoredBlocks | None:
+        """The part of it of at least `REAL_KR`; None of blocks that are not known by k_r."""
+        if "kr" not in self.blocks:
+            return None
+        judged = self.judged
+        return replace(judged, known=judged.known & (self.grid("kr") >= REAL_KR))
 
     def grid(self, name: str) -> FloatArray:
         """Return a value of the blocks of the grid, shape (n, m)."""
@@ -367,7 +373,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             names[event],
             values if least is None else {**values, "least": least},
             observed,
-            failed,
+            np.where(points.read[chosen], failed, np.nan),
             of_outcomes,
         ),
         weights=None if points.weights is None else points.weights[chosen],
@@ -438,9 +444,8 @@ def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of any strength k_r and some size p²."""
     table = source.table
-    wide = method.forms[term.name].wide
-    if wide:
-        source = _with_safe_blocks(source)
+    simulated = source.failed.shape[1]
+    source = _with_safe_blocks(source, method.block.safe_steps)
     p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
     given = {**_measures(source), "p": p}
     x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
@@ -474,12 +479,12 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = y0 / table.pgv_m_s[:, None]
-    some_block = (y0 > 0.0) & np.isfinite(y0)
-    scored = read = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
-    if wide:
-        scored, read = scored & (ratio <= Y0_OVER_PGV[-1] * (1.0 + 1e-9)), some_block
+    some_block = np.isfinite(y0) & (kr >= KR[0])
+    read = some_block & (kr <= KR[1])
+    scored = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
+    scored[:, simulated:] = False
     failed, source_of_outcomes = source.judged_outcomes(y0, y, least)
-    some = read.any(axis=0)
+    some = (read | scored).any(axis=0)
     of_outcomes = method.reads == "outcomes"
     ranges = {
         "p2": table.p2,
@@ -491,6 +496,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     }
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
+    ranges["kr"] = np.tile(KR, (x.size, 1))
     blocks = {**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]}
     if method.block.adjust is not None:
         method.block.adjust(blocks, arrays())
@@ -516,23 +522,18 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     )
 
 
-def _with_safe_blocks(source: FitSource) -> FitSource:
-    """Return a source whose outcome grid goes on above its strongest block, with safe blocks.
-
-    No excursion from rest exceeds twice PGV, and the grid ends at four times PGV. The steps are
-    those of the grid.
-    """
+def _with_safe_blocks(source: FitSource, steps: int) -> FitSource:
+    """Return a source whose outcome grid goes on above its strongest block, with safe blocks."""
     if source.failed.shape[1] < 2:
         return source
     step = Y0_OVER_PGV[1] / Y0_OVER_PGV[0]
-    last = source.k_over_pga[:, -1:]
-    k = last * step ** np.arange(1, WIDER_STEPS + 1)
+    k = source.k_over_pga[:, -1:] * step ** np.arange(1, steps + 1)
     # where nothing was run nothing is added
     safe = np.where(np.isfinite(source.failed).any(axis=1), 0.0, np.nan)
     return replace(
         source,
         k_over_pga=np.hstack([source.k_over_pga, k]),
-        failed=np.hstack([source.failed, np.repeat(safe[:, None], WIDER_STEPS, axis=1)]),
+        failed=np.hstack([source.failed, np.repeat(safe[:, None], steps, axis=1)]),
     )
 
 

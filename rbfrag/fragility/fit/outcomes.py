@@ -1,8 +1,7 @@
 """Fits of what blocks did: the methods that read outcomes.
 
-A generalised linear model of binary outcomes on a grid that does not depend on the outcome. Every
-combination weighs the same, however many of its outcomes are known. Blocks that mechanics says
-cannot fail are not fitted: P is 0.
+A generalised linear model of binary outcomes on a grid that does not depend on the outcome; every
+block that is read counts the same. Blocks that mechanics says cannot fail are not fitted: P is 0.
 """
 
 from __future__ import annotations
@@ -32,7 +31,8 @@ class OutcomeRows:
     """The rows of a fit, and where they stand on the grid.
 
     Args:
-        data: features, outcomes, weights and earthquakes.
+        data: features, outcomes, weights and earthquakes; blocks that are judged and not fitted
+            have the weight 0.
         place: flat index on the grid (n, m) of each row.
         bounded: whether mechanics forbids the block, on the grid.
         bounded_failed: known outcomes that failed although mechanics forbids it (vertical motion,
@@ -68,7 +68,8 @@ def fit_outcomes(
     """Fit a method that reads outcomes."""
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     rows = outcome_rows(data, method, term, names)
-    failures = int((rows.data.outcome > 0.5).sum())
+    fitted = rows.data.only(rows.data.weights > 0.0)
+    failures = int((fitted.outcome > 0.5).sum())
     if 0 < failures < FEWEST_FAILURES:
         raise FitError(
             f"{failures} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
@@ -77,7 +78,7 @@ def fit_outcomes(
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
         try:
-            b, cr1, naive = fit_by_statsmodels(rows.data)
+            b, cr1, naive = fit_by_statsmodels(fitted)
             variances = np.concatenate([np.diag(cr1), np.diag(naive)])
         except np.linalg.LinAlgError:
             variances = np.array([np.nan])
@@ -89,13 +90,13 @@ def fit_outcomes(
             f"parameters of method {method.name} apart: simulate more block sizes (p²) or "
             "earthquakes, or fit a method of fewer parameters, such as logistic"
         )
-    steps = jackknife_steps(rows.data, b)
+    steps = jackknife_steps(fitted, b)
 
     def resampled(times: FloatArray) -> FloatArray:
         drawn = times > 0.0
-        return maximise(rows.data.only(drawn), b, times=times[drawn], tolerance=1e-7)[0]
+        return maximise(fitted.only(drawn), b, times=times[drawn], tolerance=1e-7)[0]
 
-    samples = bootstrap(rows.data.event, resampled, replicates=REPLICATES, seed=seed)
+    samples = bootstrap(fitted.event, resampled, replicates=REPLICATES, seed=seed)
     estimates = Estimates(
         names, b, steps, samples, seed,
         {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
@@ -114,7 +115,7 @@ def fit_outcomes(
         ln_residual=residual,
         details={
             "link": method.link.name,
-            "n_outcomes": int(rows.data.outcome.size),
+            "n_outcomes": int(fitted.outcome.size),
             "n_toppled": failures,
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_failed,
@@ -140,8 +141,8 @@ def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> 
 def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ...]) -> OutcomeRows:
     """Return the known outcomes with their features."""
     form, shape = method.forms[term.name], data.failed.shape
-    positive = data.read & (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
-    known = positive & np.isfinite(data.failed)
+    positive = (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
+    known = positive & (data.read | data.scored) & np.isfinite(data.failed)
     bounded = np.zeros(shape, dtype=np.bool_)
     for bound in form.bounds:
         bounded |= np.broadcast_to(bound.holds(data.blocks), shape)
@@ -152,11 +153,9 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     columns = np.column_stack([np.broadcast_to(f, place.size) for f in features])
     finite = np.isfinite(columns).all(axis=1)
     place, columns = place[finite], columns[finite]
-    row = place // shape[1]
-    weights = data.read.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    failed = data.failed.ravel()[place]
+    failed, read = data.failed.ravel()[place], data.read.ravel()[place].astype(np.float64)
     rows = Binomial(
-        method.link, np.ascontiguousarray(columns), failed, weights[row], data.event[row]
+        method.link, np.ascontiguousarray(columns), failed, read, data.event[place // shape[1]]
     )
     return OutcomeRows(rows, place, bounded, int((data.failed[bounded] > 0.5).sum()))
 
@@ -190,8 +189,7 @@ def _warnings(data: FitData, rows: OutcomeRows, estimates: Estimates) -> list[st
     if unknown:
         result.append(
             f"{unknown} of {int(data.read.sum())} blocks of the grid have no outcome (not stored, "
-            "or closer to critical than the error of a run): they are left out, and each "
-            "combination keeps its weight"
+            "or closer to critical than the error of a run): they are left out"
         )
     if (estimates.samples.std(axis=0, ddof=1) > 2.0 * estimates.errors).any():
         result.append(

@@ -33,7 +33,8 @@ class FitReport(Tabular):
         n: number of critical values that were fitted; of a kind without them, of outcomes.
         n_censored: number of combinations whose critical value lies below the search limit.
         events: number of earthquakes.
-        scores: how well the model predicts; ``held_out`` leaves whole earthquakes out.
+        scores: how well the model predicts; ``held_out`` leaves whole earthquakes out, ``kr05``
+            reads blocks of k_r >= 0.05 alone.
         warnings: sentences for people.
         details: everything else: counts, M, the rank of the terms, settings.
         model: the model itself, ready to be stored or used.

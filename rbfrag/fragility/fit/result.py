@@ -12,6 +12,8 @@ from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
 from rbfrag.fragility.fit.scores import nested_scatter, score_intervals, scores_of
 from rbfrag.solver.results import FloatArray
 
+_OF_REAL_BLOCKS = ("log_loss_held_out", "brier_held_out", "calibration_slope_held_out")
+
 CLUSTERED = "clustered by earthquake, CR3 (each earthquake left out in turn)"
 
 
@@ -93,11 +95,16 @@ def method_result(
         details: what else the report states.
     """
     judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
+    scored = scores_of(judged, in_sample, held_out)
+    real = data.judged_real
+    if real is not None and real.known.any():
+        own = scores_of(real, in_sample, held_out)
+        scored |= {f"{name}_kr05": own[name] for name in _OF_REAL_BLOCKS if name in own}
     return MethodResult(
         coefficients=estimates.named(estimates.values),
         steps=estimates.steps,
         standard_errors=estimates.named(estimates.errors),
-        scores={**(scores or {}), **scores_of(judged, in_sample, held_out)},
+        scores={**(scores or {}), **scored},
         details={
             "judged_on": judged.source,
             "judged_outcomes": int(judged.known.sum()),

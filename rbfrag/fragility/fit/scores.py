@@ -8,6 +8,7 @@ censored combination then counts where its limit decides.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,15 +115,20 @@ def calibration(
     """
     from statsmodels.genmod.families import Binomial
     from statsmodels.genmod.generalized_linear_model import GLM
+    from statsmodels.tools.sm_exceptions import PerfectSeparationWarning
 
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     x, t = np.log(p / (1.0 - p)), outcome[known]
     w = np.ones(x.size) if weights is None else weights[known]
-    if not 0.0 < w @ t < w.sum() or np.ptp(x) == 0.0:
+    hits, misses = x[t > 0.5], x[t <= 0.5]
+    if not (hits.size and misses.size) or hits.min() > misses.max() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
     columns = np.column_stack([np.ones(x.size), x])
     model = GLM(t, columns, family=Binomial(), var_weights=w)
-    b = model.fit(tol=1e-14).params
+    with warnings.catch_warnings():
+        # said of good models, whose slope is finite
+        warnings.simplefilter("ignore", PerfectSeparationWarning)
+        b = model.fit(tol=1e-14).params
     return Calibration(float(b[0]), float(b[1]))
 
 

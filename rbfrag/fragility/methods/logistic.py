@@ -3,13 +3,10 @@
     eta = h(p) [b0 + b1 ln(x/y) (+ b2 ln p)],   P = 1/(1 + exp(-eta))
 
 h(p) = exp(.18 l - .06 l²), l = ln p; with X(p) h(p) = p^.30, with PGD 1. (4) of
-docs/theory/fragility.md. With a spectral acceleration alone, V_T = SA g T/2π and k' of
+docs/theory/fragility.md. With SA(1.0) alone, V_1 = SA g/2π and k' of
 :func:`rbfrag.fragility.method.log_strength`,
 
-    eta = p^A [b0 + b1 l + b2 l² + b3 ln(V_T/y) + b4 ln V_T + b5 k']
-
-On the reference h lowers the held-out log loss from .1794, .1925 and .1470 to .1758, .1867 and
-.1356 (PGV, PGA·g·Tm/2π, X(p)); with 2π·PGD/Tm it would raise it from .4024 to .4060.
+    eta = h(p) [b0 + b1 l + b2 l² + b3 ln(V_1/y) + b4 ln V_1 + b5 k']
 """
 
 from __future__ import annotations
@@ -31,17 +28,6 @@ def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     return linear(b, 1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
 
 
-_SPECTRAL = ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength")
-
-
-def _of_period(a: float) -> Form:
-    return Form(
-        _SPECTRAL, _spectral, 0, size_factor=SizeFactor(a), wide=True,
-        terms=("1", r"\ln p", r"\ln^2 p", r"\ln(x/y)", r"\ln x", "k'"),
-        where=r"k' = \ln(1 + k_r/0.3)",
-    )  # fmt: skip
-
-
 def _form(size_factor: SizeFactor | None) -> Form:
     return Form(
         ("b0", "b_ln_x_over_y", "b_ln_p"), _eta, 4, size_factor=size_factor,
@@ -50,6 +36,12 @@ def _form(size_factor: SizeFactor | None) -> Form:
 
 
 _OF_SIZE = SizeFactor(0.18, 0.06)
+_SPECTRAL = Form(
+    ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength"),
+    _spectral, 0, size_factor=_OF_SIZE,
+    terms=("1", r"\ln p", r"\ln^2 p", r"\ln(x/y)", r"\ln x", "k'"),
+    where=r"k' = \ln(1 + k_r/0.3)",
+)  # fmt: skip
 
 METHOD = Method(
     name="logistic",
@@ -60,10 +52,7 @@ METHOD = Method(
         "pga_tm": _form(_OF_SIZE),
         "pgd_tm": _form(None),
         "xp": _form(SizeFactor(0.30)),
-        "sa03": _of_period(0.16),
-        "sa10": _of_period(0.13),
-        "sa20": _of_period(-0.04),
-        "sa30": _of_period(-0.08),
+        "sa10": _SPECTRAL,
     },
     reads="outcomes",
     meaning=method.OF_OUTCOME,

@@ -1,6 +1,6 @@
 """The method ``record``: outcomes, logistic in ln(X(p)/y) and in the strength of the motion.
 
-    eta = h(p) [b0 + b1 ln(X(p)/y) + b2 ln s],   s = p X(p)/(PGA g),   h(p) = p^.30
+    eta = h(p) [b0 + b1 ln(X(p)/y) + b2 ln s],   s = p X(p)/(PGA g),   h(p) = p^.18
     P = 1/(1 + exp(-eta)), 0 where y >= X(p) or k_r >= PGA
 
 (6) of docs/theory/fragility.md.
@@ -29,7 +29,7 @@ METHOD = Method(
     forms={
         "xp": Form(
             ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0,
-            (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=SizeFactor(0.30),
+            (method.ABOVE_SPECTRUM, method.NOT_LIFTED), size_factor=SizeFactor(0.18),
             terms=("1", r"\ln(x/y)", r"\ln s"), where=r"s = p\,x/(\mathrm{PGA}\,g)",
         )
     },

@@ -17,7 +17,7 @@ from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import methods
+from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.kind_draws import METHOD_OF, TRUE, drawn
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
@@ -131,7 +131,7 @@ def test_a_kind_without_a_search_is_fitted_to_its_outcomes() -> None:
     expected = fit(source, term="pgv", method="logistic")
     report = fit(replace(source, table=table), term="pgv", method="logistic")
     assert report.coefficients == pytest.approx(expected.coefficients, rel=1e-9)
-    # counted are the outcomes, 25 of each combination
-    assert (report.n, report.n_censored, report.events) == (25 * n, 0, 12)
+    read = fit_data(source, method_named("logistic"), TERMS["pgv"]).read
+    assert (report.n, report.n_censored, report.events) == (read.sum(), 0, 12)
     with pytest.raises(FitError, match="0 critical values were found"):
         fit(replace(source, table=table), term="pgv", method="lognormal")

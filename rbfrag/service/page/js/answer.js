@@ -18,10 +18,8 @@ const KNOWS = {
   pgv_pga_tm: "PGV, PGA, T_m",
   pgv_kr: "PGV",
   pga: "PGA",
-  sa03: "SA(0.3 s)",
+  pgv_pga_sa10_sa30: "PGV, PGA, SA(1, 3 s)",
   sa10: "SA(1 s)",
-  sa20: "SA(2 s)",
-  sa30: "SA(3 s)",
   pga_sa10: "PGA, SA(1 s)",
   pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
 };
