@@ -206,13 +206,18 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
 
 
 def held_out_loss(row: ModelRow) -> float:
-    """Return the log loss of a model on earthquakes left out; infinite where it has none."""
+    """Return the log loss of a model on earthquakes left out; infinite where it has none.
+
+    Of models of blocks known by k_r it is that of k_r >= 0.05, as most rock blocks are.
+    """
     scores = row.diagnostics.get("scores")
-    value = scores.get("log_loss_held_out") if isinstance(scores, Mapping) else None
+    if not isinstance(scores, Mapping):
+        return math.inf
+    value = scores.get("log_loss_held_out_kr05", scores.get("log_loss_held_out"))
     return float(value) if isinstance(value, int | float) else math.inf
 
 
-def _last_of_all(row: ModelRow) -> bool:
+def answers_special_questions(row: ModelRow) -> bool:
     """Return whether a model answers special questions only: of a record, or of one rotation."""
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
@@ -228,7 +233,7 @@ def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | 
         of_kind,
         key=lambda row: (
             not row.is_default,
-            _last_of_all(row),
+            answers_special_questions(row),
             held_out_loss(row),
             row.created,
             row.name,
