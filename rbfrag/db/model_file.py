@@ -205,18 +205,24 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-def held_out_loss(row: ModelRow, of: str = "") -> float:
+LOSSES = ("log_loss_held_out_kr05", "log_loss_held_out")
+"""Names of the log loss on earthquakes left out: of blocks of k_r >= 0.05, as most rock blocks are,
+and of all that a model is judged on."""
+
+
+def held_out_loss(row: ModelRow, *names: str) -> float:
     """Return the log loss of a model on earthquakes left out; infinite where it has none.
 
     Args:
-        of: ``_kr05`` for that of blocks of k_r >= 0.05; empty for that of all that it is judged on.
+        names: of `LOSSES`, the first that a model has; none for all of them.
     """
     scores = row.diagnostics.get("scores")
-    value = scores.get(f"log_loss_held_out{of}") if isinstance(scores, Mapping) else None
+    stored = scores if isinstance(scores, Mapping) else {}
+    value = next((stored[name] for name in names or LOSSES if name in stored), None)
     return float(value) if isinstance(value, int | float) else math.inf
 
 
-def _last_of_all(row: ModelRow) -> bool:
+def answers_special_questions(row: ModelRow) -> bool:
     """Return whether a model answers special questions only: of a record, or of one rotation."""
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
@@ -232,7 +238,7 @@ def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | 
         of_kind,
         key=lambda row: (
             not row.is_default,
-            _last_of_all(row),
+            answers_special_questions(row),
             held_out_loss(row),
             row.created,
             row.name,

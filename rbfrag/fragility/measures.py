@@ -6,7 +6,7 @@ Each is pure arithmetic on single numbers or arrays and loads no library.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -29,9 +29,7 @@ class Term:
             how strong the shaking is, and is zero when there is none.
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
-        level: how much it knows of the motion: 3 the record itself, 0 less than PGV with PGA.
         of_block: what the formula reads of the block, after the inputs.
-        advice: what every answer says of a term that knows little; empty for nothing.
     """
 
     name: str
@@ -39,10 +37,8 @@ class Term:
     symbol: str
     inputs: tuple[str, ...]
     formula: Callable[..., Any]
-    variance_degree: int
-    level: int = 0
+    variance_degree: int = 1
     of_block: tuple[str, ...] = ()
-    advice: str = ""
 
     @property
     def label(self) -> str:
@@ -77,6 +73,11 @@ def pga_over_p_m_s(pga_g: Any, p: Any) -> Any:
     return pga_g * STANDARD_GRAVITY_M_S2 / p
 
 
+def _first_over_p(pga_g: Any, *others: Any) -> Any:
+    """Return PGA·g/p [m/s], p being the last; the other measures enter the model by themselves."""
+    return pga_over_p_m_s(pga_g, others[-1])
+
+
 def spectral_velocity_m_s(sa_g: Any, period_s: float) -> Any:
     """Return V_T = SA·g·T/2π [m/s] from a spectral acceleration [g] and its period [s]."""
     return sa_g * (STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi))
@@ -95,12 +96,6 @@ def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
 SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 2.0: "sa20_g", 3.0: "sa30_g"}
 """Spectral accelerations (5 % damping, one component) that questions may state, by period [s]."""
 
-
-_KNOWS_LITTLE = (
-    "PGA alone says little of toppling: PGV or SA(1.0) would halve the log loss on earthquakes "
-    "left out or lower it by a quarter (0.25, against 0.13 and 0.19)"
-)
-
 TERMS: Mapping[str, Term] = {
     term.name: term
     for term in (
@@ -110,16 +105,14 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s",),
             pgv_m_s,
-            1,
         ),
-        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s, 1, 0),
+        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s),
         Term(
             "pga_sa03_sa10_sa30",
             "spectral acceleration at 1 s, as a velocity, with PGA and those at 0.3 and 3 s",
             "SA(1.0)·g·T/2π",
             ("sa10_g", "pga_g", "sa03_g", "sa30_g"),
             _first_at_1s,
-            1,
         ),
         Term(
             "pga_tm",
@@ -127,8 +120,6 @@ TERMS: Mapping[str, Term] = {
             "PGA·g·Tm/2π",
             ("pga_g", "tm_s"),
             pga_tm_m_s,
-            1,
-            0,
         ),
         Term(
             "pga_sa10",
@@ -136,7 +127,6 @@ TERMS: Mapping[str, Term] = {
             "SA(1.0)·g·T/2π",
             ("sa10_g", "pga_g"),
             _first_at_1s,
-            1,
         ),
         Term(
             "sa10",
@@ -144,7 +134,6 @@ TERMS: Mapping[str, Term] = {
             "SA(1.0)·g·T/2π",
             ("sa10_g",),
             partial(spectral_velocity_m_s, period_s=1.0),
-            1,
         ),
         Term(
             "pga",
@@ -152,9 +141,7 @@ TERMS: Mapping[str, Term] = {
             "PGA·g/p",
             ("pga_g",),
             pga_over_p_m_s,
-            1,
             of_block=("p",),
-            advice=_KNOWS_LITTLE,
         ),
         Term(
             "pgd_tm",
@@ -162,8 +149,7 @@ TERMS: Mapping[str, Term] = {
             "2π·PGD/Tm",
             ("pgd_m", "tm_s"),
             pgd_tm_m_s,
-            2,
-            0,
+            variance_degree=2,
         ),
         Term(
             "pgv_pga",
@@ -171,8 +157,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g"),
             first_m_s,
-            1,
-            1,
         ),
         Term(
             "pgv_pga_tm",
@@ -180,8 +164,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "tm_s"),
             first_m_s,
-            1,
-            2,
         ),
         Term(
             "pgv_pga_sa10_sa30",
@@ -189,15 +171,42 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "sa10_g", "sa30_g"),
             first_m_s,
-            1,
-            2,
         ),
-        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1, 3),
+        Term(
+            "pga_sa10_sa30",
+            "spectral acceleration at 1 s, as a velocity, with PGA and that at 3 s",
+            "SA(1.0)·g·T/2π",
+            ("sa10_g", "pga_g", "sa30_g"),
+            _first_at_1s,
+        ),
+        Term(
+            "pga_m",
+            "peak ground acceleration over the block's frequency parameter, with magnitude",
+            "PGA·g/p",
+            ("pga_g", "magnitude"),
+            _first_over_p,
+            of_block=("p",),
+        ),
+        Term(
+            "pgv_pga_m",
+            "peak ground velocity, with PGA and magnitude",
+            "PGV",
+            ("pgv_m_s", "pga_g", "magnitude"),
+            first_m_s,
+        ),
+        Term(
+            "pgv_pga_ia",
+            "peak ground velocity, with PGA and Arias intensity",
+            "PGV",
+            ("pgv_m_s", "pga_g", "arias_m_s"),
+            first_m_s,
+        ),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s),
     )
 }
-"""The terms by name; those of one level by falling skill (docs/theory/fragility.md)."""
+"""The terms by name."""
 
-STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m")
+STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m", "arias_m_s", "magnitude")
 """The measures that a question may state, by name."""
 
 MEASURES = frozenset({*STATED, "xp_m_s"})
@@ -208,9 +217,6 @@ ALONE = ("pgv_m_s", "sa10_g", "pga_g")
 
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number of the shaking: what the dissertation compares."""
-
-BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
-"""The terms by falling skill on held-out earthquakes (docs/evidence/model-choice.md)."""
 
 
 def spectral(sa_g: Mapping[float, T]) -> dict[str, T]:
@@ -243,13 +249,16 @@ def intensity_term(name: str) -> Term:
 
 
 def terms_from(given: Collection[str]) -> tuple[str, ...]:
-    """Return the names of the terms that the given measures suffice for, best first."""
-    return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))
+    """Return the names of the terms that the given measures suffice for."""
+    return tuple(name for name in TERMS if set(TERMS[name].inputs) <= set(given))
 
 
-def least_inputs() -> list[tuple[str, ...]]:
-    """Return the sets of measures of which each suffices for a term and none holds another."""
-    stated = [term.inputs for term in TERMS.values() if set(term.inputs) <= set(STATED)]
+def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
+    """Return the sets of measures of which each suffices for one of some terms, none of which holds
+    another.
+    """
+    known = [TERMS[name].inputs for name in terms if name in TERMS]
+    stated = [inputs for inputs in known if set(inputs) <= set(STATED)]
     least = [own for own in stated if not any(set(other) < set(own) for other in stated)]
     return list(dict.fromkeys(least))
 
@@ -274,6 +283,8 @@ CREDIBLE = {
         "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
         "s): is PGV in m/s and PGA in g?",
     ),
+    "arias_m_s": (0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
+    "magnitude": (3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
     "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
     "kr": (0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
     "ky": (0.0, 5.0, _STEEP),

@@ -195,7 +195,8 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
-        stored: names of what combinations say of their block beside its size, for `adjust`.
+        stored: what combinations say of their block beside its size, for `adjust`, by name: the
+            values of which fits read combinations, as those between tell them little more.
         fractions: those of the options that lie between 0 and 1 and whose scatter is one of
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
@@ -203,6 +204,8 @@ class BlockParameters:
         doubts: the combinations that make an answer doubtful.
         safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
             of them safe by mechanics.
+        judged_kr: strength up to which fits are judged, where their grid goes on far beyond what
+            fails.
         points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
             blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
@@ -216,12 +219,13 @@ class BlockParameters:
     at_rest: Bound
     criterion: str | None = None
     options: tuple[str, ...] = ()
-    stored: tuple[str, ...] = ()
+    stored: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
     fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
     safe_steps: int = 0
+    judged_kr: float = math.inf
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 
@@ -338,6 +342,7 @@ class Form:
         equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
             <+name> with their sign, <exp name>, as mathtext.
         where: what the symbols mean, likewise.
+        advice: what every answer says of a form that knows little; empty for nothing.
     """
 
     parameters: tuple[str, ...]
@@ -349,6 +354,7 @@ class Form:
     terms: tuple[str, ...] = ()
     equation: str = "<sum>"
     where: str = ""
+    advice: str = ""
 
     def unscaled(
         self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
