@@ -187,6 +187,15 @@ TERMS: Mapping[str, Term] = {
             1,
         ),
         Term(
+            "pgv_pga_m",
+            "peak ground velocity, with PGA and magnitude",
+            "PGV",
+            ("pgv_m_s", "pga_g", "magnitude"),
+            first_m_s,
+            1,
+            2,
+        ),
+        Term(
             "pgv_pga_tm",
             "peak ground velocity, with PGA and Tm",
             "PGV",

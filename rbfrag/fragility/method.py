@@ -200,7 +200,6 @@ class BlockParameters:
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
-        doubts: the combinations that make an answer doubtful.
         points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
             blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
@@ -218,7 +217,6 @@ class BlockParameters:
     fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
-    doubts: tuple[Bound, ...] = ()
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 
