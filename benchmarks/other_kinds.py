@@ -1,11 +1,12 @@
-"""How well models of blocks that slide or slump do, and what y alone costs:
+"""How well models of blocks that slide or slump do:
 
-    python -m benchmarks.other_kinds DATABASE [--write]
+    python -m benchmarks.other_kinds DATABASE [--slumping DATABASE] [--suite NAME] [--write]
 
-reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
-the models, compares them with published regressions, and prints the tables; --write keeps them and
-draws the figure of docs/evidence/other-kinds.md. Toppling may be in another database, such as the
-shipped one. What the blocks of one earthquake share is that of the shipped models.
+reads the campaigns of a database (sliding, slumping by 2 degrees and past recovery), fits the
+models, compares them with published regressions, and prints the tables; --write keeps them and
+draws the figure of docs/evidence/other-kinds.md. Slumping may be in another database, there run
+under the motions of a suite alone. What the blocks of one earthquake share is that of the shipped
+models.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +30,7 @@ from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
-from rbfrag.db.queries import combination_table
-from rbfrag.fragility.fit.censoring import score_bounds
+from rbfrag.db.rows import Selection
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
 from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
@@ -45,13 +46,12 @@ FIGURE = ROOT / "docs" / "figures" / "other-kinds.svg"
 
 
 def fitted(
-    connection: Connection, kind: str, term: str = "pgv_pga", rotation_deg: float | None = None
+    connection: Connection, kind: str, term: str = "pgv_pga", **selection: Unpack[Selection]
 ) -> Fitted:
     """Fit a model of a kind."""
     method = method_of_kind(kind, None)
-    asked = {"rotation_deg": rotation_deg}
-    source = read_source(connection, method.block, kind=kind, rotation_deg=rotation_deg)
-    return fit_source(source, TERMS[term], method, kind=kind, selection=asked, shared=False)
+    source = read_source(connection, method.block, kind=kind, **selection)
+    return fit_source(source, TERMS[term], method, kind=kind, selection=selection, shared=False)
 
 
 def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray:
@@ -65,20 +65,34 @@ def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray
 
 
 def scored(name: str, p: FloatArray, data: FitData) -> list[str]:
-    """Return the line of a model: known share, scores, and bounds where some are not known."""
+    """Return the line of a model: scores, and how many outcomes are undecided."""
     judged = data.judged
-    outcomes = judged.failed, judged.known, judged.weights
-    known = np.isfinite(data.failed)
-    every = replace(judged, known=known, failed=np.where(known, data.failed, 0.0))
-    low, high = score_bounds(every, p, data.read)
+    outcomes = judged.failed, judged.known
+    undecided = 1.0 - judged.known[data.read].mean()
     return [
         name,
-        f"{100.0 * (1.0 - known.mean()):.0f} %",
-        f"{log_loss(p, *outcomes):.3f}",
-        f"{brier(p, *outcomes):.3f}",
+        f"{log_loss(p, *outcomes):.4f}",
+        f"{brier(p, *outcomes):.4f}",
         f"{calibration(p, *outcomes).slope:.2f}",
-        f"{low:.3f} to {high:.3f}",
+        f"{int(judged.known.sum()):,}",
+        f"{100.0 * undecided:.1f} %",
     ]
+
+
+def coefficient_lines(fits: Sequence[Fitted]) -> str:
+    """Return the coefficients of some fits with their clustered errors, one fit a row."""
+    names = list(dict.fromkeys(name for fit in fits for name in fit.result.coefficients))
+    rows = [
+        [_name(fit)]
+        + [
+            f"{fit.result.coefficients[name]:.3f} ± {fit.result.standard_errors[name]:.3f}"
+            if name in fit.result.coefficients
+            else ""
+            for name in names
+        ]
+        for fit in fits
+    ]
+    return markdown((["model", *(f"`{name}`" for name in names)], rows))
 
 
 def class_lines(
@@ -89,13 +103,12 @@ def class_lines(
     lines = []
     for low, high in pairwise(edges):
         here = judged.known & (of >= low) & (of < high)
-        counts = judged.counts * here
-        if not counts.any():
+        if not here.any():
             continue
-        mean = [float((counts * each).sum() / counts.sum()) for each in (p, judged.failed)]
+        mean = [float(each[here].mean()) for each in (p, judged.failed)]
         # where nearly all or none fail there is no slope to speak of
         decided = not 0.01 < mean[1] < 0.99
-        slope = calibration(p, judged.failed, here, judged.counts).slope
+        slope = calibration(p, judged.failed, here).slope
         text = f"{low:g} to {high:g}" if np.isfinite(high) else f"from {low:g}"
         lines.append([
             name, f"{variable} {text}", "" if decided else f"{slope:.2f}",
@@ -118,30 +131,9 @@ RATIOS, DISTANCES = (0.0, 0.1, 0.3, 0.6, 1.0), (0.0, 0.02, 0.1, 0.2, math.inf)
 SIZES, STRENGTHS = (0.0, 3.0, 8.0, math.inf), (0.0, 0.2, math.inf)
 
 
-def within_motion(residual: FloatArray, group: NDArray[np.intp]) -> tuple[float, float]:
-    """Return the scatter between blocks under one motion, and between motions."""
-    count = np.bincount(group)
-    mean = np.bincount(group, residual) / np.maximum(count, 1)
-    many = count[group] > 1
-    inside = residual[many] - mean[group[many]]
-    freedom = many.sum() - np.unique(group[many]).size
-    within = float(np.sqrt((inside**2).sum() / freedom))
-    return within, float(np.std(mean[count > 1]))
-
-
-def scatter(
-    connection: Connection, kind: str, rotation_deg: float | None = None
-) -> tuple[float, float]:
-    """Return both scatters of ln(y/PGV) at failure, found values alone; y = k g/p."""
-    table = combination_table(connection, kind=kind, rotation_deg=rotation_deg)
-    found = (table.status == "found") & (table.kr_over_pga < 1.0)
-    names = [f"{m} {p}" for m, p in zip(table.motion_id.tolist(), table.polarity, strict=True)]
-    group = np.unique(np.array(names)[found], return_inverse=True)[1]
-    y = table.kr_over_pga * table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
-    return within_motion(np.log(y / table.pgv_m_s)[found], group.astype(np.intp))
-
-
-def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[Fitted, Fitted]]:
+def tables(
+    database: str, slumping: str | None, suite: str | None
+) -> tuple[dict[str, str], tuple[Fitted, Fitted]]:
     """Return the tables of the page by name, and the fits that the figure draws."""
     found: dict[str, str] = {}
     with opened_database(database, read_only=True) as engine, engine.connect() as c:
@@ -149,40 +141,30 @@ def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[F
         source = read_source(c, method_of_kind("sliding", None).block, kind="sliding")
         for facing in ("one", "either"):
             found[f"sliding-{facing}"] = comparison(source, facing=facing)
-        slumps = {
-            (rotation, term): fitted(c, "slumping", term, rotation)
+    with opened_database(slumping or database, read_only=True) as engine, engine.connect() as c:
+        slumps = [
+            fitted(c, "slumping", term, rotation_deg=rotation, suite=suite)
             for rotation in (None, 2.0)
-            for term in ("pgv_pga", "pgv")
-        }
-        scatters = {
-            "slumping past recovery, 18 blocks": scatter(c, "slumping"),
-            "slumping by 2 degrees, 18 blocks": scatter(c, "slumping", 2.0),
-        }
-    with opened_database(toppling or database, read_only=True) as engine, engine.connect() as c:
-        scatters = {"toppling, six sizes": scatter(c, "toppling"), **scatters}
-    sliding, recovery = slides["pgv_pga"], slumps[None, "pgv_pga"]
+            for term in ("pgv_pga_m", "pgv_pga")
+        ]
+    sliding, turned = slides["pgv_pga"], slumps[-1].data
     rows = []
     for fit in slides.values():
         for variable, edges in (*_ratio_classes(fit), ("d [m]", DISTANCES)):
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
     found["sliding-classes"] = markdown((CLASS_HEADS, rows))
-    rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in slumps.values()]
-    turned = slumps[2.0, "pgv_pga"].data
+    rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in slumps]
     rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(turned, sliding, 2.0), turned))
-    heads = ["held out", "not known", "log loss", "Brier", "slope", "log loss, bounds"]
+    heads = ["held out", "log loss", "Brier", "slope", "outcomes", "undecided"]
     found["slumping-scores"] = markdown((heads, rows))
+    found["slumping-coefficients"] = coefficient_lines(slumps)
     rows = []
-    for fit in slumps.values():
+    for fit in slumps:
         classes = (*_ratio_classes(fit), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS))
         for variable, edges in classes:
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
     found["slumping-classes"] = markdown((CLASS_HEADS, rows))
-    cells = [
-        [name, f"{within:.2f}", f"{between:.2f}"] for name, (within, between) in scatters.items()
-    ]
-    heads = ["critical values", "between blocks under one motion", "between motions"]
-    found["y-scatter"] = markdown((heads, cells))
-    return found, (sliding, recovery)
+    return found, (sliding, slumps[1])
 
 
 def _ratio_classes(fit: Fitted) -> tuple[tuple[str, tuple[float, ...]], ...]:
@@ -215,10 +197,11 @@ def dependence_table(models: Sequence[ModelRow]) -> str:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
-    options.add_argument("--toppling", help="database of the toppling campaign, if it is another")
+    options.add_argument("--slumping", help="database of the slumping campaign, if it is another")
+    options.add_argument("--suite", help="of the motions of the slumping campaign")
     options.add_argument("--write", action="store_true", help="keep tables, draw the figure")
     chosen = options.parse_args()
-    found, (sliding, slumping) = tables(chosen.database, chosen.toppling)
+    found, (sliding, slumping) = tables(chosen.database, chosen.slumping, chosen.suite)
     kinds = ("sliding", "slumping")
     found["dependence"] = dependence_table([m for m in read_models(REFERENCE) if m.kind in kinds])
     for name, table in found.items():

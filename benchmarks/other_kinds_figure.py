@@ -18,7 +18,7 @@ def plot_other_kinds(
     sliding: FragilityModel, slides: FitData, slumping: FragilityModel, slumps: FitData,
     path: str | PathLike[str],
 ) -> Picture:  # fmt: skip
-    """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
+    """Draw displacements over PGV²/(k_y g) against k_y/PGA, and outcomes by (1 - r)/r and z.
 
     Args:
         sliding: a model on PGV and PGA.
@@ -74,29 +74,26 @@ def _slides(axes: Any, model: FragilityModel, data: FitData) -> None:
 
 
 def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
-    v = data.values
-    r = v["ks"] / v["pga_g"]
-    z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
-    c, b, d, s0 = model.parameters
-    excess = (1.0 - r) / r * v["ks"] ** d
-    for chosen, colour, text in (
-        (~data.observed, "#7fb2d8", "not failed before the model ends"),
-        (data.observed, "#8a8a8a", "fails"),
-    ):
-        axes.plot(z[chosen], excess[chosen], ".", ms=1.8, color=colour, alpha=0.5, rasterized=True)
+    b0, b1, b2, b3 = model.parameters
+    ks, r = data.grid("ks"), data.grid("ks") / data.grid("pga_g")
+    z = data.grid("p") * data.grid("pgv_m_s") / (data.grid("pga_g") * STANDARD_GRAVITY_M_S2)
+    excess = (1.0 - r) / r * ks ** (b3 / b1)
+    for fails, colour, text in ((0.0, "#7fb2d8", "comes to rest"), (1.0, "#8a8a8a", "fails")):
+        chosen = data.failed == fails
+        axes.plot(z[chosen], excess[chosen], ".", ms=1.2, color=colour, alpha=0.3, rasterized=True)
         axes.plot([], [], "o", ms=4, color=colour, label=text)
     grid = np.geomspace(float(z.min()), float(z.max()), 60)
     for side in (-1.645, 0.0, 1.645):
         axes.plot(
-            grid, np.exp(c - b * np.log(grid) + side * np.exp(s0)),
+            grid, np.exp((side - b0 - b2 * np.log(grid)) / b1),
             color="#b2182b", lw=1.0 if side else 1.8, ls="--" if side else "-",
-            label={0.0: "median", 1.645: "5 % and 95 %"}.get(side),
+            label={0.0: "P = 0.5", 1.645: "P = 0.05 and 0.95"}.get(side),
         )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
     written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
     written_numbers(axes.yaxis, 1.0)
     axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
-    axes.set_ylabel(rf"$(1-r)/r\cdot k_s^{{{d:.2f}}}$ at failure, $r=k_s/\mathrm{{PGA}}$")
+    axes.set_ylabel(rf"$(1-r)/r\cdot k_s^{{{b3 / b1:.2f}}}$, $r=k_s/\mathrm{{PGA}}$")
     axes.set_title("slumping past recovery", fontsize=10)
     axes.legend(loc="upper right", fontsize=8, frameon=False)

@@ -80,10 +80,10 @@ MODELS_OF_ALL: tuple[dict[str, Any], ...] = (
     {"kind": "rocking", "term": "pga_sa10"},
     {"kind": "rocking", "term": "pgv"},
     {"kind": "rocking", "term": "sa10"},
+    {"kind": "slumping", "term": "pgv_pga_m", "rotation_deg": None},
     {"kind": "slumping", "term": "pgv_pga", "rotation_deg": None},
-    {"kind": "slumping", "term": "pgv", "rotation_deg": None},
+    {"kind": "slumping", "term": "pgv_pga_m", "rotation_deg": 2.0},
     {"kind": "slumping", "term": "pgv_pga", "rotation_deg": 2.0},
-    {"kind": "slumping", "term": "pgv", "rotation_deg": 2.0},
 )
 """The models that are fitted to the full database: what they read is too much to be shipped."""
 

@@ -101,7 +101,7 @@ def simulate(
             failure past recovery; None for 2 and past recovery.
         displacements_m: sliding: displacements on a level plane [m]; None for 0.01, 0.05, 0.15
             and 0.3.
-        family: slumping: the blocks; None for `rbfrag.campaign.kinds.slumping.FAMILY`.
+        family: slumping: the blocks, as `rbfrag.campaign.kinds.slumping.FAMILY` has them.
         restitution_factors: rocking: factors on the restitution of the rectangle, 1 - 1.5 sin² α
             (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
         vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
@@ -144,10 +144,10 @@ def simulate(
     wanted = _wanted(request.get("grid"), histories, full_map)
     depth = positive(request.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
     if sequence:
-        if vertical != "without" or full_map:
-            one = "full_map" if full_map else "vertical"
+        if vertical != "without":
             raise InputError(
-                f"{one} does not go with sequence: leave one of them out", fields=(one, "sequence")
+                "vertical does not go with sequence: leave one of them out",
+                fields=("vertical", "sequence"),
             )
         return simulate_sequences(
             sequences_of_kind(kind),

@@ -281,7 +281,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
     }
 
 
-_IF_KNOWN = ("median_displacement_m", "unknown_share")
+_IF_KNOWN = ("median_displacement_m",)
 """Keys that are shown without --verbose where they apply."""
 
 
@@ -290,5 +290,5 @@ _OF_POLARITY = (
 )  # fmt: skip
 """Keys that are shown of each polarity."""
 
-_LEFT_OUT = ("y_m_s", "median_displacement_m", "unknown_share", "block_sd")
+_LEFT_OUT = ("y_m_s", "median_displacement_m", "block_sd")
 """Keys that a table leaves out where they do not apply."""

@@ -119,7 +119,8 @@ def combination_table(
         versions = connection.scalars(query.with_only_columns(version).distinct())
         numerics_version = max(versions, key=_age, default=NUMERICS_VERSION)
     query = query.where(version == numerics_version)
-    order = (combination.c.search_limit, combination.c.natural_key)
+    # without a search limit blocks were followed to their end, whatever a search before saw of them
+    order = (combination.c.search_limit.nulls_first(), combination.c.natural_key)
     settings_of = cache(lambda text: stored_json(text, dict, "settings of a combination"))
     rows: dict[tuple[Any, ...], Any] = {}
     for row in connection.execute(query.order_by(*order)).mappings():

@@ -16,7 +16,6 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
-from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE
 
 _SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
 _STRENGTH = (
@@ -45,7 +44,6 @@ _DESCRIPTIONS = {
     },
     "restitution_sigma": ("", "the standard deviation of the restitution, 0 or more"),
     "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
-    "leaves_g": ("g", "the acceleration in g at which the block leaves its back plane"),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
     "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
@@ -126,6 +124,9 @@ class Contradiction(Remark):
 
 
 _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
+
+NOTABLE_SHARE = 0.05
+"""From this share of an uncertain block outside the fitted ranges on an answer says so."""
 
 PARTLY_OUTSIDE = (
     f"{100.0 * NOTABLE_SHARE:g} % or more of what the uncertain block may be lies outside the "
@@ -290,8 +291,6 @@ def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Ite
     if model.method.doubts is not None:
         for holds, name, text in model.method.doubts(model.parameters, values, ns):
             yield Remark(holds, name, values[name], text)
-    for bound in model.method.block.doubts:
-        yield Remark(bound.holds(values), bound.about, values.get(bound.about), bound.text)
     for name, (low, high, text) in CREDIBLE.items():
         if name in values:
             value = values[name]

@@ -201,7 +201,6 @@ class BlockParameters:
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
-        doubts: the combinations that make an answer doubtful.
         safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
             of them safe by mechanics.
         judged_kr: strength up to which fits are judged, where their grid goes on far beyond what
@@ -223,7 +222,6 @@ class BlockParameters:
     fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
-    doubts: tuple[Bound, ...] = ()
     safe_steps: int = 0
     judged_kr: float = math.inf
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"

@@ -16,7 +16,6 @@ from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, Bound, Form, Method, Numbers
 from rbfrag.fragility.methods import method_named, method_names
-from rbfrag.fragility.unknown_outcomes import UnknownOutcomes
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
@@ -77,7 +76,6 @@ class FragilityModel:
         vertical: whether it was fitted with vertical motion.
         notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
-        unknown: how many outcomes that it was fitted to are not known; None where all are.
         data: the database that it is stored in, as people call it; None of a row by itself.
     """
 
@@ -91,7 +89,6 @@ class FragilityModel:
     vertical: bool
     notes: tuple[str, ...] = ()
     spread: Spread | None = None
-    unknown: UnknownOutcomes | None = None
     data: str | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
         default_factory=dict, compare=False, repr=False
@@ -164,7 +161,6 @@ class FragilityModel:
             vertical=row.diagnostics.get("vertical", "without") != "without",
             notes=notes if event_spread is not None else (*notes, NO_EVENT_RANGE),
             spread=stored_spread(row.name, row.diagnostics),
-            unknown=UnknownOutcomes.stored(row.diagnostics, method.block.strength, row.name),
             data=data,
         )
 

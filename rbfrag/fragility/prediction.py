@@ -15,7 +15,6 @@ from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
 from rbfrag.solver.kinds import mode_of_kind
 
 if TYPE_CHECKING:
@@ -54,9 +53,6 @@ class Prediction:
             short pulses where Tm is not known.
         median_displacement_m: the displacement that is exceeded with P = 1/2 [m]; None where the
             kind has none, where the block does not move and where it is uncertain.
-        unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
-            the share that is not known because blocks left their model before they failed; None
-            where all are known.
         block_sd: standard deviation of P over what an uncertain block may be; None where it is
             certain.
         data: the database that the model is of; None of a model that was given itself.
@@ -79,7 +75,6 @@ class Prediction:
     warnings: tuple[str, ...] = ()
     pgv_over_pga_s: float | None = None
     median_displacement_m: float | None = None
-    unknown_share: float | None = None
     block_sd: float | None = None
     data: str | None = field(default=None, compare=False)
 
@@ -242,11 +237,6 @@ def _answer_single(
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
         median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
-    share = None
-    if model.unknown is not None:
-        share = model.unknown.share(values)
-        if share >= NOTABLE_SHARE:
-            warnings = (*warnings, in_words(share))
     return Prediction(
         model.row.kind,
         probability,
@@ -265,7 +255,6 @@ def _answer_single(
         warnings,
         values.get("pgv_over_pga_s"),
         median,
-        share,
         block_sd,
         model.data,
     )
@@ -282,7 +271,7 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
     for bound in model.form.bounds:
         if bound.holds(values):
             return False
-    for bound in (*block.refuses, *block.doubts):
+    for bound in block.refuses:
         if bound.holds(values):
             return False
     if method.doubts is not None and any(

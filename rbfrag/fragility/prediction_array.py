@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Remark, answer_with_findings
+from rbfrag.fragility.checks import NOTABLE_SHARE, Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
-from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.frames import Tabular
 from rbfrag.solver.kinds import KINDS, mode_of_kind
@@ -72,8 +71,6 @@ class PredictionArray(Tabular):
         term: its intensity term.
         method: how it was fitted.
         notes: sentences about the model that hold for every element.
-        unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
-            the share that is not known; None where all are known.
         block_sd: standard deviation of P over what each uncertain block may be; None where all are
             certain.
         data: the database that the model is of; None of a model that was given itself.
@@ -99,7 +96,6 @@ class PredictionArray(Tabular):
     term: str
     method: str
     notes: tuple[str, ...] = ()
-    unknown_share: FloatArray | None = None
     block_sd: FloatArray | None = None
     data: str | None = None
     index: pd.Index | None = None
@@ -163,7 +159,6 @@ class _Columns:
     y: FloatArray
     x: FloatArray
     in_domain: NDArray[np.bool_]
-    unknown: FloatArray | None = None
     block_sd: FloatArray | None = None
 
 
@@ -192,9 +187,8 @@ def predict_many(
     size = int(np.prod(shape))
     ns = arrays()
     p, low, high, event_low, event_high, y, x = np.empty((7, size))
-    unknown = None if model.unknown is None else np.empty(size)
     out = _Columns(
-        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_), unknown,
+        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_),
         np.empty(size) if model.uncertain else None,
     )  # fmt: skip
     reach = quantiles if interval else None
@@ -237,7 +231,6 @@ def predict_many(
         term=model.term.name,
         method=model.method.name,
         notes=model.notes,
-        unknown_share=None if unknown is None else unknown.reshape(shape),
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
@@ -289,7 +282,7 @@ def _answer_part(
     for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
         clear &= values[name] <= most
-    bounds = (*model.bounds(values), *block.refuses, *block.doubts)
+    bounds = (*model.bounds(values), *block.refuses)
     flags = [bound.holds(values) for bound in bounds]
     if method.doubts is not None:
         flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
@@ -297,9 +290,6 @@ def _answer_part(
         clear &= np.logical_not(holds)
     if model.spread is not None:
         clear &= model.spread.holds(values, ns)
-    if model.unknown is not None and out.unknown is not None:
-        out.unknown[part] = share = model.unknown.array(values)
-        clear &= np.logical_not(share >= NOTABLE_SHARE)
     answer = model.answer(values, quantiles, ns, given)
     if answer.outside is not None:
         clear &= answer.outside < NOTABLE_SHARE
@@ -356,8 +346,6 @@ def _answer_with_diagnostics(
     for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
         column[places] = np.where(judgement.missing, np.nan, value)
     out.in_domain[places] = judgement.in_domain
-    if out.unknown is not None:
-        sentences.add(out.unknown[places] >= NOTABLE_SHARE, IN_GENERAL)
     return sentences.texts()
 
 

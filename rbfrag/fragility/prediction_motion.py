@@ -103,7 +103,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
         name: mean(name)
         for name in (
             "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
-            "unknown_share", "block_sd",
+            "block_sd",
         )
     }  # fmt: skip
     return MotionPrediction(

@@ -20,7 +20,7 @@ from rbfrag.question.many import OF_ALL, many_blocks
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
-    "unknown_share", "block_sd",
+    "block_sd",
 )  # fmt: skip
 
 
@@ -196,7 +196,7 @@ def _together(
     columns: dict[str, Any] = {}
     for name in _COLUMNS:
         known = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
-        if known or name not in ("unknown_share", "block_sd"):
+        if known or name != "block_sd":
             columns[name] = column = np.full(size, np.nan)
             for at, value in known:
                 column[at] = value

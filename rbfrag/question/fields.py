@@ -188,12 +188,6 @@ class NumberFields(TypedDict, Generic[V], total=False):
     ps2: Annotated[
         V, Field("Slumping: frequency parameter p_s² at rest", "1/s²", (), "ps2_1_s2", above=0.0)
     ]
-    leaves_g: Annotated[
-        V,
-        Field(
-            "Slumping: acceleration at which the block leaves its back plane", "g", word="leaves_g"
-        ),
-    ]
 
 
 class FailureFields(TypedDict, Generic[V], total=False):

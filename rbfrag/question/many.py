@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
-from rbfrag.fragility.measures import HIGHEST
 from rbfrag.question.blocks import (
     NUMBERS,
     Blocks,
@@ -44,7 +43,7 @@ from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
 from rbfrag.solver.stability.modes import MODES, words_of_mode
 
-_IF_EMPTY = {"beta_deg": 0.0, "leaves_g": HIGHEST}
+_IF_EMPTY = {"beta_deg": 0.0}
 """What an option stands for that is not stated: a level base, and a back plane never left."""
 
 OF_ALL = ("back_fracture", *BOND)

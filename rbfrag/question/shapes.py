@@ -11,7 +11,6 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import HIGHEST
 from rbfrag.question.fields import PlaneFields, column_of, declared, names_of
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
@@ -310,15 +309,10 @@ def numbers_of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[s
             model_of_mode(judged.mode), body, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
             phi_back_deg=judged.phi_back_deg,
         )  # fmt: skip
-        return _leaving(shaken.p2, shaken.leaves_g, functions)
-    ps2, leaves_g = slump_at_rest(
+        return {"ps2": shaken.p2}
+    ps2 = slump_at_rest(
         alpha1_deg=body.alpha1_deg, alpha3_deg=body.alpha3_deg, gamma_deg=body.gamma_deg,
         r1_m=body.r1_m, r3_m=body.r3_m, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
         phi_back_deg=judged.phi_back_deg, functions=functions, trigonometry=trigonometry,
     )  # fmt: skip
-    return _leaving(ps2, leaves_g, functions)
-
-
-def _leaving(ps2: Any, leaves_g: Any, functions: Elementwise[Any]) -> dict[str, Any]:
-    # where no k_h opens a contact the model holds as far as numbers go
-    return {"ps2": ps2, "leaves_g": functions.where(leaves_g < HIGHEST, leaves_g, HIGHEST)}
+    return {"ps2": ps2}

@@ -262,7 +262,9 @@ def _other_modes(
             "models of sliding and slumping read PGV: give pgv_m_s too", fields=("pgv_m_s",)
         )
     motion: dict[str, Any] = {
-        name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
+        name: measures[name]
+        for name in ("pgv_m_s", "pga_g", "arias_m_s", "magnitude")
+        if name in measures
     }
     k, beta_deg = realisations.stability.yield_acceleration, realisations.beta_deg
     with np.errstate(all="ignore"):

@@ -3,8 +3,7 @@ block's mechanism at rest."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
@@ -21,12 +20,9 @@ class MechanismKind(Kind):
     """A kind that states a mechanism; the engine for one degree of freedom runs it.
 
     Attributes:
-        one_phase: whether searches and campaigns end with the first phase of its mechanism: what
-            they know of its blocks holds while their contacts do.
         yield_name: symbol of its yield acceleration.
     """
 
-    one_phase = False
     yield_name = "k"
     carries_state = True
 
@@ -83,8 +79,6 @@ class ShakenMechanism:
         yield_name: symbol of the yield acceleration.
         yield_g: acceleration that starts it where 1 + k_v = 1 [g].
         p2: frequency parameter p_s² at rest [1/s²].
-        leaves_g: k_h at which a contact opens as the motion starts [g]; infinite where none does.
-        most_rad: rotation at which the model ends whatever the motion [rad].
         remarks: what is known about the block that an answer should say.
     """
 
@@ -93,8 +87,6 @@ class ShakenMechanism:
     yield_name: str
     yield_g: float
     p2: float
-    leaves_g: float
-    most_rad: float
     remarks: tuple[str, ...]
     site: BlockOnPlanes
 
@@ -134,7 +126,6 @@ def shaken_mechanism(
         )
     site = BlockOnPlanes.of(block, judged, judged.mode, {})
     mechanism = model.mechanism(site)
-    mechanism = replace(mechanism, goes_on=mechanism.goes_on and not model.one_phase)
     equation = mechanism.first.forward
     return ShakenMechanism(
         kind=model.kind,
@@ -142,19 +133,6 @@ def shaken_mechanism(
         yield_name=model.yield_name,
         yield_g=equation.threshold(0.0),
         p2=equation.driving(0.0) / equation.inertia(0.0),
-        leaves_g=_leaves_g(mechanism),
-        most_rad=mechanism.first.highest if model.one_phase else math.inf,
         remarks=judged.warnings,
         site=site,
     )
-
-
-def _leaves_g(mechanism: Mechanism) -> float:
-    """Return the least k_h above the yield at which a contact opens at rest."""
-    leaves = math.inf
-    for condition in mechanism.first.forward.conditions:
-        per_k_h, per_w = condition.per_k_h(0.0), condition.per_w(0.0)
-        # a force that k_h only strengthens opens no contact
-        if per_k_h < 0.0:
-            leaves = min(leaves, -per_w / per_k_h)
-    return leaves

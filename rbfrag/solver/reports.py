@@ -222,5 +222,4 @@ def _scaled(result: CriticalResult) -> dict[str, Any]:
         "y_m_s": y_m_s,
         its["yield_name"]: its["yield_g"],
         "ps2": result.p2,
-        "leaves_g": finite_or_none(its["leaves_g"]),
     }

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.other_kinds import RATIOS, class_lines, dependence_table, within_motion
+from benchmarks.other_kinds import RATIOS, class_lines, coefficient_lines, dependence_table
 from benchmarks.other_kinds_figure import plot_other_kinds
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.fitting import fit_source
@@ -44,13 +44,15 @@ def test_classes_are_judged_by_their_own_outcomes() -> None:
     assert float(whole[0][4]) == pytest.approx(fit.data.failed.mean(), abs=5e-4)
 
 
-def test_scatter_is_parted_between_blocks_and_motions() -> None:
-    rng = np.random.default_rng(2)
-    group = np.repeat(np.arange(2000), 6)
-    residual = rng.normal(0.0, 0.3, 2000)[group] + rng.normal(0.0, 0.1, group.size)
-    within, between = within_motion(residual, group)
-    assert within == pytest.approx(0.1, rel=0.05)
-    assert between == pytest.approx(np.hypot(0.3, 0.1 / np.sqrt(6.0)), rel=0.05)
+def test_coefficients_stand_below_their_names() -> None:
+    fits = [
+        fit_source(drawn("slumping", term, 400), TERMS[term], METHOD_OF["slumping"])
+        for term in ("pgv_pga_m", "pgv_pga")
+    ]
+    lines = [line.split("|") for line in coefficient_lines(fits).splitlines()]
+    assert lines[0][6].strip() == "`b_m`"
+    assert float(lines[2][6].partition("±")[0]) == pytest.approx(0.5, abs=0.4)
+    assert not lines[3][6].strip()
 
 
 def test_what_an_earthquake_may_do_stands_beside_what_its_blocks_share() -> None:

@@ -234,12 +234,12 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert (second["probability"], second["reason"]) == ("1", "unstable")
     assert "mode is topple, and p2 is missing" in third["reason"]
-    source.write_text("ks,ps2_1_s2,pgv_m_s\n0.1,3,0.5\n")
+    source.write_text("ks,ps2_1_s2,pgv_m_s,pga_g\n0.1,3,0.5,0.6\n")
     told = predict_table(
         source, target, given={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
     )
-    assert told["model"] == "slumping-2deg-pgv"
-    expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, db=str(REFERENCE))
+    assert told["model"] == "slumping-2deg-pgv_pga"
+    expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, pga_g=0.6, db=str(REFERENCE))
     (row,) = rows_of(target)
     assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     source.write_text("ky,pgv_m_s\n0.1,0.5\n")

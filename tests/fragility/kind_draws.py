@@ -1,8 +1,6 @@
-"""Blocks that slide or slump exactly as a formula says, some of them censored."""
+"""Blocks that slide or slump exactly as a formula says; slides of less than 1 mm are censored."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +15,14 @@ from tests.synthetic import unknown_spectrum
 
 TRUE = {
     ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
-    ("slumping", "pgv_pga"): (-0.7, 0.9, 0.4, -0.9),
-    ("slumping", "pgv"): (0.3, 0.9, -0.9),
+    ("slumping", "pgv_pga_m"): (1.2, 3.0, 2.5, 1.2, 0.5),
+    ("slumping", "pgv_pga"): (1.2, 3.0, 2.5, 1.2),
 }
 METHOD_OF = {"sliding": method_named("displacement"), "slumping": method_named("capacity")}
 
 
 def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
-    """Return combinations, each with one block that slides or with its critical scale."""
+    """Return combinations, each with one block that slides, or one under six scaled records."""
     rng = np.random.default_rng(seed)
     event = np.sort(rng.integers(0, 20, n))
     pulse = np.exp(rng.normal(-2.5, 0.5, n))
@@ -46,23 +44,23 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
             _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan)),
             np.full(n, np.nan), k[:, None], np.full((n, 1), np.nan), slid[:, None],
         )  # fmt: skip
-    c, b, *d, s0 = TRUE[kind, term]
     ks, ps2 = np.exp(rng.normal(-1.5, 0.4, n)), np.exp(rng.normal(1.0, 0.8, n))
-    if term == "pgv_pga":
-        line = c - b * np.log(np.sqrt(ps2) * pulse) - d[0] * np.log(ks)
-        excess = np.exp(line + math.exp(s0) * z)
-        failing = ks * (1.0 + excess)
-    else:
-        y = ks * STANDARD_GRAVITY_M_S2 / np.sqrt(ps2)
-        pgv = np.exp(c + b * np.log(y) + math.exp(s0) * z)
-        failing = pgv / (pulse * STANDARD_GRAVITY_M_S2)
-    limit = rng.uniform(0.05, 0.2, n)
-    found = failing < ks / limit
     pga = np.exp(rng.normal(-1.5, 0.6, n))
-    ratio = np.where(found, ks / failing, np.nan)
-    table = _table(event, pga, pulse * pga * STANDARD_GRAVITY_M_S2, found, ratio, ps2, limit, ks)
-    nothing = np.empty((n, 0))
-    return FitSource(table, np.full(n, np.nan), nothing, nothing)
+    magnitude = rng.uniform(5.5, 7.8, 20)[event]
+    ratio = np.tile(np.geomspace(0.02, 0.95, 6), (n, 1))
+    scaled = ks[:, None] / ratio
+    values = {
+        "ks": ks[:, None],
+        "p": np.sqrt(ps2)[:, None],
+        "pga_g": scaled,
+        "pgv_m_s": scaled * (pulse * STANDARD_GRAVITY_M_S2)[:, None],
+        "magnitude": magnitude[:, None],
+    }
+    eta = METHOD_OF[kind].forms[term].eta(TRUE[kind, term], values, arrays()).eta
+    failed = (eta > rng.standard_normal(eta.shape)).astype(float)
+    pgv = pulse * pga * STANDARD_GRAVITY_M_S2
+    table = _table(event, pga, pgv, found & False, np.full(n, np.nan), ps2, ks, magnitude)
+    return FitSource(table, np.full(n, np.nan), ratio, failed)
 
 
 def _table(
@@ -72,8 +70,8 @@ def _table(
     found: NDArray[np.bool_],
     k_over_pga: NDArray[np.float64],
     p2: NDArray[np.float64],
-    limit: NDArray[np.float64] | None = None,
     yield_g: NDArray[np.float64] | None = None,
+    magnitude: NDArray[np.float64] | None = None,
 ) -> CombinationTable:
     n = event.size
     none = np.full(n, np.nan)
@@ -84,8 +82,8 @@ def _table(
         event_guessed=np.zeros(n, dtype=bool),
         polarity=np.full(n, "forward", dtype=object),
         p2=p2,
-        status=np.where(found, "found", "below_limit").astype(object),
-        search_limit=np.full(n, 0.01) if limit is None else limit,
+        status=np.where(found, "found", "not_searched").astype(object),
+        search_limit=np.full(n, 0.01),
         kr_over_pga=k_over_pga,
         upper=np.full(len(p2), np.nan),
         kr=k_over_pga * pga,
@@ -98,5 +96,5 @@ def _table(
         block=np.full(n, None, dtype=object),
         yield_g=none if yield_g is None else yield_g,
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(n),
+        **(unknown_spectrum(n) | ({} if magnitude is None else {"magnitude": magnitude})),
     )

@@ -59,8 +59,9 @@ def fit(
     ),
     data: Data,
     kind: str = option(
-        "What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; rocking "
-        "(free-standing), also on sa10 and pga_sa10; or another kind that campaigns store.",
+        "What the blocks do: toppling; sliding, on the terms pgv and pgv_pga; slumping, on "
+        "pgv_pga and pgv_pga_m (with magnitude); rocking (free-standing), also on sa10 and "
+        "pga_sa10; or another kind that campaigns store.",
         "toppling",
     ),
     rotation: float | None = option(

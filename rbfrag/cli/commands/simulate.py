@@ -96,7 +96,7 @@ class StorageOptions:
         metavar="without|with|both",
     )
     full_map: bool = option(
-        "Toppling and slumping: store the intervals of strength that fail and that do not, too.",
+        "Toppling: store the intervals of strength that fail and that do not, too.",
         False,
         word="--map",
     )
@@ -128,9 +128,10 @@ def simulate(
 
     A combination is a motion, without or with its vertical one, in one polarity, and a block. Of
     toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
-    slumping, the factor on each record that brings each block of a documented family down; with
-    --kind sliding, the strengths that slide stated displacements; with --kind rocking, the outcomes
-    of a grid of free-standing blocks, which have no critical one, in one polarity.
+    slumping, the outcomes of a documented family of blocks under scaled records, each followed to
+    its end; with --kind sliding, the strengths that slide stated displacements; with --kind
+    rocking, the outcomes of a grid of free-standing blocks, which have no critical one, in one
+    polarity.
 
     With --sequence, sliding and slumping blocks under two motions, the second of which finds them
     where the first has left them: two shocks of one station where the metadata state them, and each

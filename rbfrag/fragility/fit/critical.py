@@ -7,12 +7,10 @@ method's formula states.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit.censoring import score_bounds, unknown_shares
 from rbfrag.fragility.fit.clusters import bootstrap, jackknife_steps, left_out, sandwich
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.likelihood import (
@@ -30,13 +28,6 @@ from rbfrag.solver.results import FloatArray
 
 REPLICATES = 400
 _LN_SIGMA = "ln_sigma"
-_SCORES = (
-    ("in_sample_log_loss", "log_loss_in_sample"),
-    ("held_out_log_loss", "log_loss_held_out"),
-    ("held_out_brier", "brier_held_out"),
-    ("calibration_slope", "calibration_slope_held_out"),
-)
-"""What reports of these models have called their scores, beside the names of all."""
 
 
 def fit_lognormal(
@@ -146,39 +137,7 @@ def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> Met
     for event, part in others.items():
         here = data.event == event
         held_out[here] = probabilities(method, form, data, part)[here]
-    unknown, warnings = _unknown(data, method, term) if data.weights is not None else ({}, [])
-    result = method_result(
-        data, estimates, in_sample, held_out, scores=_bounds(data, held_out), details=unknown,
-        warnings=warnings,
-    )  # fmt: skip
-    aliases = {name: result.scores[score] for name, score in _SCORES if score in result.scores}
-    return replace(result, scores={**result.scores, **aliases})
-
-
-def _unknown(data: FitData, method: Method, term: Term) -> tuple[dict[str, object], list[str]]:
-    """Return how many outcomes are not known, where, and what is to be said of it."""
-    k, known = data.grid(method.block.strength), np.isfinite(data.failed)
-    if "pga_g" in term.inputs:
-        variable, ratio = "k_over_pga", k / data.grid("pga_g")
-    else:
-        variable, ratio = "y_over_intensity", data.grid("y_m_s") / data.grid("intensity_m_s")
-    share = float(np.mean(~known[data.read]))
-    warnings = [
-        f"{100 * np.mean(~data.observed):.0f} % of the blocks leave their back plane, or stay, "
-        "before they fail: they count as failing under stronger motions than those, and "
-        f"{100 * share:.0f} % of the outcomes are not known"
-    ]
-    curves = unknown_shares(variable, ratio, data.values[method.block.strength], known)
-    return {"unknown_outcomes": {"share": share, **curves}}, warnings
-
-
-def _bounds(data: FitData, held_out: FloatArray) -> dict[str, float]:
-    if data.weights is None:
-        return {}
-    known = np.isfinite(data.failed)
-    every = replace(data.judged, known=known, failed=np.where(known, data.failed, 0.0))
-    low, high = score_bounds(every, held_out, data.read)
-    return {"log_loss_held_out_least": low, "log_loss_held_out_most": high}
+    return method_result(data, estimates, in_sample, held_out)
 
 
 def censored_rows(data: FitData, form: Form) -> CensoredNormal:

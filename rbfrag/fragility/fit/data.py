@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.db.rows import CombinationTable, Selection
 from rbfrag.errors import FitError
 from rbfrag.fragility.domain import INSIDE
-from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
 from rbfrag.fragility.measures import STATED, Term
@@ -44,9 +43,6 @@ REAL_KR = 0.05
 Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
 """The grid of blocks that fits are judged on, as y0/PGV, from `KR[0]` on. They also read the weaker
 ones that are stored, and safe ones above, nearly all of which are decided where PGV is known."""
-
-K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
-"""The same of blocks that the record is scaled to."""
 
 LEAST_DISPLACEMENT_M = 1e-3
 """Displacements below this count as less than it, whether zero or not: their scatter is another."""
@@ -210,8 +206,6 @@ class FitData:
         n_outside_model: combinations for which the block model does not apply.
         guessed_events: number of earthquakes read off file headers.
         fingerprint: hash of natural keys and fitted values.
-        weights: what each outcome counts where it is judged, shape (n, m), so that those known
-            stand for those not known; None: each the same.
         sensitive: whether the outcomes are sensitive to the motion's last digits, shape (n, m);
             None where that is stored of none.
         least_y_m_s: of censored rows whose critical value lies between two ends the lower one
@@ -238,7 +232,6 @@ class FitData:
     n_outside_model: int = 0
     guessed_events: int = 0
     fingerprint: str = ""
-    weights: FloatArray | None = None
     sensitive: FloatArray | None = None
     least_y_m_s: FloatArray | None = None
 
@@ -275,10 +268,8 @@ class FitData:
     def judged(self) -> ScoredBlocks:
         """What the fit is judged on."""
         known = np.isfinite(self.failed) & self.scored
-        if self.weights is not None:
-            known &= self.weights > 0.0
         failed = np.where(known, self.failed, 0.0)
-        return ScoredBlocks(failed, known, self.event, self.outcomes, self.weights)
+        return ScoredBlocks(failed, known, self.event, self.outcomes)
 
     @property
     def judged_real(self) -> ScoredBlocks | None:
@@ -307,7 +298,6 @@ class _Points:
     read: NDArray[np.bool_]
     outcomes: str
     ranges: dict[str, FloatArray]
-    weights: FloatArray | None = None
     scored: NDArray[np.bool_] | None = None
     sensitive: FloatArray | None = None
     least_y_m_s: FloatArray | None = None
@@ -377,7 +367,6 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             np.where(points.read[chosen], failed, np.nan),
             of_outcomes,
         ),
-        weights=None if points.weights is None else points.weights[chosen],
         sensitive=None if points.sensitive is None else points.sensitive[chosen],
         least_y_m_s=least,
     )
@@ -542,50 +531,41 @@ def _with_safe_blocks(source: FitSource, steps: int) -> FitSource:
 
 
 def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the points of blocks of known strength and size under scaled records.
-
-    A block that fails under a scale of the record counts as failing under all greater ones, also
-    where the model would end before: P is that of failing at this shaking or at weaker.
-    """
-    table = source.table
+    """Return the outcomes of stored blocks, which were followed to their end, by scaled record."""
+    table, k = source.table, source.k_over_pga
     strength = table.yield_g
     if not np.isfinite(strength).all():
         raise FitError("a stored block has no yield acceleration: run  rbfrag db check")
-    observed = table.status == "found"
-    known = (observed | (table.status == "below_limit")) & (table.pgv_m_s > 0.0)
-    ratio = np.where(observed, table.kr_over_pga, table.search_limit)
-    per_pga = np.where(table.pga_g > 0.0, table.pgv_m_s, np.nan) / table.pga_g
     size = np.sqrt(table.p2)
     block = {method.block.strength: strength, str(method.block.size): table.p2, "p": size}
     block["y_m_s"] = strength * STANDARD_GRAVITY_M_S2 / size
-    stored = source.k_over_pga
-    k = stored if stored.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
-    usable = known & (ratio < 1.0)
-    failed, decided = critical_outcomes(ratio, observed, k)
-    weights = np.zeros(k.shape)
-    weights[usable] = censoring_weights(*(part[usable] for part in (ratio, observed, k, strength)))
-
-    def shaking(k: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, FloatArray]:
-        # the scaled record: its PGA is k over the ratio, and PGV goes with it
-        of_record = {"pga_g": strength / k, "pgv_m_s": strength / k * per_pga}
-        return {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
-
+    measures = _measures(source)
+    of_record = {name: measures[name] for name in term.inputs}
+    defined = np.isfinite(np.column_stack([*of_record.values()])).all(axis=1)
+    # PGA of the scaled record is k over the ratio; what is no acceleration or velocity stays
+    pga = strength[:, None] / k
+    scale = pga / np.where(table.pga_g > 0.0, table.pga_g, np.nan)[:, None]
+    scaled = {name: value[:, None] * scale for name, value in of_record.items()}
+    if "magnitude" in scaled:
+        scaled["magnitude"] = of_record["magnitude"][:, None]
+    unscaled = {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
     return _Points(
-        values={**shaking(ratio, strength, per_pga), **block},
-        observed=observed,
-        usable=usable,
-        combination=np.arange(ratio.size),
-        order=np.zeros(ratio.size),
-        blocks={**shaking(k, strength[:, None], per_pga[:, None]), **_column(block)},
-        failed=np.where(decided, failed, np.nan),
+        values={**unscaled, **block, "y_m_s": np.full(size.size, np.nan)},
+        observed=np.zeros(size.size, dtype=np.bool_),
+        # a searched one ended where the block lost a contact
+        usable=(table.status == "not_searched") & defined & (table.pgv_m_s > 0.0),
+        combination=np.arange(size.size),
+        order=np.zeros(size.size),
+        blocks={**scaled, "intensity_m_s": term.intensity_m_s(scaled), **_column(block)},
+        failed=source.failed,
         read=np.isfinite(k),
-        outcomes="critical values, weighted for those that are not known",
-        weights=weights,
+        outcomes="simulated outcomes",
         ranges={
-            **ratio_columns({**_measures(source), "p": size}),
+            **ratio_columns({**measures, "p": size}),
+            **{name: of_record[name] for name in term.inputs if name == "magnitude"},
             str(method.block.size): table.p2,
             "y_m_s": block["y_m_s"],
-            "k_over_pga": np.column_stack([ratio, np.ones(ratio.size)]),
+            "k_over_pga": np.column_stack([k, np.ones(size.size)]),
         },
     )
 

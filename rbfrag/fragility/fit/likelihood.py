@@ -317,7 +317,7 @@ def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArr
     from statsmodels.genmod.families import links
     from statsmodels.tools.sm_exceptions import DomainWarning, SpecificationWarning
 
-    theirs: Any = {"logit": links.Logit, "loglog": links.LogLog}
+    theirs: Any = {"logit": links.Logit, "loglog": links.LogLog, "normal": links.Probit}
     start = most_likely(rows)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DomainWarning)

@@ -33,20 +33,12 @@ class ScoredBlocks:
         known: where the outcome is known.
         event: number of each row's earthquake, shape (n,).
         source: where the outcomes come from.
-        weights: what each known outcome counts, shape (n, m); None: each the same.
     """
 
     failed: FloatArray
     known: Mask
     event: NDArray[np.intp]
     source: str
-    weights: FloatArray | None = None
-
-    @property
-    def counts(self) -> FloatArray:
-        """What each outcome counts, 0 where it is not known, shape (n, m)."""
-        known = self.known.astype(np.float64)
-        return known if self.weights is None else known * self.weights
 
 
 def critical_outcomes(
@@ -64,29 +56,20 @@ def critical_outcomes(
     return (reached & observed[:, None]).astype(np.float64), known
 
 
-def log_loss(
-    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
-) -> float:
-    """Return the mean log loss of the known outcomes; `weights` None for equal ones."""
+def log_loss(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
+    """Return the mean log loss of the known outcomes."""
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
-    hit = outcome[known] > 0.0
-    return _mean(-np.log(np.where(hit, p, 1.0 - p)), known, weights)
+    return float(-np.log(np.where(outcome[known] > 0.0, p, 1.0 - p)).mean())
 
 
-def brier(
-    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
-) -> float:
+def brier(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
     """Return the Brier score, the mean squared error of the probability."""
-    return _mean((probability[known] - outcome[known]) ** 2, known, weights)
+    return float(((probability[known] - outcome[known]) ** 2).mean())
 
 
-def sharpness(probability: FloatArray, known: Mask, weights: FloatArray | None = None) -> float:
+def sharpness(probability: FloatArray, known: Mask) -> float:
     """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
-    return _mean(probability[known] * (1.0 - probability[known]), known, weights)
-
-
-def _mean(values: FloatArray, known: Mask, weights: FloatArray | None) -> float:
-    return float(np.mean(values) if weights is None else np.average(values, weights=weights[known]))
+    return float((probability[known] * (1.0 - probability[known])).mean())
 
 
 @dataclass(frozen=True)
@@ -102,16 +85,13 @@ class Calibration:
     slope: float
 
 
-def calibration(
-    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
-) -> Calibration:
+def calibration(probability: FloatArray, outcome: FloatArray, known: Mask) -> Calibration:
     """Return intercept and slope of the outcomes on the clipped logit of the probability.
 
     Args:
         probability: predicted, shape (n, m).
         outcome: 0 or 1, same shape.
         known: where the outcome is known.
-        weights: weight of each element, same shape; None for equal ones.
     """
     from statsmodels.genmod.families import Binomial
     from statsmodels.genmod.generalized_linear_model import GLM
@@ -119,12 +99,11 @@ def calibration(
 
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     x, t = np.log(p / (1.0 - p)), outcome[known]
-    w = np.ones(x.size) if weights is None else weights[known]
     hits, misses = x[t > 0.5], x[t <= 0.5]
     if not (hits.size and misses.size) or hits.min() > misses.max() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
     columns = np.column_stack([np.ones(x.size), x])
-    model = GLM(t, columns, family=Binomial(), var_weights=w)
+    model = GLM(t, columns, family=Binomial())
     with warnings.catch_warnings():
         # said of good models, whose slope is finite
         warnings.simplefilter("ignore", PerfectSeparationWarning)
@@ -141,7 +120,7 @@ def scores_of(
         in_sample: probabilities by the fit to all data, shape (n, m).
         held_out: probabilities by fits without the earthquake concerned.
     """
-    outcomes = judged.failed, judged.known, judged.weights
+    outcomes = judged.failed, judged.known
     line = calibration(held_out, *outcomes)
     result = {
         "log_loss_in_sample": log_loss(in_sample, *outcomes),
@@ -150,7 +129,7 @@ def scores_of(
         "brier_held_out": brier(held_out, *outcomes),
         "calibration_slope_held_out": line.slope,
         "calibration_intercept_held_out": line.intercept,
-        "sharpness_held_out": sharpness(held_out, judged.known, judged.weights),
+        "sharpness_held_out": sharpness(held_out, judged.known),
     }
     return {name: value for name, value in result.items() if np.isfinite(value)}
 
@@ -162,8 +141,7 @@ def score_intervals(
     random = np.random.default_rng(seed)
     g = int(judged.event.max()) + 1
     drawn = random.multinomial(g, np.full(g, 1.0 / g), size=RESAMPLES).astype(np.float64)
-    counts = judged.counts
-    count = np.bincount(judged.event, counts.sum(axis=1), minlength=g)
+    count = np.bincount(judged.event, judged.known.sum(axis=1), minlength=g)
     p = np.clip(held_out, CLIP, 1.0 - CLIP)
     losses = {
         "log_loss_held_out": -np.where(judged.failed > 0.5, np.log(p), np.log1p(-p)),
@@ -171,7 +149,7 @@ def score_intervals(
     }
     result = {}
     for name, loss in losses.items():
-        lost = (counts * loss).sum(axis=1)
+        lost = np.where(judged.known, loss, 0.0).sum(axis=1)
         means = (drawn @ np.bincount(judged.event, lost, minlength=g)) / np.maximum(
             drawn @ count, 1.0
         )
@@ -216,7 +194,7 @@ def calibration_bins(
     """
     used = judged.known & np.isfinite(held_out)
     event = np.broadcast_to(judged.event[:, None], held_out.shape)[used]
-    p, failed, counts = held_out[used], judged.failed[used], judged.counts[used]
+    p, failed = held_out[used], judged.failed[used]
     number = np.clip(np.searchsorted(EDGES, p, side="right") - 1, 0, EDGES.size - 2)
     events, which = np.unique(event, return_inverse=True)
     shape = (events.size, EDGES.size - 1)
@@ -226,7 +204,7 @@ def calibration_bins(
         counted = np.bincount(cell, weights, minlength=shape[0] * shape[1])
         return counted.reshape(shape).astype(np.float64)
 
-    count, failures, expected = table(counts), table(counts * failed), table(counts * p)
+    count, failures, expected = table(None), table(failed), table(p)
 
     def failed_fraction(chosen: NDArray[np.int64]) -> FloatArray:
         total = count[chosen].sum(axis=0)
@@ -240,15 +218,15 @@ def calibration_bins(
     draws = [
         failed_fraction(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)
     ]
-    total, number_of = count.sum(axis=0), table(None).sum(axis=0)
-    kept = number_of >= FEWEST_BLOCKS
+    total = count.sum(axis=0)
+    kept = total >= FEWEST_BLOCKS
     low, high = np.nanquantile(np.array(draws)[:, kept], (0.025, 0.975), axis=0)
     return CalibrationBins(
         predicted=expected.sum(axis=0)[kept] / total[kept],
         observed=failures.sum(axis=0)[kept] / total[kept],
         low=low,
         high=high,
-        blocks=number_of[kept].astype(np.intp),
+        blocks=total[kept].astype(np.intp),
         events=int(events.size),
     )
 

@@ -1,12 +1,12 @@
-"""The method ``capacity``: the strength of shaking at which a slumping block fails, lognormal.
+"""The method ``capacity``: what slumping blocks did under scaled records, probit.
 
-With r = k_s/PGA and z = p_s PGV/(PGA g), and where PGA is not known with y = k_s g/p_s:
+    P = Φ(eta), 0 from r = 1 on
 
-    eta = [ln((1 - r)/r) - c + b ln z + d ln k_s]/σ,    eta = [ln PGV - c - b ln y]/σ,    ln σ = s0
+    pgv_pga_m   eta = b0 + b1 ln((1 - r)/r) + b2 ln z + b3 ln k_s + b4 (M - 6.5)
+    pgv_pga     the same without M
 
-P = Φ(eta): the PGV at which a block fails, and its PGA, scatter about a line in ln z and ln k_s, or
-in ln y. With PGA known P falls with k_s where d < 1, which is all that is fitted: the slope of eta
-by ln k_s is d - 1/(1 - r) times 1/σ.
+r = k_s/PGA, z = p_s PGV/(PGA g). P falls with k_s where b3 < b1: the slope of eta by ln k_s is
+b3 - b1/(1 - r). It rises where all measures rise together: z stays and r falls.
 """
 
 from __future__ import annotations
@@ -15,8 +15,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits
-from rbfrag.fragility.method import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
+from rbfrag.fragility.method import (
+    NORMAL,
+    BlockParameters,
+    Bound,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+    linear,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+MIDDLE_MAGNITUDE = 6.5
 
 BLOCK = BlockParameters(
     ("ks", "ps2"),
@@ -30,33 +41,19 @@ BLOCK = BlockParameters(
     ),
     criterion="rotation_deg",
     points="scaled_records",
-    options=("leaves_g",),
-    doubts=(
-        Bound(
-            lambda v: "leaves_g" in v and "pga_g" in v and v["pga_g"] > v["leaves_g"],
-            "pga_g",
-            "is above leaves_g, at which the block leaves its back plane: the model takes it to "
-            "stay there",
-        ),
-    ),
 )
 """Blocks known by the yield acceleration coefficient k_s and p_s² at rest [1/s²]."""
 
 
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     r = v["ks"] / v["pga_g"]
-    z = ns.log(v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    per = ns.exp(-b[3])
-    strength = ns.log(v["ks"])
-    eta = (ns.log((1.0 - r) / r) - b[0] + b[1] * z + b[2] * strength) * per
-    return Eta(eta, (-per, z * per, strength * per, -eta), b[3], (0.0, 0.0, 0.0, 1.0))
+    z = v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
+    return linear(b, 1.0, ns.log((1.0 - r) / r), ns.log(z), ns.log(v["ks"]))
 
 
-def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    log_y = ns.log(v["y_m_s"])
-    per = ns.exp(-b[2])
-    eta = (ns.log(v["pgv_m_s"]) - b[0] - b[1] * log_y) * per
-    return Eta(eta, (-per, -log_y * per, -eta), b[2], (0.0, 0.0, 1.0))
+def _pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    features = _pgv_pga(b, v, ns).slopes
+    return linear(b, *features, v["magnitude"] - MIDDLE_MAGNITUDE)
 
 
 def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
@@ -65,18 +62,18 @@ def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
     return f"a rotation of {rotation:g} degrees or failure past recovery"
 
 
+_PARAMETERS = ("b0", "b_ln_excess", "b_ln_z", "b_ln_k")
+
 METHOD = Method(
     name="capacity",
     block=BLOCK,
     link=NORMAL,
     forms={
-        "pgv_pga": Form(
-            ("c", "b", "d", "s0"), _pgv_pga, 0, (BLOCK.at_rest,), (-0.5, 0.8, 0.4, -1.0)
-        ),
-        "pgv": Form(("c", "b", "s0"), _pgv, 0, (), (0.0, 1.0, -1.0)),
+        "pgv_pga_m": Form((*_PARAMETERS, "b_m"), _pgv_pga_m, 0, (BLOCK.at_rest,)),
+        "pgv_pga": Form(_PARAMETERS, _pgv_pga, 0, (BLOCK.at_rest,)),
     },
-    reads="critical",
+    reads="outcomes",
     meaning="probability that the block slumps past recovery, or by the rotation asked for",
-    fit=fits.censored,
+    fit=fits.outcomes,
     failure=_failure,
 )

@@ -142,7 +142,6 @@ class Slumping(ScaledKind):
     """The slumping model."""
 
     yield_name = "ks"
-    one_phase = True
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
         """Return the slumping block."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -190,8 +189,7 @@ class ScaledKind(MechanismKind):
         )
         shaken = shaken_mechanism(self, options.pop("block"), **options)
         shaking = Shaking(motion, vertical, polarity)
-        (result,) = critical_scales(shaking, shaken, [rotation_deg], rules)
-        return result
+        return critical_scale(shaking, shaken, rotation_deg, rules)
 
 
 class ScanRules(NamedTuple):
@@ -222,49 +220,33 @@ def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRu
     return ScanRules(limit, ratio, positive(bracket, "bracket", "a width over the scale"))
 
 
-def critical_scales(
-    shaking: Shaking,
-    shaken: ShakenMechanism,
-    rotations_deg: Sequence[float | None],
-    rules: ScanRules,
-) -> tuple[CriticalResult, ...]:
-    """Return the smallest factors on a record that turn a block so far; they share their runs.
+def critical_scale(
+    shaking: Shaking, shaken: ShakenMechanism, rotation_deg: float | None, rules: ScanRules
+) -> CriticalResult:
+    """Return the smallest factor on a record that turns a block so far.
 
     Args:
         shaking: the motion; its vertical component is scaled with the horizontal one.
-        rotations_deg: peak rotations that count as failure [deg]; None among them for failure
-            past recovery.
+        rotation_deg: peak rotation that counts as failure [deg]; None for failure past recovery.
         rules: how far and how finely the scales are looked at.
 
     Raises:
         InputError: a rotation outside its range.
     """
-    failures_rad = [rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
+    fails_rad = rotation_rad(rotation_deg)
     excited = shaking.excitation
     pga_g = excited.pga_g
     scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
     starts = first_motion(excited, shaken.yield_g)
 
-    @cache
-    def runs_at(scale: float) -> list[ScaledRun]:
-        # the answers differ in the rotation that counts as failure, not in the motion of the block
-        run = shaken.run(excited.scaled(scale))
-        return [scaled_run(run, scale, fails_rad) for fails_rad in failures_rad]
+    def run(scale: float) -> ScaledRun:
+        return scaled_run(shaken.run(excited.scaled(scale)), scale, fails_rad)
 
-    answers = []
-    for i, rotation_deg in enumerate(rotations_deg):
-
-        def run(scale: float, i: int = i) -> ScaledRun:
-            return runs_at(scale)[i]
-
-        start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
-        if starts is None or starts >= scale_limit:
-            # nothing moves below the limit: the closed form of the first motion is the proof
-            result = replace(start, certified=True)
-        else:
-            result = _search(start, run, rules)
-        answers.append(_answer(result, shaken, shaking))
-    return tuple(answers)
+    start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
+    if starts is None or starts >= scale_limit:
+        # nothing moves below the limit: the closed form of the first motion is the proof
+        return _answer(replace(start, certified=True), shaken, shaking)
+    return _answer(_search(start, run, rules), shaken, shaking)
 
 
 def first_motion(excited: Excitation, yield_g: float) -> float | None:
@@ -281,18 +263,11 @@ def first_motion(excited: Excitation, yield_g: float) -> float | None:
     return yield_g / most if most > 0.0 else None
 
 
-def rotation_rad(rotation_deg: float | None, shaken: ShakenMechanism) -> float:
+def rotation_rad(rotation_deg: float | None) -> float:
     """Return the rotation that counts as failure [rad]; infinite for failure past recovery."""
     if rotation_deg is None:
         return math.inf
-    stated = math.radians(positive(rotation_deg, "rotation_deg", "degrees"))
-    if stated >= shaken.most_rad:
-        raise InputError(
-            f"rotation_deg = {rotation_deg:g}: at {math.degrees(shaken.most_rad):.4g} degrees the "
-            "back edge of the block lies on its base plane; give less, or leave it out for failure "
-            "past recovery"
-        )
-    return stated
+    return math.radians(positive(rotation_deg, "rotation_deg", "degrees"))
 
 
 def critical_rad(shaken: ShakenMechanism) -> float:
@@ -506,7 +481,6 @@ def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> C
             "scale_limit": search.scale_limit,
             "yield_name": shaken.yield_name,
             "yield_g": shaken.yield_g,
-            "leaves_g": shaken.leaves_g,
             "critical_rotation_rad": critical,
             "ended": search.ended,
             "runs": search.runs,

@@ -24,12 +24,11 @@ def slump_at_rest(
     phi_back_deg: N,
     functions: Elementwise[N],
     trigonometry: Any,
-) -> tuple[N, N]:
-    """Return p_s² of parallelograms at rest [1/s²], and k_h at which a contact opens [g].
+) -> N:
+    """Return p_s² of parallelograms at rest [1/s²].
 
     p_s² = g (F_y cos β - F_x sin β)/D with the contact forces of a slump that starts
-    (docs/theory/slumping.md); NaN where there is none. The acceleration is infinite where k_h opens
-    no contact.
+    (docs/theory/slumping.md); NaN where there is none.
 
     Args:
         alpha1_deg: angle of the heel [deg].
@@ -60,20 +59,8 @@ def slump_at_rest(
     inertia = force_y * path_x - force_x * path_y + inertia_m2 * sin(gamma + phi1 - phi2)
     pull = STANDARD_GRAVITY_M_S2 * (force_y * cos(beta) - force_x * sin(beta))
     turns = (inertia > 0.0) & (pull > 0.0)
-    p2: Any = where(turns, pull / where(turns, inertia, 1.0), math.nan)
-    # each contact force times D is its lever across the acceleration (`two_contacts`)
-    levers = (
-        (sin(gamma - phi2) * inertia_m2 + path_x * on_base,
-         cos(gamma - phi2) * inertia_m2 + path_y * on_base),
-        (path_x * on_back + sin(phi1) * inertia_m2, path_y * on_back - cos(phi1) * inertia_m2),
-    )  # fmt: skip
-    opens: Any = math.inf
-    for x, y in levers:
-        # a force that k_h only strengthens opens no contact
-        falls = x * sin(beta) - y * cos(beta)
-        own = (x * cos(beta) + y * sin(beta)) / where(falls > 0.0, falls, 1.0)
-        opens = where((falls > 0.0) & (own < opens), own, opens)
-    return p2, opens
+    p2: N = where(turns, pull / where(turns, inertia, 1.0), math.nan)
+    return p2
 
 
 def rocking_at_rest(

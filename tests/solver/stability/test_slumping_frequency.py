@@ -15,7 +15,7 @@ from rbfrag.solver.stability.at_rest import slump_at_rest
 
 def test_it_is_that_of_the_mechanism() -> None:
     blocks = [each.block for each in FAMILY]
-    p2, leaves_g = slump_at_rest(
+    p2 = slump_at_rest(
         alpha1_deg=np.array([b.alpha1_deg for b in blocks]),
         alpha3_deg=np.array([b.alpha3_deg for b in blocks]),
         gamma_deg=np.array([b.gamma_deg for b in blocks]),
@@ -27,7 +27,7 @@ def test_it_is_that_of_the_mechanism() -> None:
         functions=array_elementwise(),
         trigonometry=np,
     )
-    for value, leaves, each in zip(p2, leaves_g, FAMILY, strict=True):
+    for value, each in zip(p2, FAMILY, strict=True):
         one = shaken_mechanism(
             model_of_kind("slumping"),
             each.block,
@@ -36,7 +36,6 @@ def test_it_is_that_of_the_mechanism() -> None:
             phi_back_deg=each.phi_deg - 4.0,
         )
         assert value == pytest.approx(one.p2, rel=1e-12)
-        assert leaves == pytest.approx(one.leaves_g, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -53,4 +52,4 @@ def test_printed_values(angles: tuple[float, float, float, float], p2: float) ->
         ("phi_back_deg", phi),
     )}  # fmt: skip
     rest = slump_at_rest(**one, functions=array_elementwise(), trigonometry=np)
-    assert rest[0][0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)
+    assert rest[0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)
