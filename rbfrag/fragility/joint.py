@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
+from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.method import BlockParameters
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
@@ -30,6 +30,9 @@ UNKNOWN = 0
 
 COMPONENTS = 2
 """Horizontal components that an unknown azimuth is drawn from: labels 0 and 1."""
+
+SIDES = 2 * COMPONENTS
+"""Sides that a block may face: both polarities of each component."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEAR_ONE = 0.99
@@ -179,24 +182,57 @@ def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
     return np.asarray(sign * (np.minimum(pa, pb) - pa * pb - missing))
 
 
-def event_ranges(
-    probability: ArrayLike, rho_e: float, level: float = 0.95
+def share_range(
+    probability: ArrayLike, law: Dependence, sites: int, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Return between which shares of like blocks at many sites fail in one future earthquake.
+    """Return between which shares of like blocks fail at some sites of one future earthquake.
 
-        Φ((Φ⁻¹(P) + √ρ_e Φ⁻¹(q)) / √(1 - ρ_e)),   q = (1 - level)/2 and (1 + level)/2
-
-    Too narrow for few sites or few blocks, whose own scatter it leaves out.
+    The blocks face all sides: two components times two polarities at each site, m = 4 sites in all.
+    Their number is beta-binomial of mean m P and of the variance that Φ₂ gives pairs: of opposite
+    sides R = ρ_e + ρ_s + ρ_v - ρ_o, of the two components ρ_e + ρ_s, of other sites ρ_e.
 
     Args:
         probability: P of one block, 0 to 1, of any shape, which both ends have.
-        rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
+        sites: their number, each shaken by the same measures.
         level: probability that the share lies between both ends.
     """
-    reach = -normal_quantile(0.5 - 0.5 * level)
-    a = ndtri(np.asarray(probability, dtype=np.float64))
-    low, high = EventSpread.of(rho_e).ends(a, reach, ndtr)
-    return np.asarray(low), np.asarray(high)
+    p, n = np.asarray(probability, dtype=np.float64), SIDES * sites
+    site = law.rho_e + law.rho_s
+    a, excess = ndtri(p), np.zeros(p.shape)
+    for others, r in ((1, site + law.rho_v - law.rho_o), (2, site), (n - SIDES, law.rho_e)):
+        if others:
+            excess += others / (n - 1.0) * joint_excess(a, a, r)
+    alone = p * (1.0 - p)
+    rho = np.divide(excess, alone, out=np.zeros(p.shape), where=alone > 0.0)
+    tail = 0.5 - 0.5 * level
+    low, high = (_beta_binomial_quantile(n, p, rho, q) / n for q in (tail, 1.0 - tail))
+    return low, high
+
+
+def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float) -> FloatArray:
+    """Return the smallest number of n that is not exceeded with probability q.
+
+    Args:
+        share: mean over n, any shape.
+        rho: overdispersion, same shape; taken for that of nearly independent blocks below it.
+    """
+    flat, found = share.ravel(), np.empty(share.size)
+    more = 1.0 / np.clip(rho.ravel(), _LEAST_RHO, _MOST_RHO) - 1.0
+    k = np.arange(n + 1.0)
+    ways = -np.log(n + 1.0) - betaln(n - k + 1.0, k + 1.0)
+    at_once = max(1, _PAIRS_AT_ONCE // (n + 1))
+    for start in range(0, flat.size, at_once):
+        some = slice(start, start + at_once)
+        alpha, beta = (
+            part[:, None] for part in (flat[some] * more[some], (1 - flat[some]) * more[some])
+        )
+        with np.errstate(invalid="ignore"):
+            chance = np.exp(ways + betaln(k + alpha, n - k + beta) - betaln(alpha, beta))
+        found[some] = (np.cumsum(chance, axis=1) < q).sum(axis=1)
+    decided = (flat <= 0.0) | (flat >= 1.0)
+    found[decided] = n * flat[decided]
+    found[np.isnan(flat)] = np.nan
+    return np.minimum(found, n).reshape(share.shape)
 
 
 def count_moments(
