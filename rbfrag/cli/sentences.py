@@ -237,12 +237,6 @@ def table_in_words(summary: Mapping[str, Any]) -> str:
         summary: what `rbfrag predict --blocks --json` prints.
     """
     rows, answered, outside = summary["rows"], summary["answered"], summary["without_answer"]
-    if outside:
-        text = f"{answered:,} of {rows:,} blocks are answered; {outside:,} without answer."
-    else:
-        text = f"All {rows:,} blocks are answered." if rows != 1 else "The block is answered."
-    if summary.get("failures_low") is None:
-        return text
-    low, high = (f"{summary[name]:,.0f}" for name in ("failures_low", "failures_high"))
-    ends = low if low == high else f"{low} to {high}"
-    return f"{text} {ends} of them fail together if one earthquake shakes all of them so."
+    if not outside:
+        return f"All {rows:,} blocks are answered." if rows != 1 else "The block is answered."
+    return f"{answered:,} of {rows:,} blocks are answered; {outside:,} without answer."

@@ -2,7 +2,7 @@
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
 are exact. The beta-binomial distribution of the same mean and variance is a cheap stand-in for that
-of the count, where thousands are wanted; ``benchmarks/joint_law.py`` has the law itself.
+of the count.
 Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
 """
 
@@ -197,16 +197,27 @@ def share_range(
         level: probability that the share lies between both ends.
     """
     p, n = np.asarray(probability, dtype=np.float64), SIDES * sites
-    site = law.rho_e + law.rho_s
-    a, excess = ndtri(p), np.zeros(p.shape)
-    for others, r in ((1, site + law.rho_v - law.rho_o), (2, site), (n - SIDES, law.rho_e)):
-        if others:
-            excess += others / (n - 1.0) * joint_excess(a, a, r)
-    alone = p * (1.0 - p)
-    rho = np.divide(excess, alone, out=np.zeros(p.shape), where=alone > 0.0)
-    tail = 0.5 - 0.5 * level
+    rho, tail = overdispersion(p, law, sites), 0.5 - 0.5 * level
     low, high = (_beta_binomial_quantile(n, p, rho, q) / n for q in (tail, 1.0 - tail))
     return low, high
+
+
+def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
+    """Return the mean correlation of the failures of two blocks of :func:`share_range`, from 0 on.
+
+    Args:
+        p: P of one block, any shape.
+    """
+    others, site, excess = SIDES * sites - 1.0, law.rho_e + law.rho_s, np.zeros(p.shape)
+    a = ndtri(p)
+    for number, r in (
+        (1.0, site + law.rho_v - law.rho_o), (2.0, site), (others - 3.0, law.rho_e)
+    ):  # fmt: skip
+        if number:
+            excess += number / others * joint_excess(a, a, r)
+    alone = p * (1.0 - p)
+    rho = np.divide(excess, alone, out=np.zeros(p.shape), where=alone > 0.0)
+    return np.clip(rho, _LEAST_RHO, _MOST_RHO)
 
 
 def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float) -> FloatArray:
@@ -214,10 +225,10 @@ def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float
 
     Args:
         share: mean over n, any shape.
-        rho: overdispersion, same shape; taken for that of nearly independent blocks below it.
+        rho: overdispersion, same shape.
     """
-    flat, found = share.ravel(), np.empty(share.size)
-    more = 1.0 / np.clip(rho.ravel(), _LEAST_RHO, _MOST_RHO) - 1.0
+    flat, result = share.ravel(), np.empty(share.size)
+    more = 1.0 / rho.ravel() - 1.0
     k = np.arange(n + 1.0)
     ways = -np.log(n + 1.0) - betaln(n - k + 1.0, k + 1.0)
     at_once = max(1, _PAIRS_AT_ONCE // (n + 1))
@@ -228,11 +239,11 @@ def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float
         )
         with np.errstate(invalid="ignore"):
             chance = np.exp(ways + betaln(k + alpha, n - k + beta) - betaln(alpha, beta))
-        found[some] = (np.cumsum(chance, axis=1) < q).sum(axis=1)
+        result[some] = (np.cumsum(chance, axis=1) < q).sum(axis=1)
     decided = (flat <= 0.0) | (flat >= 1.0)
-    found[decided] = n * flat[decided]
-    found[np.isnan(flat)] = np.nan
-    return np.minimum(found, n).reshape(share.shape)
+    result[decided] = n * flat[decided]
+    result[np.isnan(flat)] = np.nan
+    return np.minimum(result, n).reshape(share.shape)
 
 
 def count_moments(

@@ -30,7 +30,7 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         return ("No such block fails.",)
     of_block = document.get("block_sd")
     # what slides too far or slumps past a limit does not fall
-    fall = "fall" if document.get("failure") == document.get("kind") else "fail"
+    fall = "fall" if document["mode"] == "topple" else "fail"
     one = "s" if _count(p, of) in ("1", "fewer than 1") else ""
     sentences = [
         f"This block {fall}s or stands; in nearly all such cases it {fall}s ({level})."

@@ -12,7 +12,7 @@ from tests.cli.conftest import Shell
 
 def words(p: float, low: float, high: float, **more: Any) -> tuple[str, ...]:
     document = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high, "event_low": None}
-    return prediction_in_words({**document, "kind": "rocking", "failure": "rocking", **more})
+    return prediction_in_words({**document, "mode": "topple", **more})
 
 
 def test_one_block_falls_or_stands() -> None:
@@ -27,7 +27,7 @@ def test_one_block_falls_or_stands() -> None:
     assert unknown == (
         "At 1 site of one earthquake it is not known what share of such blocks falls together."
     )
-    (slide,) = words(0.13, 0.11, 0.152, failure="permanent displacement above 0.1 m")
+    (slide,) = words(0.13, 0.11, 0.152, mode="slide")
     assert slide.startswith("This block fails or stands; of 100 such cases 13 fail (11")
 
 
