@@ -178,7 +178,7 @@ def line(study: Study, place: str, kind: str) -> Line | None:
     p = study.blocks["probability"]
     usable = [(law, own) for law, own in _by_earthquake(study, (p > low) & (p < high))]
     generator, rows = np.random.default_rng(0), []
-    for _ in range(10 * PORTFOLIOS):
+    for _ in range(10 * PORTFOLIOS if usable else 0):
         number = int(generator.integers(len(usable)))
         law, own = usable[number]
         some = portfolio(own, place, generator)

@@ -1,9 +1,8 @@
 """Several blocks in one earthquake, in closed form: how many fail, and whether any does.
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
-are exact. The beta-binomial distribution of the same mean and variance is a cheap stand-in for that
-of the count.
-Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
+are exact; the beta-binomial law of both stands for that of the count. Samples are drawn in
+:mod:`rbfrag.fragility.joint_sampling`.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -263,27 +261,17 @@ def count_moments(
         weights: weight or loss of each block, shape (n,); None for 1.
     """
     p, w = checked(probability, blocks, weights)
-    mean, variance = _moments(p, w, blocks, dependence)
-    return float(mean), float(variance)
-
-
-def _moments(
-    p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance of the weighted number of failures of P of shape (..., n)."""
-    variance = np.asarray((w * w * p * (1.0 - p)).sum(axis=-1))
+    variance = float((w * w * p * (1.0 - p)).sum())
     for number in np.unique(blocks.earthquake):
-        some = blocks.earthquake == number
-        shared = _shared_variance(p[..., some], w[some], blocks.only(some), law)
-        variance = np.asarray(variance + 2.0 * shared)
-    return np.asarray(p @ w), variance
+        some = np.flatnonzero(blocks.earthquake == number)
+        variance += 2.0 * _shared_variance(p[some], w[some], blocks.only(some), dependence)
+    return float(p @ w), variance
 
 
-def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> Any:
-    """Return the sum of covariances over all pairs of blocks of one earthquake, shape (...)."""
-    a, n = ndtri(p), blocks.size
-    total: Any = 0.0
-    rows = max(1, _PAIRS_AT_ONCE // max(p.size, 1))
+def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
+    """Return the sum of covariances over all pairs of blocks of one earthquake."""
+    a, n, total = ndtri(p), blocks.size, 0.0
+    rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
     for start in range(0, n, rows):
         i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
         i += start
@@ -293,42 +281,19 @@ def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Depen
         sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
         either = site & (sign == UNKNOWN)
         r = law.of_pairs(d_l, d_y, site, component & ~either, sign)
-        excess = joint_excess(a[..., i], a[..., j], r)
+        excess = joint_excess(a[i], a[j], r)
         if either.any():  # another component in half of the cases, else the same or opposite side
             here = np.ones(int(either.sum()), dtype=np.bool_)
-            a_i, a_j, apart = a[..., i[either]], a[..., j[either]], (d_l[either], d_y[either])
             own = [
-                joint_excess(a_i, a_j, law.of_pairs(*apart, here, here, np.full(here.size, side)))
+                joint_excess(
+                    a[i[either]], a[j[either]],
+                    law.of_pairs(d_l[either], d_y[either], here, here, np.full(here.size, side)),
+                )
                 for side in (-1.0, 1.0)
-            ]
-            excess[..., either] = 0.5 * excess[..., either] + 0.25 * (own[0] + own[1])
-        total = total + excess @ (w[i] * w[j])
+            ]  # fmt: skip
+            excess[either] = 0.5 * excess[either] + 0.25 * (own[0] + own[1])
+        total += float(excess @ (w[i] * w[j]))
     return total
-
-
-def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray:
-    """Return the probability that any of n blocks fails, of the law of `FailureCount`.
-
-    Args:
-        mean: expected number of failures, any shape.
-        variance: its variance, same shape.
-        least: greatest P of one block, same shape.
-    """
-    mean, variance = (np.asarray(values, dtype=np.float64) for values in (mean, variance))
-    share = mean / max(n, 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alone = n * share * (1.0 - share)
-        rho = np.minimum(1.0, (variance / alone - 1.0) / max(n - 1.0, 1.0))
-        more = 1.0 / rho - 1.0
-        alpha, beta = share * more, (1.0 - share) * more
-        p = 1.0 - variance / mean  # of the binomial law, of n' = mean/p blocks, not whole
-        binomial = np.where(p > 0.0, (1.0 - p) ** (mean / p), (1.0 - share) ** n)
-        none = np.where(
-            rho > _LEAST_RHO, np.exp(betaln(alpha, beta + n) - betaln(alpha, beta)), binomial
-        )
-    none = np.where(rho >= _MOST_RHO, 1.0 - share, none)
-    any_of_them = np.minimum(np.clip(1.0 - none, least, mean), 1.0)
-    return np.asarray(np.where((share > 0.0) & (share < 1.0), any_of_them, share))
 
 
 def checked(
@@ -377,10 +342,14 @@ class FailureCount:
         return cls(blocks.size, mean, variance, float(p.max(initial=0.0)))
 
     @property
+    def share(self) -> float:
+        """π, the mean over n."""
+        return self.mean / max(self.n, 1)
+
+    @property
     def overdispersion(self) -> float:
         """ρ, from 0 for independent blocks of equal P to 1 where all fail or none."""
-        share = self.mean / self.n if self.n else 0.0
-        alone = self.n * share * (1.0 - share)
+        alone = self.n * self.share * (1.0 - self.share)
         if self.n < 2 or alone <= 0.0:
             return 0.0
         return min(1.0, (self.variance / alone - 1.0) / (self.n - 1.0))
@@ -388,25 +357,33 @@ class FailureCount:
     @property
     def probability_any(self) -> float:
         """Probability that at least one fails, between the greatest P and the sum of all."""
-        return float(_probability_any(self.n, self.mean, self.variance, self.least_any))
+        share, rho = self.share, self.overdispersion
+        if not 0.0 < share < 1.0:
+            return share
+        if rho > _LEAST_RHO:
+            more = 1.0 / min(rho, _MOST_RHO) - 1.0
+            alpha, beta = share * more, (1.0 - share) * more
+            none = np.exp(betaln(alpha, beta + self.n) - betaln(alpha, beta))
+        else:
+            n, p = self._binomial()
+            none = (1.0 - p) ** n
+        return float(min(max(1.0 - none, self.least_any), self.mean, 1.0))
 
     def quantile(self, q: ArrayLike) -> IntArray:
         """Return the smallest number that is not exceeded with probability q, same shape as q."""
-        from scipy.stats import betabinom, binom
+        from scipy.stats import binom
 
-        share, rho = self.mean / max(self.n, 1), self.overdispersion
-        levels = np.asarray(q, dtype=np.float64)
+        share, rho, levels = self.share, self.overdispersion, np.asarray(q, dtype=np.float64)
         if not 0.0 < share < 1.0:
-            return np.full(levels.shape, round(self.mean), dtype=np.int64)
-        if rho >= 1.0:
-            return np.where(levels <= 1.0 - share, 0, self.n).astype(np.int64)
-        if rho > _LEAST_RHO:
-            more = 1.0 / rho - 1.0
-            counts = betabinom.ppf(levels, self.n, share * more, (1.0 - share) * more)
+            counts = np.full(levels.shape, self.mean)
+        elif rho > _LEAST_RHO:
+            law = np.array(share), np.array(min(rho, _MOST_RHO))
+            each = [_beta_binomial_quantile(self.n, *law, one) for one in levels.ravel().tolist()]
+            counts = np.reshape(each, levels.shape)
         else:  # of whole blocks: the mean stays
             n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
             counts = binom.ppf(levels, n, self.mean / n)
-        return np.asarray(counts, dtype=np.int64)
+        return np.asarray(np.rint(counts), dtype=np.int64)
 
     def _binomial(self) -> tuple[float, float]:
         """Return n and P of the binomial law with this mean and variance; n is not whole."""

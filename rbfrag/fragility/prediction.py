@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rbfrag.fragility.prediction_array import PredictionArray
 
 _SINGLE_TYPES = (float, int, str, bytes)
+MOST_SITES = 10_000
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ def answer_given(
     """Return the answer of one model for values by name; see :func:`predict`."""
     if sites is not None:
         answer = answer_given(model, given, level, nan=nan, interval=interval, weights=weights)
-        return _at_sites(answer, model, checked_sites(sites))
+        return _at_sites(answer, model, sites)
     if not given.keys() >= {*model.method.block.names}:
         check_numbers(model.kind, model.method.block, given)
     quantiles = quantiles_of(checked_level(level))
@@ -182,36 +183,22 @@ def answer_given(
     return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
-MOST_SITES = 10_000
-
-
-def checked_sites(sites: object) -> int:
-    """Return a number of sites, or refuse what is none."""
-    if (
-        isinstance(sites, bool)
-        or not isinstance(sites, int | float)
-        or sites not in range(1, MOST_SITES + 1)
-    ):
+def _at_sites(answer: A, model: FragilityModel, sites: float) -> A:
+    """Return an answer with the range of the share that fails at some sites of one earthquake."""
+    if isinstance(sites, bool | str) or sites not in range(1, MOST_SITES + 1):
         raise InputError(
             f"sites = {sites!r}: give how many places one earthquake shakes so, a whole number "
             f"from 1 to {MOST_SITES:,}",
             fields=("sites",),
         )
-    return int(sites)
-
-
-def _at_sites(answer: A, model: FragilityModel, sites: int) -> A:
-    """Return an answer with the range of the share that fails at some sites of one earthquake."""
-    import numpy as np
-
+    if model.dependence is None:
+        return with_remarks(answer, (NO_EVENT_RANGE,))
+    # Kept apart: a single answer loads no library.
     from rbfrag.fragility.joint import share_range
 
-    law = model.dependence
-    if law is None:
-        return with_remarks(answer, (NO_EVENT_RANGE,))
-    low, high = share_range(answer.probability, law, sites, answer.level)
-    own = float if isinstance(answer, Prediction) else np.asarray
-    return type(answer)(**(vars(answer) | {"event_low": own(low), "event_high": own(high)}))
+    ends = share_range(answer.probability, model.dependence, int(sites), answer.level)
+    low, high = map(float, ends) if isinstance(answer, Prediction) else ends
+    return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 
 def array_answer(
