@@ -35,7 +35,6 @@ from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
 from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
-from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.measures import TERMS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -177,9 +176,8 @@ def _name(fit: Fitted) -> str:
 
 
 def dependence_table(models: Sequence[ModelRow]) -> str:
-    """Return what the blocks of one earthquake share, of stored models, and what that means."""
-    heads = ["model", "earthquake", "site", "component, same side", "component, opposite",
-             "one earthquake, P = 0.5"]  # fmt: skip
+    """Return what the blocks of one earthquake share, of stored models."""
+    heads = ["model", "earthquake", "site", "component, same side", "component, opposite"]
     cells = []
     for row in models:
         if row.dependence is None:
@@ -189,8 +187,7 @@ def dependence_table(models: Sequence[ModelRow]) -> str:
             f"{row.dependence[name]:.2f} ± {errors[name]:.2f}"
             for name in ("rho_e", "rho_s", "rho_v", "rho_o")
         ]
-        low, high = event_ranges(0.5, row.dependence["rho_e"], 0.95)
-        cells.append([f"`{row.name}`", *shares, f"{100 * low:.0f} to {100 * high:.0f} of 100"])
+        cells.append([f"`{row.name}`", *shares])
     return markdown((heads, cells))
 
 

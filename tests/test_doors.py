@@ -47,7 +47,7 @@ from tests.service.page.conftest import service as service
 from tests.service.page.reading import agrees, probability_shown
 from tests.synthetic import shaking, write_at2
 
-NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+NUMBERS = ("probability", "ci_low", "ci_high")
 
 # fields of a block, its kind if one is asked for, and PGV
 SHAPES: list[dict[str, Any]] = [

@@ -267,7 +267,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
     """Return what is shown without --verbose."""
     ends = {
         "interval": (document["ci_low"], document["ci_high"]),
-        "one earthquake": (document["event_low"], document["event_high"]),
+        f"at {document.get('sites')} site(s)": (document["event_low"], document["event_high"]),
     }
     return {
         "probability": percent(document["probability"]),
@@ -286,9 +286,9 @@ _IF_KNOWN = ("median_displacement_m",)
 
 
 _OF_POLARITY = (
-    "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
+    "probability", "ci_low", "ci_high", "intensity_m_s",
 )  # fmt: skip
 """Keys that are shown of each polarity."""
 
-_LEFT_OUT = ("y_m_s", "median_displacement_m", "block_sd")
+_LEFT_OUT = ("y_m_s", "median_displacement_m", "block_sd", "event_low", "event_high")
 """Keys that a table leaves out where they do not apply."""

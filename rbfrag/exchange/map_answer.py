@@ -34,8 +34,9 @@ class ShakeMapAnswer(Tabular):
 
     Args:
         columns: one row a node, or a block at its own place: ``lon`` and ``lat`` [deg], the
-            measures, ``probability``, ``ci_low``, ``ci_high``, ``event_low``, ``event_high``,
-            ``in_domain``; of blocks ``block_id`` and ``reason``. NaN of one that cannot be used.
+            measures, ``probability``, ``ci_low``, ``ci_high``, ``event_low``, ``event_high`` (NaN:
+            ``failures`` has the range of them all), ``in_domain``; of blocks ``block_id`` and
+            ``reason``. NaN of one that cannot be used.
         failures: how many of all blocks fail together.
         about: event, model, and what was read, under the keys of the JSON contract.
         warnings: what to know about the answer.
@@ -180,8 +181,7 @@ def shakemap(
         "probability": answer.probability,
         "ci_low": answer.ci_low,
         "ci_high": answer.ci_high,
-        "event_low": answer.event_low,
-        "event_high": answer.event_high,
+        **dict.fromkeys(("event_low", "event_high"), np.full(lon.shape, np.nan)),
         "in_domain": answer.in_domain,
     }
     if own:

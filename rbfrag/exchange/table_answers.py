@@ -20,10 +20,15 @@ from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formu
 from rbfrag.exchange.tables.files import table_path, table_writer
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
+from rbfrag.fragility.joint import UNKNOWN, FailureCount, Placement, count_moments
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.fields import BlockFields, ShakingFields, column_of, names_of
+from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import ask
+from rbfrag.solver.results import FloatArray
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
@@ -34,6 +39,9 @@ _SHAKING = names_of(ShakingFields)
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
+
+MOST_PAIRED = 700
+"""Rows that tell what pairs of blocks share; of a longer table so many drawn at random."""
 
 MOST_LISTED = 10_000
 """So many answers are listed; a file has them all."""
@@ -66,19 +74,26 @@ def predict_table(
         question: ``rotation_deg``, ``model``, ``level`` and ``db`` of :func:`rbfrag.predict`.
 
     Returns:
-        Counts: rows, answered, without an answer, in_domain; kind, model, term, method; without a
-        target ``blocks``, one mapping a row, of the first :data:`MOST_LISTED`; warnings.
+        Counts: rows, answered, without an answer, in_domain; expected_failures and, if one
+        earthquake shakes all rows, failures_low and failures_high; kind, model, term, method;
+        without a target ``blocks``, one mapping a row, of the first :data:`MOST_LISTED`; warnings.
 
     Raises:
         InputError: a file that cannot be read or written, a missing column, no row that can be
             answered.
     """
+    if question.get("sites") is not None:
+        raise InputError(
+            "sites is of one block: rows of a table stand where their column site_id says",
+            fields=("sites",),
+        )
     origin = as_path(source, "source", "a table of blocks")
     goal = None if target is None else table_path(target)
     if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"out {goal} is the table itself: name another file", fields=("out",))
     read = names_of(BlockFields, ShakingFields)
     counts = np.zeros(3, dtype=np.int64)
+    together: list[tuple[FloatArray, FloatArray, NDArray[np.object_]]] = []
     refused: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
     formulas: list[str] = []
@@ -102,6 +117,8 @@ def predict_table(
                 own = own.split(", ") if isinstance(own, str) else own
                 words.update(dict.fromkeys(filter(None, own)))
             finite = np.isfinite(answer["probability"])
+            site = np.array(table.text(part, "site_id") or [""] * finite.size, dtype=object)
+            together.append((answer["probability"][finite], predicted.y_m_s[finite], site[finite]))
             for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
                 refused[f"{table.file.word} {part.lines[i]}"] = answer["reason"][i]
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
@@ -119,10 +136,48 @@ def predict_table(
         "answered": answered,
         "without_answer": total - answered,
         "in_domain": inside,
+        **_total_failures(together, [*chosen["model"]], question),
         **{name: ", ".join(each) for name, each in chosen.items()},
         **({"blocks": rows} if goal is None else {}),
         "warnings": [*table.remarks(known), *notes, *missing, *formulas],
     }
+
+
+def _total_failures(
+    together: Sequence[tuple[FloatArray, FloatArray, NDArray[np.object_]]],
+    models: Sequence[str],
+    question: Mapping[str, Any],
+) -> dict[str, float | None]:
+    """Return the expected number of failures, and its range if one earthquake shakes all rows.
+
+    The blocks face unknown azimuths and stand at one site where no other is named. They are taken
+    as of one size, by which more fall together than of unlike ones.
+
+    Args:
+        together: P, velocity y [m/s] and site of rows.
+        models: names of the models that answer; the range of several is not known.
+        question: as :func:`predict_table` has it.
+    """
+    p, y, names = (np.concatenate(column) for column in zip(*together, strict=True))
+    ends: dict[str, float | None] = dict.fromkeys(("failures_low", "failures_high"))
+    law = None
+    if len(models) == 1:
+        model, rotation = question.get("model") or models[0], question.get("rotation_deg")
+        law = find_model(model, MEASURES, question.get("db"), rotation_deg=rotation).dependence
+    if law is not None:
+        ln_y = np.log(np.where(np.isfinite(y) & (y > 0.0), y, 1.0))
+        blocks = Placement.of(
+            0.0, ln_y, site=np.unique(names.astype(str), return_inverse=True)[1], polarity=UNKNOWN
+        )
+        alone = float((p * (1.0 - p)).sum())
+        some = np.random.default_rng(0).permutation(p.size)[:MOST_PAIRED]
+        shared = count_moments(p[some], blocks.only(some), law)[1]
+        shared -= float((p[some] * (1.0 - p[some])).sum())
+        shared *= p.size * (p.size - 1.0) / max(some.size * (some.size - 1.0), 1.0)
+        count = FailureCount(p.size, float(p.sum()), alone + shared)
+        tail = 0.5 - 0.5 * question.get("level", LEVEL)
+        ends = dict(zip(ends, map(float, count.quantile([tail, 1.0 - tail])), strict=True))
+    return {"expected_failures": float(p.sum()), **ends}
 
 
 def _answer(

@@ -252,9 +252,8 @@ def answer_with_findings(
 
 def _never(model: FragilityModel) -> Answer:
     """Return the answer where a single number is ruled: P = 0."""
-    of_event = None if model.event_spread is None else 0.0
     of_block = (0.0, 0.0) if model.uncertain else (None, None)
-    return Answer(0.0, 0.0, 0.0, of_event, of_event, None, None, *of_block)
+    return Answer(0.0, 0.0, 0.0, None, None, *of_block)
 
 
 def _not(condition: Any) -> Any:

@@ -9,9 +9,8 @@ nothing. For single numbers no library is loaded; what needs arrays is in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 from rbfrag.errors import InputError
 
@@ -145,41 +144,6 @@ class Dependence:
         r *= together
         np.fill_diagonal(r, 1.0)
         return r
-
-
-class EventSpread(NamedTuple):
-    """What one earthquake may do to many like blocks at many sites.
-
-    Args:
-        root: √ρ_e.
-        scale: 1/√(1 - ρ_e).
-    """
-
-    root: float
-    scale: float
-
-    @classmethod
-    def of(cls, rho_e: float) -> EventSpread:
-        """Return the spread of a ρ_e, the share of the variance of Z that blocks have in common.
-
-        Raises:
-            InputError: ρ_e is not between 0 and 1.
-        """
-        if not 0.0 <= rho_e <= 1.0:
-            raise InputError(f"rho_e is a share between 0 and 1, not {rho_e!r}")
-        left = math.sqrt(1.0 - rho_e)
-        return cls(math.sqrt(rho_e), 1.0 / left if left else math.inf)
-
-    def ends(self, a: Any, reach: float, share: Callable[[Any], Any]) -> tuple[Any, Any]:
-        """Return Φ((a ± √ρ_e · reach)/√(1 - ρ_e)), the lower end first.
-
-        Args:
-            a: Φ⁻¹ of P, a number or an array.
-            reach: normal quantile of the level.
-            share: Φ for the kind of number given.
-        """
-        by = self.root * reach
-        return share((a - by) * self.scale), share((a + by) * self.scale)
 
 
 def normal_share(z: float) -> float:

@@ -1,9 +1,8 @@
 """Several blocks in one earthquake, in closed form: how many fail, and whether any does.
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
-are exact. The beta-binomial distribution of the same mean and variance is a cheap stand-in for that
-of the count, where thousands are wanted; ``benchmarks/joint_law.py`` has the law itself.
-Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
+are exact; the beta-binomial law of both stands for that of the count. Samples are drawn in
+:mod:`rbfrag.fragility.joint_sampling`.
 """
 
 from __future__ import annotations
@@ -11,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
+from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.method import BlockParameters
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
@@ -30,6 +28,9 @@ UNKNOWN = 0
 
 COMPONENTS = 2
 """Horizontal components that an unknown azimuth is drawn from: labels 0 and 1."""
+
+SIDES = 2 * COMPONENTS
+"""Sides that a block may face: both polarities of each component."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEAR_ONE = 0.99
@@ -179,24 +180,68 @@ def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
     return np.asarray(sign * (np.minimum(pa, pb) - pa * pb - missing))
 
 
-def event_ranges(
-    probability: ArrayLike, rho_e: float, level: float = 0.95
+def share_range(
+    probability: ArrayLike, law: Dependence, sites: int, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Return between which shares of like blocks at many sites fail in one future earthquake.
+    """Return between which shares of like blocks fail at some sites of one future earthquake.
 
-        Φ((Φ⁻¹(P) + √ρ_e Φ⁻¹(q)) / √(1 - ρ_e)),   q = (1 - level)/2 and (1 + level)/2
-
-    Too narrow for few sites or few blocks, whose own scatter it leaves out.
+    The blocks face all sides: two components times two polarities at each site, m = 4 sites in all.
+    Their number is beta-binomial of mean m P and of the variance that Φ₂ gives pairs: of opposite
+    sides R = ρ_e + ρ_s + ρ_v - ρ_o, of the two components ρ_e + ρ_s, of other sites ρ_e.
 
     Args:
         probability: P of one block, 0 to 1, of any shape, which both ends have.
-        rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
+        sites: their number, each shaken by the same measures.
         level: probability that the share lies between both ends.
     """
-    reach = -normal_quantile(0.5 - 0.5 * level)
-    a = ndtri(np.asarray(probability, dtype=np.float64))
-    low, high = EventSpread.of(rho_e).ends(a, reach, ndtr)
-    return np.asarray(low), np.asarray(high)
+    p, n = np.asarray(probability, dtype=np.float64), SIDES * sites
+    rho, tail = overdispersion(p, law, sites), 0.5 - 0.5 * level
+    low, high = (_beta_binomial_quantile(n, p, rho, q) / n for q in (tail, 1.0 - tail))
+    return low, high
+
+
+def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
+    """Return the mean correlation of the failures of two blocks of :func:`share_range`, from 0 on.
+
+    Args:
+        p: P of one block, any shape.
+    """
+    others, site, excess = SIDES * sites - 1.0, law.rho_e + law.rho_s, np.zeros(p.shape)
+    a = ndtri(p)
+    for number, r in (
+        (1.0, site + law.rho_v - law.rho_o), (2.0, site), (others - 3.0, law.rho_e)
+    ):  # fmt: skip
+        if number:
+            excess += number / others * joint_excess(a, a, r)
+    alone = p * (1.0 - p)
+    rho = np.divide(excess, alone, out=np.zeros(p.shape), where=alone > 0.0)
+    return np.clip(rho, _LEAST_RHO, _MOST_RHO)
+
+
+def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float) -> FloatArray:
+    """Return the smallest number of n that is not exceeded with probability q.
+
+    Args:
+        share: mean over n, any shape.
+        rho: overdispersion, same shape.
+    """
+    flat, result = share.ravel(), np.empty(share.size)
+    more = 1.0 / rho.ravel() - 1.0
+    k = np.arange(n + 1.0)
+    ways = -np.log(n + 1.0) - betaln(n - k + 1.0, k + 1.0)
+    at_once = max(1, _PAIRS_AT_ONCE // (n + 1))
+    for start in range(0, flat.size, at_once):
+        some = slice(start, start + at_once)
+        alpha, beta = (
+            part[:, None] for part in (flat[some] * more[some], (1 - flat[some]) * more[some])
+        )
+        with np.errstate(invalid="ignore"):
+            chance = np.exp(ways + betaln(k + alpha, n - k + beta) - betaln(alpha, beta))
+        result[some] = (np.cumsum(chance, axis=1) < q).sum(axis=1)
+    decided = (flat <= 0.0) | (flat >= 1.0)
+    result[decided] = n * flat[decided]
+    result[np.isnan(flat)] = np.nan
+    return np.minimum(result, n).reshape(share.shape)
 
 
 def count_moments(
@@ -216,27 +261,17 @@ def count_moments(
         weights: weight or loss of each block, shape (n,); None for 1.
     """
     p, w = checked(probability, blocks, weights)
-    mean, variance = _moments(p, w, blocks, dependence)
-    return float(mean), float(variance)
-
-
-def _moments(
-    p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance of the weighted number of failures of P of shape (..., n)."""
-    variance = np.asarray((w * w * p * (1.0 - p)).sum(axis=-1))
+    variance = float((w * w * p * (1.0 - p)).sum())
     for number in np.unique(blocks.earthquake):
-        some = blocks.earthquake == number
-        shared = _shared_variance(p[..., some], w[some], blocks.only(some), law)
-        variance = np.asarray(variance + 2.0 * shared)
-    return np.asarray(p @ w), variance
+        some = np.flatnonzero(blocks.earthquake == number)
+        variance += 2.0 * _shared_variance(p[some], w[some], blocks.only(some), dependence)
+    return float(p @ w), variance
 
 
-def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> Any:
-    """Return the sum of covariances over all pairs of blocks of one earthquake, shape (...)."""
-    a, n = ndtri(p), blocks.size
-    total: Any = 0.0
-    rows = max(1, _PAIRS_AT_ONCE // max(p.size, 1))
+def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
+    """Return the sum of covariances over all pairs of blocks of one earthquake."""
+    a, n, total = ndtri(p), blocks.size, 0.0
+    rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
     for start in range(0, n, rows):
         i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
         i += start
@@ -246,42 +281,19 @@ def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Depen
         sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
         either = site & (sign == UNKNOWN)
         r = law.of_pairs(d_l, d_y, site, component & ~either, sign)
-        excess = joint_excess(a[..., i], a[..., j], r)
+        excess = joint_excess(a[i], a[j], r)
         if either.any():  # another component in half of the cases, else the same or opposite side
             here = np.ones(int(either.sum()), dtype=np.bool_)
-            a_i, a_j, apart = a[..., i[either]], a[..., j[either]], (d_l[either], d_y[either])
             own = [
-                joint_excess(a_i, a_j, law.of_pairs(*apart, here, here, np.full(here.size, side)))
+                joint_excess(
+                    a[i[either]], a[j[either]],
+                    law.of_pairs(d_l[either], d_y[either], here, here, np.full(here.size, side)),
+                )
                 for side in (-1.0, 1.0)
-            ]
-            excess[..., either] = 0.5 * excess[..., either] + 0.25 * (own[0] + own[1])
-        total = total + excess @ (w[i] * w[j])
+            ]  # fmt: skip
+            excess[either] = 0.5 * excess[either] + 0.25 * (own[0] + own[1])
+        total += float(excess @ (w[i] * w[j]))
     return total
-
-
-def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray:
-    """Return the probability that any of n blocks fails, of the law of `FailureCount`.
-
-    Args:
-        mean: expected number of failures, any shape.
-        variance: its variance, same shape.
-        least: greatest P of one block, same shape.
-    """
-    mean, variance = (np.asarray(values, dtype=np.float64) for values in (mean, variance))
-    share = mean / max(n, 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alone = n * share * (1.0 - share)
-        rho = np.minimum(1.0, (variance / alone - 1.0) / max(n - 1.0, 1.0))
-        more = 1.0 / rho - 1.0
-        alpha, beta = share * more, (1.0 - share) * more
-        p = 1.0 - variance / mean  # of the binomial law, of n' = mean/p blocks, not whole
-        binomial = np.where(p > 0.0, (1.0 - p) ** (mean / p), (1.0 - share) ** n)
-        none = np.where(
-            rho > _LEAST_RHO, np.exp(betaln(alpha, beta + n) - betaln(alpha, beta)), binomial
-        )
-    none = np.where(rho >= _MOST_RHO, 1.0 - share, none)
-    any_of_them = np.minimum(np.clip(1.0 - none, least, mean), 1.0)
-    return np.asarray(np.where((share > 0.0) & (share < 1.0), any_of_them, share))
 
 
 def checked(
@@ -330,10 +342,14 @@ class FailureCount:
         return cls(blocks.size, mean, variance, float(p.max(initial=0.0)))
 
     @property
+    def share(self) -> float:
+        """π, the mean over n."""
+        return self.mean / max(self.n, 1)
+
+    @property
     def overdispersion(self) -> float:
         """ρ, from 0 for independent blocks of equal P to 1 where all fail or none."""
-        share = self.mean / self.n if self.n else 0.0
-        alone = self.n * share * (1.0 - share)
+        alone = self.n * self.share * (1.0 - self.share)
         if self.n < 2 or alone <= 0.0:
             return 0.0
         return min(1.0, (self.variance / alone - 1.0) / (self.n - 1.0))
@@ -341,25 +357,33 @@ class FailureCount:
     @property
     def probability_any(self) -> float:
         """Probability that at least one fails, between the greatest P and the sum of all."""
-        return float(_probability_any(self.n, self.mean, self.variance, self.least_any))
+        share, rho = self.share, self.overdispersion
+        if not 0.0 < share < 1.0:
+            return share
+        if rho > _LEAST_RHO:
+            more = 1.0 / min(rho, _MOST_RHO) - 1.0
+            alpha, beta = share * more, (1.0 - share) * more
+            none = np.exp(betaln(alpha, beta + self.n) - betaln(alpha, beta))
+        else:
+            n, p = self._binomial()
+            none = (1.0 - p) ** n
+        return float(min(max(1.0 - none, self.least_any), self.mean, 1.0))
 
     def quantile(self, q: ArrayLike) -> IntArray:
         """Return the smallest number that is not exceeded with probability q, same shape as q."""
-        from scipy.stats import betabinom, binom
+        from scipy.stats import binom
 
-        share, rho = self.mean / max(self.n, 1), self.overdispersion
-        levels = np.asarray(q, dtype=np.float64)
+        share, rho, levels = self.share, self.overdispersion, np.asarray(q, dtype=np.float64)
         if not 0.0 < share < 1.0:
-            return np.full(levels.shape, round(self.mean), dtype=np.int64)
-        if rho >= 1.0:
-            return np.where(levels <= 1.0 - share, 0, self.n).astype(np.int64)
-        if rho > _LEAST_RHO:
-            more = 1.0 / rho - 1.0
-            counts = betabinom.ppf(levels, self.n, share * more, (1.0 - share) * more)
+            counts = np.full(levels.shape, self.mean)
+        elif rho > _LEAST_RHO:
+            law = np.array(share), np.array(min(rho, _MOST_RHO))
+            each = [_beta_binomial_quantile(self.n, *law, one) for one in levels.ravel().tolist()]
+            counts = np.reshape(each, levels.shape)
         else:  # of whole blocks: the mean stays
             n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
             counts = binom.ppf(levels, n, self.mean / n)
-        return np.asarray(counts, dtype=np.int64)
+        return np.asarray(np.rint(counts), dtype=np.int64)
 
     def _binomial(self) -> tuple[float, float]:
         """Return n and P of the binomial law with this mean and variance; n is not whole."""

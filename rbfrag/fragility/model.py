@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.dependence import Dependence, EventSpread
+from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
@@ -42,8 +42,6 @@ class Answer(NamedTuple):
 
     Args:
         probability: P.
-        event_low: lower end of the share failing in one future earthquake; None where the model
-            does not know it.
         eta: argument of the link; None where nothing had to be evaluated, and where the block is
             uncertain.
         log_sigma: logarithm of the scatter, of models that have one.
@@ -55,8 +53,6 @@ class Answer(NamedTuple):
     probability: Any
     low: Any
     high: Any
-    event_low: Any
-    event_high: Any
     eta: Any
     log_sigma: Any
     block_sd: Any = None
@@ -72,7 +68,6 @@ class FragilityModel:
         form: the method's formula on that term.
         parameters: values of the coefficients.
         errors: how well they are known.
-        event_spread: what one earthquake may do; None where it is not known.
         vertical: whether it was fitted with vertical motion.
         notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
@@ -85,7 +80,6 @@ class FragilityModel:
     form: Form
     parameters: tuple[float, ...]
     errors: ParameterErrors
-    event_spread: EventSpread | None
     vertical: bool
     notes: tuple[str, ...] = ()
     spread: Spread | None = None
@@ -146,10 +140,8 @@ class FragilityModel:
                 f"model {row.name!r} has {size} coefficients but steps of leaving earthquakes out "
                 "of another size: fit it again"
             )
-        rho_e = None if row.dependence is None else row.dependence.get("rho_e")
         term = TERMS[row.term]
         notes = (form.advice,) if form.advice else ()
-        event_spread = EventSpread.of(rho_e) if isinstance(rho_e, int | float) else None
         return cls(
             row=row,
             term=term,
@@ -157,9 +149,8 @@ class FragilityModel:
             form=form,
             parameters=parameters,
             errors=ParameterErrors(packed(row.covariance), steps),
-            event_spread=event_spread,
             vertical=row.diagnostics.get("vertical", "without") != "without",
-            notes=notes if event_spread is not None else (*notes, NO_EVENT_RANGE),
+            notes=notes,
             spread=stored_spread(row.name, row.diagnostics),
             data=data,
         )
@@ -280,7 +271,7 @@ class FragilityModel:
         ns: Numbers,
         given: Mapping[str, Any],
     ) -> Answer:
-        """Return P with its interval, the range of one future earthquake, and eta.
+        """Return P with its interval, and eta.
 
         Args:
             values: completed values, within what the bounds allow.
@@ -295,14 +286,9 @@ class FragilityModel:
         middle = link(eta, ns)
         log_sigma = unscaled.log_sigma
         if quantiles is None:
-            return Answer(middle, None, None, None, None, eta, log_sigma)
+            return Answer(middle, None, None, eta, log_sigma)
         reach = h * self.errors.half_width(unscaled.slopes, quantiles, ns)
-        low, high = link(eta - reach, ns), link(eta + reach, ns)
-        spread = self.event_spread
-        if spread is None:
-            return Answer(middle, low, high, None, None, eta, log_sigma)
-        event_low, event_high = spread.ends(ns.ndtri(middle), quantiles.normal, ns.ndtr)
-        return Answer(middle, low, high, event_low, event_high, eta, log_sigma)
+        return Answer(middle, link(eta - reach, ns), link(eta + reach, ns), eta, log_sigma)
 
 
 Model = ModelRow | FragilityModel | str

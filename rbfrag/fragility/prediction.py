@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.method import SINGLE
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.solver.kinds import mode_of_kind
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rbfrag.fragility.prediction_array import PredictionArray
 
 _SINGLE_TYPES = (float, int, str, bytes)
+MOST_SITES = 10_000
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,11 @@ class Prediction:
         ci_low: lower end of the confidence interval of P: how well the share of such blocks that
             fail over all earthquakes and sites is known.
         ci_high: upper end of it.
-        event_low: lower end of the share of such blocks at many sites that fails in one single
-            earthquake; None where the model does not know what its blocks share.
+        event_low: lower end of the share of like blocks, facing all sides, that fails at the sites
+            asked for in one earthquake; None where none are, as one block falls or stands, and
+            where the model does not know what its blocks share.
         event_high: upper end of it.
-        level: confidence level of the interval, and probability of the range of one earthquake.
+        level: confidence level of the interval, and probability of that range.
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
@@ -149,8 +151,12 @@ def answer_given(
     nan: Literal["propagate", "raise"] = "propagate",
     interval: bool = True,
     weights: ArrayLike | None = None,
+    sites: float | None = None,
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
+    if sites is not None:
+        answer = answer_given(model, given, level, nan=nan, interval=interval, weights=weights)
+        return _at_sites(answer, model, sites)
     if not given.keys() >= {*model.method.block.names}:
         check_numbers(model.kind, model.method.block, given)
     quantiles = quantiles_of(checked_level(level))
@@ -172,13 +178,36 @@ def answer_given(
     return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
+def _at_sites(answer: A, model: FragilityModel, sites: float) -> A:
+    """Return an answer with the range of the share that fails at some sites of one earthquake."""
+    if isinstance(sites, bool | str) or sites not in range(1, MOST_SITES + 1):
+        raise InputError(
+            f"sites = {sites!r}: give how many places one earthquake shakes so, a whole number "
+            f"from 1 to {MOST_SITES:,}",
+            fields=("sites",),
+        )
+    if model.dependence is None:
+        return with_remarks(answer, (NO_EVENT_RANGE,))
+    # Kept apart: a single answer loads no library.
+    from rbfrag.fragility.joint import share_range
+
+    ends = share_range(answer.probability, model.dependence, int(sites), answer.level)
+    low, high = map(float, ends) if isinstance(answer, Prediction) else ends
+    return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
+
+
 def array_answer(
-    model: FragilityModel, given: Mapping[str, Any], level: float = 0.95, *, interval: bool = True
+    model: FragilityModel,
+    given: Mapping[str, Any],
+    level: float = 0.95,
+    *,
+    interval: bool = True,
+    sites: float | None = None,
 ) -> PredictionArray:
     """Return the answer of one model for values by name, some of which are arrays."""
     from rbfrag.fragility.prediction_array import PredictionArray
 
-    answer = answer_given(model, given, level, interval=interval)
+    answer = answer_given(model, given, level, interval=interval, sites=sites)
     assert isinstance(answer, PredictionArray)
     return answer
 
@@ -232,7 +261,7 @@ def _answer_single(
         judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
         answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
-    probability, low, high, event_low, event_high, eta, log_sigma, block_sd, _ = answer
+    probability, low, high, eta, log_sigma, block_sd, _ = answer
     median = None
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
@@ -242,8 +271,8 @@ def _answer_single(
         probability,
         low,
         high,
-        event_low,
-        event_high,
+        None,
+        None,
         quantiles.level,
         model.row.name,
         model.term.name,

@@ -59,8 +59,8 @@ class PredictionArray(Tabular):
         probability: P; NaN where the input cannot be used.
         ci_low: lower end of the confidence interval of P; NaN where none was asked for.
         ci_high: upper end of it.
-        event_low: lower end of the share of such blocks at many sites that fails in one single
-            earthquake; NaN where the model does not know it and where none was asked for.
+        event_low: lower end of the share of like blocks that fails at the sites asked for in one
+            earthquake; NaN where none are and where the model does not know it.
         event_high: upper end of it.
         in_domain: True where block and motion lie in the ranges that were fitted.
         reasons: why an answer is missing, ruled or to be doubted; read them by :attr:`reason`.
@@ -154,8 +154,6 @@ class _Columns:
     probability: FloatArray
     low: FloatArray
     high: FloatArray
-    event_low: FloatArray
-    event_high: FloatArray
     y: FloatArray
     x: FloatArray
     in_domain: NDArray[np.bool_]
@@ -175,7 +173,7 @@ def predict_many(
     Args:
         given: block and measures of the motion by name, numbers or arrays.
         quantiles: of the confidence level.
-        interval: whether interval and range of one earthquake are asked for.
+        interval: whether an interval is asked for.
         refuse_nan: raise instead of answering NaN.
 
     Raises:
@@ -186,16 +184,14 @@ def predict_many(
     values, shape = flat(given)
     size = int(np.prod(shape))
     ns = arrays()
-    p, low, high, event_low, event_high, y, x = np.empty((7, size))
+    p, low, high, y, x = np.empty((5, size))
     out = _Columns(
-        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_),
+        p, low, high, y, x, np.ones(size, dtype=np.bool_),
         np.empty(size) if model.uncertain else None,
     )  # fmt: skip
     reach = quantiles if interval else None
     if not interval:
         out.low[:] = out.high[:] = np.nan
-    if not interval or model.event_spread is None:
-        out.event_low[:] = out.event_high[:] = np.nan
 
     def answer(start: int) -> NDArray[np.intp]:
         part = slice(start, min(start + CHUNK, size))
@@ -220,8 +216,8 @@ def predict_many(
         probability=out.probability.reshape(shape),
         ci_low=out.low.reshape(shape),
         ci_high=out.high.reshape(shape),
-        event_low=out.event_low.reshape(shape),
-        event_high=out.event_high.reshape(shape),
+        event_low=np.full(shape, np.nan),
+        event_high=np.full(shape, np.nan),
         in_domain=out.in_domain.reshape(shape),
         reasons=Reasons(shape, reasons),
         y_m_s=out.y.reshape(shape),
@@ -353,7 +349,6 @@ def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
     """Return the columns that a model answers, each with what is to stand there."""
     pairs = (
         (out.probability, answer.probability), (out.low, answer.low), (out.high, answer.high),
-        (out.event_low, answer.event_low), (out.event_high, answer.event_high),
         (out.block_sd, answer.block_sd),
     )  # fmt: skip
     return [(column, value) for column, value in pairs if column is not None and value is not None]

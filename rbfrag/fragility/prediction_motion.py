@@ -47,8 +47,14 @@ def predict_motion(
     level: float,
     db: str | PathLike[str] | None,
     weights: ArrayLike | None = None,
+    sites: float | None = None,
 ) -> Prediction:
     """Return the probability for one block; arguments as for :func:`rbfrag.predict`."""
+    if sites is not None:
+        raise InputError(
+            "sites given beside a motion: it shakes one site; give its measures instead",
+            fields=("sites",),
+        )
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
@@ -102,8 +108,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
     means: dict[str, Any] = {
         name: mean(name)
         for name in (
-            "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
-            "block_sd",
+            "probability", "ci_low", "ci_high", "intensity_m_s", "block_sd",
         )
     }  # fmt: skip
     return MotionPrediction(

@@ -188,7 +188,7 @@ class UncertainModel(FragilityModel):
         p = np.where(forbidden, 0.0, link.probability(eta, ns))
         middle = weight @ p
         answer = Answer(
-            middle, None, None, None, None, None, None,
+            middle, None, None, None, None,
             block_sd=np.sqrt(weight @ np.square(p - middle)),
             outside=weight @ self._outside(values, eta.shape),
         )  # fmt: skip
@@ -204,13 +204,7 @@ class UncertainModel(FragilityModel):
         low, high = (
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
-        answer = answer._replace(low=low, high=high)
-        if self.event_spread is None:
-            return answer
-        # the earthquake moves all blocks alike, so that the ends of the sum are sums of the ends
-        ends = self.event_spread.ends(ns.ndtri(p), quantiles.normal, ns.ndtr)
-        event_low, event_high = (weight @ np.where(forbidden, 0.0, end) for end in ends)
-        return answer._replace(event_low=event_low, event_high=event_high)
+        return answer._replace(low=low, high=high)
 
     def _outside(self, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
         """Return where a block that it may be lies outside the ranges that were fitted."""

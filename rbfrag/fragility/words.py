@@ -17,29 +17,35 @@ def percent(share: float) -> str:
 
 
 def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what P, its interval and the range of one earthquake mean, in counts of blocks.
+    """Return what P, its interval and the range at some sites mean, in counts of blocks.
 
     Args:
         document: an answer under the keys of the JSON contract.
     """
     p, level = document["probability"], f"{100.0 * document['level']:g} %"
     low, high = document["ci_low"], document["ci_high"]
-    event_low, event_high = document["event_low"], document["event_high"]
+    event_low, sites = document["event_low"], document.get("sites")
     of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
     if high == 0.0:
         return ("No such block fails.",)
     of_block = document.get("block_sd")
-    fails = "fails" if _count(p, of) in ("1", "fewer than 1") else "fail"
+    # what slides too far or slumps past a limit does not fall
+    fall = "fall" if document["mode"] == "topple" else "fail"
+    one = "s" if _count(p, of) in ("1", "fewer than 1") else ""
     sentences = [
-        f"Nearly all such blocks fail ({level})."
+        f"This block {fall}s or stands; in nearly all such cases it {fall}s ({level})."
         if _range(low, high, of) == "nearly all"
-        else f"Of {of:,} such blocks {_count(p, of)} {fails} "
-        f"({_range(low, high, of)} as far as the data tell it, {level}).",
-        "How many in one single earthquake is not known."
-        if event_low is None
-        else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of:,} "
-        f"({level}).",
+        else f"This block {fall}s or stands; of {of:,} such cases {_count(p, of)} {fall}{one} "
+        f"({_range(low, high, of)} as far as the data tell it, {level})."
     ]
+    if sites is not None:
+        where = f"At {sites:,} site{'s' if sites > 1 else ''} of one earthquake"
+        sentences.append(
+            f"{where} it is not known what share of such blocks {fall}s together."
+            if event_low is None
+            else f"{where}, facing all sides, {_range(event_low, document['event_high'], 100)} of "
+            f"100 such blocks {fall} ({level})."
+        )
     if of_block is not None:
         sentences.append(
             "The block is uncertain: among what it may be, P differs with a standard deviation of "

@@ -11,7 +11,6 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
@@ -49,9 +48,6 @@ class SiteProbability:
         probability: P at each site, the mean over the blocks of a class, shape (n,).
         ci_low: lower end of its interval, as far as the data tell the parameters of the model.
         ci_high: upper end.
-        event_low: lower end of the share of such blocks at many such sites that fails in one single
-            earthquake, taken at P; NaN where the model does not know it.
-        event_high: upper end.
         in_domain: whether every block and the site's shaking lie in the ranges fitted.
         level: confidence level.
         shaking: what the model reads of the shaking, and its scatter.
@@ -63,8 +59,6 @@ class SiteProbability:
     probability: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
-    event_low: FloatArray
-    event_high: FloatArray
     in_domain: NDArray[np.bool_]
     level: float
     shaking: SiteShaking
@@ -158,13 +152,9 @@ def site_probability(
     probability, low, high = (
         np.bincount(site, row * weights[block], n).astype(np.float64) for row in each
     )
-    event_low = event_high = np.full(n, np.nan)
-    if chosen.event_spread is not None:
-        event_low, event_high = event_ranges(probability, chosen.event_spread.root**2, level)
     return SiteProbability(
-        probability, low, high, event_low, event_high, in_domain, level, shaking, site, block,
-        each=each[0],
-    )  # fmt: skip
+        probability, low, high, in_domain, level, shaking, site, block, each=each[0]
+    )
 
 
 def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:

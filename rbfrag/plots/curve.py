@@ -85,13 +85,13 @@ def plot_curve(
     fixed: Mapping[str, float] | None = None,
     level: float = LEVEL,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
+    sites: float | None = None,
 ) -> Picture:
-    """Draw the fragility curve of one block with two bands.
+    """Draw the fragility curve of one block with the interval of P.
 
-    The narrow band is the interval of P: the share of such blocks that fail over all earthquakes
-    and sites with this shaking, as far as the data tell it. The wide one is the share that may
-    fail in one single earthquake, taken at P; it is left out where the model does not know it.
-    With few earthquakes the first may be the wider. Outside the fitted ranges the curve is dashed.
+    P is the share of such blocks that fail over all earthquakes and sites with this shaking, its
+    interval how well the data tell it. With `sites` a wide band is the share of like blocks that
+    fails at so many sites of one earthquake. Outside the fitted ranges the curve is dashed.
 
     Args:
         over: the measure along the abscissa, by name; None for the one that the model's term
@@ -99,6 +99,7 @@ def plot_curve(
         fixed: the other measures that the term reads, by name, held at one value.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
+        sites: number of sites of one earthquake; None for no band.
 
     Raises:
         InputError: a value that cannot be used, a measure that is missing, too many to compare
@@ -126,7 +127,7 @@ def plot_curve(
     lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in beside or {}), default=0)
     figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(beside or {}) / 2))
     axes = figure.add_subplot()
-    draw_curve(axes, model, block, varied, held, level=level, beside=beside)
+    draw_curve(axes, model, block, varied, held, level=level, beside=beside, sites=sites)
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
@@ -157,22 +158,24 @@ def draw_curve(
     level: float = LEVEL,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     at: float = 0.0,
+    sites: float | None = None,
 ) -> None:
     """Draw the curve of :func:`plot_curve` into axes.
 
     Args:
         at: a value of the measure to point out; 0 for none.
+        sites: number of sites of one earthquake; None for no band.
     """
     end = max(_right_end(model, block, varied, held), 1.15 * at)
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
-    answer = array_answer(model, {**block, varied: x, **held}, level)
+    answer = array_answer(model, {**block, varied: x, **held}, level, sites=sites)
     known = answer.in_domain
     percent = f"{100.0 * level:g} %"
     if not np.isnan(answer.event_low).all():
         axes.fill_between(
             x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,
-            label=f"share failing in one single earthquake ({percent})",
+            label=f"share failing at {sites:g} site(s) of one earthquake ({percent})",
         )  # fmt: skip
     axes.fill_between(
         x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,

@@ -17,7 +17,7 @@ from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
-from rbfrag.question.fields import AnsweringFields, ShakingFields
+from rbfrag.question.fields import RangeFields, ShakingFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.question import described
 
@@ -139,7 +139,7 @@ class _OneCurve(TypedDict, total=False):
 class FragilityCurveKeywords(
     BlockKeywords[float | None],
     ShakingFields[float | None],
-    AnsweringFields,
+    RangeFields,
     _OneCurve,
     total=False,
 ):
@@ -156,7 +156,7 @@ def curve(
     beside: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
     **question: Unpack[FragilityCurveKeywords],
 ) -> Picture:
-    """Draw the fragility curve of one block over a measure of the shaking, with two bands.
+    """Draw the fragility curve of one block over a measure of the shaking, with its interval.
 
     Args:
         p2: frequency parameter p² of the block [1/s²], if it is not given by name.
@@ -167,13 +167,13 @@ def curve(
         beside: gives other fragilities to compare with, by name, for the measure that the curve
             runs over.
         question: fields of the block, with ``kind``, the measures that are held, and ``model``,
-            ``level`` and ``db``, as :func:`rbfrag.predict` has them.
+            ``level``, ``sites`` and ``db``, as :func:`rbfrag.predict` has them.
     """
     from rbfrag.plots.curve import plot_curve, rise_of_curve
 
     numbers = [each for each in (p2, kr) if each is not None]
     block, held, answering, drawing = parts_of(
-        numbers, question, BlockKeywords, ShakingFields, AnsweringFields, _OneCurve
+        numbers, question, BlockKeywords, ShakingFields, RangeFields, _OneCurve
     )
     held |= spectral(drawing.get("sa_g") or {})
     kind = block.pop("kind", None)
@@ -196,7 +196,7 @@ def curve(
     others = {} if beside is None else beside(varied)
     picture = plot_curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
-        level=answering.get("level", LEVEL), beside=others,
+        level=answering.get("level", LEVEL), beside=others, sites=answering.get("sites"),
     )  # fmt: skip
     warnings = (*blocks.remarks, *rise_of_curve(chosen, group.numbers))
     return replace(picture, warnings=warnings)

@@ -34,6 +34,7 @@ def ask_many(
     nan: Literal["propagate", "raise"],
     interval: bool,
     weights: ArrayLike | None,
+    sites: float | None,
     find: Callable[[Mapping[str, Any], str | None], FragilityModel],
 ) -> Prediction | PredictionArray:
     """Return the answers for blocks that are described by shapes, or are of several kinds.
@@ -47,6 +48,7 @@ def ask_many(
         nan: what becomes of elements that cannot be used.
         interval: whether an interval is asked for.
         weights: of draws of one block.
+        sites: number of sites of one earthquake with such blocks.
         find: returns the model that answers for what is given, of a kind.
 
     Raises:
@@ -66,7 +68,7 @@ def ask_many(
     if not rows:
         _refuse_unread(blocks, block)
     if weights is not None:
-        return _of_draws(blocks, given, level, weights, size, find)
+        return _of_draws(blocks, given, level, weights, sites, size, find)
     refused, parts = list(blocks.refused), []
     for group in blocks.groups:
         places = group.places
@@ -76,7 +78,7 @@ def ask_many(
             chosen = find(own, group.kind)
             own = chosen.method.block.filled(own) if rows else own
             own = {n: np.broadcast_to(v, places.shape) for n, v in own.items()}
-            answer = answer_given(chosen, own, level, interval=interval)
+            answer = answer_given(chosen, own, level, interval=interval, sites=sites)
         except (InputError, ModelError) as error:
             if len(blocks.groups) == 1:
                 raise
@@ -162,6 +164,7 @@ def _of_draws(
     given: Mapping[str, Any],
     level: float,
     weights: ArrayLike,
+    sites: float | None,
     size: int,
     find: Callable[[Mapping[str, Any], str | None], FragilityModel],
 ) -> Prediction | PredictionArray:
@@ -179,7 +182,7 @@ def _of_draws(
     (group,) = whole
     own = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
     chosen = find(own, group.kind)
-    answer = answer_given(chosen, own, level, weights=weights)
+    answer = answer_given(chosen, own, level, weights=weights, sites=sites)
     return with_remarks(answer, unused_measures(chosen, own))
 
 
@@ -209,7 +212,7 @@ def _together(
     nothing = np.empty(0, dtype=np.intp)
     unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
     if unstable.size:
-        for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+        for name in ("probability", "ci_low", "ci_high"):
             columns[name][unstable] = 1.0
         if "block_sd" in columns:
             columns["block_sd"][unstable] = 0.0

@@ -28,6 +28,7 @@ def prediction_document(
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
+    sites: float | None = None,
     motion: MotionLike | None = None,
     polarity: Polarity = "both",
     model: str | None = None,
@@ -42,6 +43,7 @@ def prediction_document(
         given: block and what is known of the motion, by the names of :func:`predict`.
         kind: how the block fails; None for what it is given by.
         rotation_deg: rotation that counts as failure, where models of several are fitted [deg].
+        sites: number of sites of one earthquake with such blocks; None for one block.
         motion: the accelerogram itself.
         polarity: forward, reverse or both; with `motion` only.
         model: name of a stored model; None for the best for each term that the measures
@@ -65,7 +67,7 @@ def prediction_document(
         others = [
             predict_motion(
                 given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
-                model=model, level=level, db=db,
+                model=model, level=level, db=db, sites=sites,
             )
         ]  # fmt: skip
     else:
@@ -76,13 +78,15 @@ def prediction_document(
             else [find_model(model, given, db, **options)]
         )
         for each in models:
-            answer = answer_given(each, given, level, weights=weights)
+            answer = answer_given(each, given, level, weights=weights, sites=sites)
             assert isinstance(answer, Prediction)
             others.append(answer)
         unused = unused_measures(models[0], given)
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *unused, *recommended.warnings]
+    if sites is not None:
+        document["sites"] = int(sites)
     document["answers"] = [
         {name: getattr(each, name) for name in OF_EACH_MODEL} | {"recommended": each is recommended}
         for each in others

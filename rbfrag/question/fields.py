@@ -371,7 +371,21 @@ class AnsweringFields(TypedDict, total=False):
     ]
 
 
-class RequestFields(AnsweringFields, total=False):
+class RangeFields(AnsweringFields, total=False):
+    """Which model answers, and what the range of one earthquake is of."""
+
+    sites: Annotated[
+        float | None,
+        Field(
+            "Number of sites shaken so in one earthquake: adds what share of such blocks, facing "
+            "all sides, fails there; default: one block, which falls or stands",
+            least=1.0,
+            most=10_000.0,
+        ),
+    ]
+
+
+class RequestFields(RangeFields, total=False):
     """What is asked of blocks and their shaking."""
 
     rotation_deg: Annotated[

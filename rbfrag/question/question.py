@@ -59,9 +59,9 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     such blocks that fail over all earthquakes and sites with these measures. The interval
     F(eta ± t s) says how well that is known, s being the standard error of eta from the fits that
     each leave an earthquake out and t Student's quantile for as many earthquakes as tell of this
-    block. The range of one earthquake says what share of such blocks at many sites fails in one
-    single earthquake. Without shaking, and where mechanics forbids failure (k >= PGA, say), P is 0
-    whatever the model says.
+    block. With ``sites`` a range says what share of like blocks fails at so many sites of one
+    earthquake; one block falls or stands. Without shaking, and where mechanics forbids failure
+    (k >= PGA, say), P is 0 whatever the model says.
 
     A block is given by p2 and kr (it topples, or rocks if `kind` says so), by ky and displacement_m
     (it slides further than that), by ks and ps2 (it slumps), or by its shape, dip and friction,
@@ -166,6 +166,7 @@ def ask(
     kind: Any = None,
     mode: Any = None,
     rotation_deg: float | None = None,
+    sites: float | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
@@ -181,6 +182,7 @@ def ask(
         kind: how they fail, for all or one each; None or an empty text for what they say.
         mode: failure modes that are stated, one each and empty for none; None for none at all.
         rotation_deg: rotation that counts as failure [deg].
+        sites: number of sites of one earthquake with such blocks.
         model: a model, the name of a stored one, or None.
         level: confidence level.
         db: database of the model.
@@ -191,7 +193,7 @@ def ask(
     """
     if nan not in ("propagate", "raise"):
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
-    how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights}
+    how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:
         if not has_shape(given):
             given, unread = read_by_some(given)

@@ -170,7 +170,7 @@ def scenario(
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
     reason[realisations.bonded] = BONDED
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
-    columns[:, unstable] = 1.0
+    columns[:3, unstable] = 1.0
     reason[unstable] = "unstable"
 
     def fill(blocks: NDArray[np.bool_], answers: PredictionArray) -> None:

@@ -104,13 +104,15 @@ class PredictAnswer(_Document):
 
     `probability` is the share of such blocks that fail over all earthquakes and sites with these
     measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
-    `event_low` and `event_high` between which shares fail in one single earthquake; null where that
-    is not known. `block_sd` is the standard deviation of P over what an uncertain block may be;
+    `event_low` and `event_high` between which shares of like blocks fail at `sites` of one
+    earthquake; null where no sites are asked for (one block falls or stands) and where that is not
+    known. `block_sd` is the standard deviation of P over what an uncertain block may be;
     null where it is certain.
     """
 
     mode: str
     answers: list[ModelAnswer]
+    sites: int | None = None
 
 
 OF_ARRAYS = (

@@ -3,47 +3,38 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from benchmarks.held_out import MODELS, Outcomes
-from benchmarks.joint_failures import PLACES, PUBLISHED, Line, portfolio
+from benchmarks.joint_failures import PLACES, Line, placement_of, portfolio
 
 
-def outcomes() -> Outcomes:
-    """Return three sites with two components each in one earthquake, one component in another."""
-    random = np.random.default_rng(0)
-    motion = np.repeat(np.arange(7), 60)
-    return Outcomes(
-        keys=(),
-        failed=random.integers(2, size=420).astype(float),
-        event=(motion == 6).astype(np.intp),
-        site=motion // 2,
-        motion=motion,
-        polarity=np.tile((-1, 1), 210),
-        fold=np.zeros(420, dtype=np.intp),
-        strength=np.zeros(420, dtype=np.intp),
-        value={},
-    )
+def blocks() -> pd.DataFrame:
+    """Return three sites with two components each in one earthquake."""
+    component = np.repeat(np.arange(6), 60)
+    return pd.DataFrame({
+        "site": component // 2, "component": component, "polarity": np.tile((-1, 1), 180),
+        "p2": 4.0, "y_m_s": np.linspace(0.1, 0.9, 360),
+    })  # fmt: skip
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_portfolios_hold_blocks_of_one_earthquake_and_place(place: str) -> None:
-    data, random = outcomes(), np.random.default_rng(1)
-    usable = [np.flatnonzero(data.event == event) for event in (0, 1)]
-    drawn = [portfolio(data, usable, place, random) for _ in range(200)]
-    found = [rows for rows in drawn if rows is not None]
-    assert found
-    for rows in found:
-        assert 10 <= rows.size == np.unique(rows).size <= 50
-        assert np.unique(data.event[rows]).size == 1
-        sites, motions = (np.unique(label[rows]).size for label in (data.site, data.motion))
-        sides = np.unique(data.polarity[rows]).size
+def test_portfolios_hold_blocks_of_one_place(place: str) -> None:
+    own, random = blocks(), np.random.default_rng(1)
+    drawn = [rows for _ in range(200) if (rows := portfolio(own, place, random)) is not None]
+    assert len(drawn) > 50
+    for rows in drawn:
+        assert 10 <= len(rows) == rows.index.nunique() <= 50
+        sites, components, sides = (rows[n].nunique() for n in ("site", "component", "polarity"))
         if place == "several sites":
-            assert data.event[rows[0]] == 0
-            assert motions >= 3  # of 4 or more drawn, of which one may have none of few blocks
+            assert components >= 3  # of 4 or more drawn, of which one may have none of few blocks
         else:
             assert sites == 1
-            assert place == "one site" or motions == sides == 1
+            assert place == "one site" or components == sides == 1
+        where = placement_of(rows)
+        assert np.unique(where.component).size == components
+        np.testing.assert_allclose(np.exp(where.ln_y), rows["y_m_s"])
+        np.testing.assert_allclose(where.l, np.log(2.0))
 
 
 def test_what_portfolios_are_judged_by() -> None:
@@ -53,18 +44,10 @@ def test_what_portfolios_are_judged_by() -> None:
         mean=np.array([1.0, 1.0, 2.0]),
         variance=np.array([2.0, 2.0, 4.0]),
         alone=np.ones(3),
-        inside=np.ones(3, dtype=bool),
-        any_by={"one": np.array([1.0, 0.5, 0.5])},
+        any_by=(np.array([0.9, 0.5, 0.5]), np.full(3, 0.5)),
     )
-    assert line.ratio(line.variance) == 1.0
-    assert line.ratio(line.alone) == pytest.approx(8.0 / 3.0)
-    low, high = line.ratio_range()
-    assert (low, high) == (1.0, 1.0)
-    mean, loss, brier = line.scores()["one"]
-    assert mean == pytest.approx(2.0 / 3.0, abs=1e-4)
-    assert loss == pytest.approx(2.0 / 3.0 * np.log(2.0), abs=1e-3)
-    assert brier == pytest.approx(0.5 / 3.0, abs=1e-3)
-
-
-def test_every_model_has_an_earlier_copula() -> None:
-    assert list(MODELS) == list(PUBLISHED)
+    assert line.ratio() == (1.0, 1.0, 1.0)
+    gain, low, high = line.gain()
+    assert gain == pytest.approx(np.log(1.8) / 3.0)
+    assert low == 0.0  # of the second earthquake alone
+    assert high == pytest.approx(np.log(1.8) / 2.0)

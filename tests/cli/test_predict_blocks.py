@@ -48,7 +48,7 @@ def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     for row, sides in zip(found["blocks"], (("2.4", ".5", "3"), ("3", ".6", "5")), strict=True):
         alone = of_one(shell, *sides)
-        for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+        for name in ("probability", "ci_low", "ci_high"):
             assert row[name] == pytest.approx(alone[name], rel=1e-12)
         assert (row["kind"], row["mode"], row["reason"]) == ("toppling", "topple", "")
     assert found["warnings"] == [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +14,16 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.exchange import table_answers
 from rbfrag.exchange.table_answers import ANSWERS, predict_table
 from rbfrag.exchange.tables import csv_file, parts
 from rbfrag.exchange.tables.files import write_block_table
+from rbfrag.fragility.joint import UNKNOWN, Placement
+from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.question.question import predict
 from tests.block_tables import read_columns
 from tests.fragility.conftest import model_row
+from tests.fragility.portfolio_draws import LAW, SHARED
 
 HEAD = "block_id,p2_1_s2,kr,pgv_m_s"
 TABLE = f'{HEAD}\n"A, upper",3,0.1,0.6\nB,10,0.3,\nC,3,-0.1,0.6\nD,3,0.1,0\n'
@@ -63,9 +68,8 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert float(first["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-12)
     assert [*first][-9:] == [*ANSWERS]
-    for name in ("event_low", "event_high"):
-        assert float(first[name]) == pytest.approx(getattr(expected, name), rel=1e-12)
-    assert second["event_low"] == ""
+    for row in (first, second, third, fourth):  # each block falls or stands
+        assert row["event_low"] == row["event_high"] == ""
     assert (first["in_domain"], first["reason"]) == ("true", "")
     assert second["probability"] == ""
     assert "pgv_m_s" in second["reason"]
@@ -74,16 +78,47 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     assert "no shaking" in fourth["reason"]
 
 
-def test_a_range_of_one_earthquake_that_is_not_known_is_an_empty_cell(tmp_path: Path) -> None:
+def total_of(tmp_path: Path, dependence: dict[str, Any] | None, rows: str) -> dict[str, Any]:
     database = tmp_path / "model.db"
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
-        save_model(connection, model_row(dependence=None))
-    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
-    source.write_text(f"{HEAD}\n1,3.0,0.1,0.6\n")
-    told = predict_table(source, target, given={}, model=None, level=0.9, db=str(database))
-    (row,) = rows_of(target)
-    assert row["event_low"] == row["event_high"] == ""
-    assert "no estimate of what the blocks of one earthquake share" in str(told["warnings"])
+        save_model(connection, model_row(dependence=dependence))
+    source = tmp_path / "a.csv"
+    source.write_text(f"{HEAD},site_id\n{rows}")
+    return predict_table(source, given={}, model=None, level=0.9, db=str(database))
+
+
+@pytest.mark.parametrize("sites", [1, 20])
+def test_a_table_has_one_range_for_its_total(tmp_path: Path, sites: int) -> None:
+    n = 200
+    ys = np.random.default_rng(0).uniform(0.05, 0.2, n)
+    rows = "".join(f"{i},3.0,{ys[i]},0.6,s{i % sites}\n" for i in range(n))
+    told = total_of(tmp_path, SHARED, rows)
+    p = np.array([row["probability"] for row in told["blocks"]])
+    blocks = Placement.of(0.0, np.log(ys), site=np.arange(n) % sites, polarity=UNKNOWN)
+    counts = JointSampler(LAW, blocks).counts(p, 20_000, np.random.default_rng(1))
+    assert told["expected_failures"] == pytest.approx(p.sum())
+    low, high = told["failures_low"], told["failures_high"]
+    assert np.quantile(counts, [0.05, 0.95]) == pytest.approx((low, high), abs=4.0)
+    assert high - low > 2.0 * 1.645 * np.sqrt((p * (1.0 - p)).sum())
+
+
+def test_of_many_rows_some_tell_what_pairs_share(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = "".join(f"{i},3.0,{0.05 + 0.0005 * i},0.6,s{i % 9}\n" for i in range(300))
+    whole = total_of(tmp_path, SHARED, rows)
+    monkeypatch.setattr(table_answers, "MOST_PAIRED", 100)
+    (tmp_path / "model.db").unlink()
+    some = total_of(tmp_path, SHARED, rows)
+    for name in ("failures_low", "failures_high"):
+        assert some[name] == pytest.approx(whole[name], rel=0.1)
+
+
+def test_what_is_not_known_of_a_total_is_none(tmp_path: Path) -> None:
+    told = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
+    assert told["failures_low"] is told["failures_high"] is None
+    with pytest.raises(InputError, match="rows of a table stand where"):
+        predict_table(tmp_path / "a.csv", given={}, sites=3)
 
 
 def test_parts_join_without_a_seam(
@@ -254,7 +289,7 @@ def test_uncertain_blocks_are_integrated_over(answer: Answer, tmp_path: Path) ->
     uncertain, certain, refused = rows_of(target)
     db = str(tmp_path / "model.db")
     expected = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=db)
-    for name in ("probability", "ci_low", "ci_high", "event_high", "block_sd"):
+    for name in ("probability", "ci_low", "ci_high", "block_sd"):
         assert float(uncertain[name]) == pytest.approx(getattr(expected, name), rel=1e-12)
     by_itself = predict(3.0, 0.1, pgv_m_s=0.6, db=db)
     assert float(certain["probability"]) == pytest.approx(by_itself.probability, rel=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 from scipy.stats import norm, t
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of, student_half_width
+from rbfrag.fragility.joint import share_range
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
@@ -82,8 +83,8 @@ def drawn_questions(model: FragilityModel, random: np.random.Generator, n: int) 
 
 def expected_ends(
     model: FragilityModel, given: dict[str, FloatArray], level: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """P, the interval and the range of one earthquake by numpy and scipy from the stored row."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """P and the interval by numpy and scipy from the stored row."""
     ns = arrays()
     with np.errstate(all="ignore"):
         values = model.method.block.completed(given, model.term, ns)
@@ -97,15 +98,10 @@ def expected_ends(
         reach = t.ppf(0.5 + 0.5 * level, np.clip(nu, 2, g - 1)) * se
         link = model.method.link.probability
         p, low, high = (np.asarray(link(at, ns)) for at in (eta, eta - reach, eta + reach))
-        rho = SHARED["rho_e"]
-        event = [
-            ndtr((ndtri(p) + np.sqrt(rho) * norm.ppf(q)) / np.sqrt(1 - rho))
-            for q in (0.5 - 0.5 * level, 0.5 + 0.5 * level)
-        ]
-    return p, low, high, event[0], event[1]
+    return p, low, high
 
 
-COLUMNS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+COLUMNS = ("probability", "ci_low", "ci_high")
 
 
 @settings(max_examples=150)
@@ -162,18 +158,35 @@ def test_the_shipped_models_have_the_interval_of_v() -> None:
         np.testing.assert_allclose(many.ci_high[open_], high[open_], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("sites", [None, 3])
+def test_ranges_of_one_earthquake_are_of_sites(sites: int | None) -> None:
+    model = drawn_model(0, 1, SHARED)
+    given = drawn_questions(model, np.random.default_rng(1), 5)
+    many = answer_given(model, given, 0.9, sites=sites)
+    one = answer_given(model, {name: float(v[0]) for name, v in given.items()}, 0.9, sites=sites)
+    if sites is None:
+        assert np.isnan([many.event_low, many.event_high]).all()
+        assert one.event_low is one.event_high is one.as_dict()["event_low"] is None
+        return
+    assert model.dependence is not None
+    ends = share_range(many.probability, model.dependence, sites, 0.9)
+    np.testing.assert_array_equal([many.event_low, many.event_high], ends)
+    assert (one.event_low, one.event_high) == (ends[0][0], ends[1][0])
+    for wrong in (0, 1.5, -2, 10**6, True, math.nan, "3"):
+        with pytest.raises(InputError, match="whole number from 1 to 10,000"):
+            answer_given(model, given, 0.9, sites=wrong)
+
+
 def test_a_model_that_does_not_know_what_blocks_share_says_so() -> None:
     model = drawn_model(0, 1, None)
     given = drawn_questions(model, np.random.default_rng(1), 5)
-    many = answer_given(model, given, 0.95)
-    assert np.isnan(many.event_low).all()
-    assert np.isnan(many.event_high).all()
+    assert answer_given(model, given, 0.95).notes == ()
+    many = answer_given(model, given, 0.95, sites=3)
+    assert np.isnan([many.event_low, many.event_high]).all()
     assert many.notes == (NO_EVENT_RANGE,)
-    one = answer_given(model, {name: float(v[0]) for name, v in given.items()}, 0.95)
-    assert one.event_low is None
-    assert one.event_high is None
+    one = answer_given(model, {name: float(v[0]) for name, v in given.items()}, 0.95, sites=3)
+    assert one.event_low is one.event_high is None
     assert NO_EVENT_RANGE in one.warnings
-    assert one.as_dict()["event_low"] is None
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])

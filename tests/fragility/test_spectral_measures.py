@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import EventSpread
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
@@ -52,7 +51,6 @@ def model() -> FragilityModel:
         form=form,
         parameters=(0.1, 3.0),
         errors=ParameterErrors((0.01, 0.0, 0.04), ()),
-        event_spread=EventSpread.of(0.1),
         vertical=False,
     )
 

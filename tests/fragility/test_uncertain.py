@@ -12,7 +12,8 @@ from scipy.stats import multivariate_normal, norm, truncnorm
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.joint import share_range
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
@@ -70,18 +71,14 @@ def test_lognormal_blocks_and_fragilities_add_their_variances(sigmas: tuple[floa
     assert answer.ci_high == pytest.approx(norm.cdf(eta + reach), abs=2e-6)
 
 
-def test_one_earthquake_moves_all_blocks_alike() -> None:
-    model = lognormal(-0.2, 0.9, 0.25)
-    spread = model.event_spread
-    assert spread is not None
-    z = np.linspace(-8.0, 8.0, 20001)
-    weight = np.exp(-0.5 * z * z) / np.exp(-0.5 * z * z).sum()
-    of_each = answer_given(model, {**QUESTION, "ks": 0.2 * np.exp(0.3 * z)}, 0.9)
-    answer = one(model, **QUESTION, ks_sigma=0.3)
-    normal = quantiles_of(0.95).normal
-    ends = spread.ends(norm.ppf(of_each.probability), normal, arrays().ndtr)
-    assert answer.event_low == pytest.approx(weight @ ends[0], abs=1e-6)
-    assert answer.event_high == pytest.approx(weight @ ends[1], abs=1e-6)
+def test_ranges_at_sites_are_taken_at_the_mean() -> None:
+    question: dict[str, Any] = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, "sites": 5}
+    answer: Any = predict(**question, kr_sigma=0.3)
+    law = find_model(answer.model, ("pgv_m_s",)).dependence
+    assert law is not None
+    ends = share_range(answer.probability, law, 5)
+    assert (answer.event_low, answer.event_high) == ends
+    assert answer.event_low < answer.probability < answer.event_high
 
 
 @pytest.mark.parametrize("pga", [None, 0.5, 0.19])
@@ -90,7 +87,7 @@ def test_as_the_scatter_vanishes_the_answer_is_that_of_the_block(pga: float | No
     question |= {} if pga is None else {"pga_g": pga}
     certain = predict(**question)
     nearly = predict(**question, kr_sigma=1e-9, p2_sigma=1e-9)
-    for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+    for name in ("probability", "ci_low", "ci_high"):
         assert getattr(nearly, name) == pytest.approx(getattr(certain, name), abs=1e-8)
     assert nearly.block_sd == pytest.approx(0.0, abs=1e-7)
     assert certain.block_sd is None
@@ -165,7 +162,7 @@ def test_arrays_answer_as_single_blocks_do(kind: str) -> None:
     assert many.block_sd is not None
     for i in range(n):
         single: Any = predict(**{k: float(v[i]) for k, v in {**block, **motion}.items()})
-        for answered in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+        for answered in ("probability", "ci_low", "ci_high"):
             value = getattr(single, answered)
             assert getattr(many, answered)[i] == pytest.approx(value, rel=1e-9, abs=2e-8)
         if block[name][i] > 0.0:
@@ -180,7 +177,6 @@ def test_draws_are_answered_by_their_weighted_mean() -> None:
     assert isinstance(answer, Prediction)
     w = np.array(weights) / 4.0
     assert answer.probability == pytest.approx(w @ each.probability, rel=1e-12)
-    assert answer.event_high == pytest.approx(w @ each.event_high, rel=1e-9)
     variance = w @ (each.probability - answer.probability) ** 2
     assert answer.block_sd == pytest.approx(math.sqrt(variance), rel=1e-12)
     assert answer.ci_low < answer.probability < answer.ci_high

@@ -13,7 +13,6 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import binom, binomtest, chi2
 
-from benchmarks.joint_law import JointFailures
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
@@ -267,17 +266,6 @@ def test_closed_form_is_near_the_samples(tmp_path: Path) -> None:
     assert exact.failures == pytest.approx(sampled.failures)
     assert exact.loss_variance[0, 0] == pytest.approx(sampled.loss_variance[0, 0], rel=0.03)
     assert exact.any_fails[0, 0] == pytest.approx(sampled.any_fails[0, 0], abs=0.05)
-    # the same law by quadrature, without a sampler
-    everything = np.arange(sampled.portfolio.size)
-    pgv = np.where(sampled.portfolio.site == 2, 0.5, 0.45)
-    p = probability(sampled.portfolio.numbers["kr"] * STANDARD_GRAVITY_M_S2 / 2.0, pgv)
-    law = sampled.portfolio.dependence
-    assert law is not None
-    joint = JointFailures.of(p, sampled.portfolio.placement(everything), law)
-    curve = sampled.exceedance["the model's copula"]
-    for count in (1, 3, 6):
-        share = 100.0 * curve[count - 1].annual_rate
-        assert share == pytest.approx(joint.at_least(count), abs=4.0 * 0.5 / 200.0 + 1e-3)
     assert exact.exceedance == {}
 
 

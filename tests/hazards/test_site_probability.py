@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbfrag.fragility.dependence import EventSpread, normal_quantile, normal_share
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
@@ -33,24 +30,6 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
     each = predict(p2[None, :], kr[None, :], pgv_m_s=PGV[:, None], model=model).probability
     assert found.probability == pytest.approx(each @ [0.75, 0.25], rel=1e-14)
     assert found.probability[0] == 0.0
-
-
-def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> None:
-    known = replace(model, event_spread=EventSpread.of(0.2))
-    found = site_probability(
-        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
-    )
-    reach, spread = -normal_quantile(0.025), EventSpread.of(0.2)
-    ends = [
-        spread.ends(normal_quantile(p), reach, normal_share) for p in found.probability.tolist()
-    ]
-    assert found.event_low == pytest.approx([low for low, _ in ends], rel=1e-9)
-    assert found.event_high == pytest.approx([high for _, high in ends], rel=1e-9)
-    nothing = site_probability(
-        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
-        model=replace(model, event_spread=None),
-    )  # fmt: skip
-    assert np.isnan([nothing.event_low, nothing.event_high]).all()
 
 
 def test_own_blocks(model: FragilityModel) -> None:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import EventSpread
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
+from tests.fragility.portfolio_draws import SHARED
 from tests.plots.critical_values import straight_line_model
 
 BLOCK = {"p2": 3.0, "kr": 0.1}
@@ -29,7 +30,7 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
         answer = predict(3.0, 0.1, pgv_m_s=float(x[i]), model=model, level=0.9)
         assert y[i] == pytest.approx(answer.probability, rel=1e-12)
         assert inside[i] == answer.in_domain
-        (interval,) = axes.collections  # of one earthquake this model knows nothing
+        (interval,) = axes.collections  # no sites are asked for
         band = interval.get_paths()[0].vertices
         here = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
         assert (here.min(), here.max()) == pytest.approx((answer.ci_low, answer.ci_high))
@@ -37,16 +38,17 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
     assert "360 critical blocks of 7 earthquakes" in axes.get_title()
 
 
-def test_the_range_of_one_earthquake_is_a_second_band(tmp_path, caught) -> None:
+def test_the_range_at_some_sites_is_a_second_band(tmp_path, caught) -> None:
     figures = caught(module)
-    model = replace(straight_line_model(), event_spread=EventSpread.of(0.1))
-    plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9)
+    row = replace(straight_line_model().row, dependence=SHARED)
+    model = FragilityModel.from_row(row)
+    plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9, sites=5)
     axes = figures[0].axes[0]
     event, interval = axes.collections
-    assert "one single earthquake (90 %)" in event.get_label()
+    assert "at 5 site(s) of one earthquake (90 %)" in event.get_label()
     assert "interval of P" in interval.get_label()
     x = axes.lines[0].get_xdata()[150]
-    answer = predict(3.0, 0.1, pgv_m_s=float(x), model=model, level=0.9)
+    answer = predict(3.0, 0.1, pgv_m_s=float(x), model=model, level=0.9, sites=5)
     for band, ends in (
         (event, (answer.event_low, answer.event_high)),
         (interval, (answer.ci_low, answer.ci_high)),

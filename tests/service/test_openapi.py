@@ -52,7 +52,7 @@ def test_every_operation_documents_its_errors(client):
 
 
 NO_UNIT = {"kr", "ky", "ks", "kind", "model", "level", "trace", "units", "n", "seed", "imt", "site",
-           "convert", "convert_sigma", "component", "polarity", "reverse", "map",
+           "sites", "convert", "convert_sigma", "component", "polarity", "reverse", "map",
            "no_back", "restitution", "p2_sigma", "kr_sigma", "ky_sigma", "ks_sigma", "ps2_sigma",
            "restitution_sigma", "magnitude"}  # fmt: skip
 

@@ -92,7 +92,7 @@ def plot_curve(
         "What the curve runs over: pgv, pga, pgd or sa10. Default: pgv, or what "
         "--model reads first."
     ),
-    answering: options.Answering,
+    answering: options.Ranging,
     beside: str | None = option(
         "Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
         "pelicun table (.csv).",
@@ -101,8 +101,9 @@ def plot_curve(
 ) -> None:
     """Draw the fragility curve of one block over a measure of the shaking.
 
-    One band is the interval of P as far as the data tell it, the other the share of such blocks
-    that may fail in one single earthquake. The other measures are held at the values given.
+    The band is the interval of P as far as the data tell it; with --sites a second one is the share
+    of such blocks that fails at so many sites of one earthquake. The other measures are held at the
+    values given.
     """
     from rbfrag.plots import plot
 

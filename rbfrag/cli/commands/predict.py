@@ -74,8 +74,8 @@ def predict(
     """Print the probability that a block fails.
 
     P is the share of such blocks that fail over all earthquakes and sites with these measures, its
-    interval how well the data tell that share, and the range of one earthquake what share of such
-    blocks at many sites may fail in one single earthquake.
+    interval how well the data tell that share. One block falls or stands; with --sites a range says
+    what share of such blocks fails at so many sites of one earthquake.
 
     What is known of the motion decides which model answers: PGV, alone or with PGA and Tm; a
     spectral acceleration; PGA; PGA with spectral accelerations; or the motion itself. Where the

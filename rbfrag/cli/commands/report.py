@@ -39,7 +39,7 @@ def report(
     rate: Hazard,
     meaning: options.Curve,
     heading: Heading,
-    answering: options.Answering,
+    answering: options.Ranging,
     json: options.Json = False,
 ) -> None:
     """Write one page about one block: PDF or HTML to attach.

@@ -15,6 +15,7 @@ from rbfrag.question.fields import (
     FailureFields,
     NumberFields,
     PlaneFields,
+    RangeFields,
     ShakingFields,
     ShapeFields,
     WholeFields,
@@ -87,6 +88,9 @@ Measures = Annotated[Given, fields_of(ShakingFields)]
 
 Answering = Annotated[Given, fields_of(AnsweringFields)]
 """Which fragility model answers, and how wide its interval is, by field."""
+
+Ranging = Annotated[Given, fields_of(RangeFields)]
+"""The same, and what the range of one earthquake is of."""
 
 BlockDraws = Annotated[
     str | None,

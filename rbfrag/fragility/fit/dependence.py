@@ -118,10 +118,8 @@ def estimate_dependence(
     )
 
 
-def dependence_of_fit(
-    data: FitData, block: BlockParameters, held_out: FloatArray, *, seed: int
-) -> DependenceEstimate:
-    """Estimate the copula of the blocks that a model was fitted to.
+def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray) -> ObservedBlocks:
+    """Return the blocks of a fit with what they did, of the strengths that it reads.
 
     Blocks without a size count as those of one size, their strength as their velocity. Of blocks
     that differ in more than size and strength those are read that have the most of it.
@@ -129,10 +127,9 @@ def dependence_of_fit(
     Args:
         block: what describes its blocks.
         held_out: probabilities of the blocks of the grid without their earthquake, shape (n, m).
-        seed: of pairs drawn and of resamples.
 
     Raises:
-        FitError: too few earthquakes or pairs, or it is not known which motions are of one site.
+        FitError: it is not known which motions are of one site.
     """
     if data.recording is None:
         raise FitError("which motions are components of one recording is not known")
@@ -146,7 +143,7 @@ def dependence_of_fit(
     alike = np.ones(shape[0], dtype=np.bool_)
     for name in block.stored:
         alike &= data.values[name] == data.values[name].max()
-    return estimate_dependence(
+    return ObservedBlocks(
         probability=held_out.ravel(),
         failed=np.where(data.read & alike[:, None], data.failed, np.nan).ravel(),
         earthquake=each(data.event),
@@ -155,7 +152,6 @@ def dependence_of_fit(
         polarity=each(data.polarity),
         p2=size.ravel(),
         y_m_s=strength.ravel(),
-        seed=seed,
     )
 
 

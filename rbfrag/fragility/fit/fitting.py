@@ -15,7 +15,7 @@ from rbfrag.db.rows import CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
-from rbfrag.fragility.fit.dependence import dependence_of_fit
+from rbfrag.fragility.fit.dependence import estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
@@ -260,7 +260,8 @@ def _dependence(
 ) -> tuple[dict[str, object] | None, list[str]]:
     """Return what blocks of one earthquake share as models store it, or why it is not known."""
     try:
-        estimate = dependence_of_fit(data, method.block, result.held_out, seed=seed)
+        blocks = observed_blocks(data, method.block, result.held_out)
+        estimate = estimate_dependence(seed=seed, **blocks)
     except FitError as error:
         return None, [f"the range of one future earthquake is not known: {error}"]
     return {

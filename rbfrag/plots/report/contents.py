@@ -23,7 +23,7 @@ from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures,
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
 from rbfrag.question.document import prediction_document
-from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.fields import AnsweringFields, RangeFields
 from rbfrag.question.keywords import model_for
 from rbfrag.question.question import described
 from rbfrag.question.words import number_in_words
@@ -124,7 +124,7 @@ class Contents:
 
 
 def contents_of(
-    given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[AnsweringFields]
+    given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[RangeFields]
 ) -> Contents:
     """Answer a question about one block.
 
@@ -140,7 +140,10 @@ def contents_of(
     document = prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how)
     facts = facts_of(document["kind"])
     numbers = dict(group.numbers)
-    model = model_for({**answering, "model": document["model"]}, [*known], facts.kind)
+    of_model: AnsweringFields = {"model": document["model"]}
+    if "db" in answering:
+        of_model["db"] = answering["db"]
+    model = model_for(of_model, [*known], facts.kind)
     answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), answering)
     about_rate: tuple[str, ...] = ()
     if answered is not None:
@@ -169,14 +172,12 @@ def contents_of(
     )
 
 
-def _rate(
-    block: Mapping[str, Any], question: RateQuestion, answering: AnsweringFields
-) -> Rate | None:
+def _rate(block: Mapping[str, Any], question: RateQuestion, answering: RangeFields) -> Rate | None:
     if question.curve is None:
         return None
     curves = as_curves(question.curve, **question.meaning)
     # another model reads the curve's measure alone
-    how: dict[str, Any] = {name: v for name, v in answering.items() if name != "model"}
+    how: dict[str, Any] = {name: v for name, v in answering.items() if name in ("level", "db")}
     answer = hazard(curves, years=question.years, **block, **question.meaning, **how)
     return Rate(curves[0], answer, as_dict([curves[0]], [[None]], [answer]))
 
@@ -258,7 +259,8 @@ def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[T
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append((f"in one earthquake ({level})", _interval(*ends)))
+        of = f"share at {document['sites']} site(s) of one earthquake ({level})"
+        answer.append((of, _interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]

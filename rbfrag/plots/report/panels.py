@@ -67,7 +67,7 @@ def _curve(part: FigureBase, contents: Contents) -> None:
     draw_curve(
         axes, contents.model, contents.numbers, first,
         {name: contents.measures[name] for name in others}, level=contents.document["level"],
-        at=contents.measures[first],
+        at=contents.measures[first], sites=contents.document.get("sites"),
     )  # fmt: skip
     part.legend(loc="outside lower center", fontsize=7, frameon=False)
 

@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import AnsweringFields, ShakingFields
+from rbfrag.question.fields import RangeFields, ShakingFields
 from rbfrag.question.keywords import BlockKeywords, parts_of
 
 SUFFIXES = (".pdf", ".png", ".html")
@@ -35,7 +35,7 @@ class ReportKeywords(
     ShakingFields[float | None],
     _Spectrum,
     CurveKeywords,
-    AnsweringFields,
+    RangeFields,
     total=False,
 ):
     """What a report is of: a block, its shaking, the curve of a rate, and which model answers."""
@@ -61,9 +61,10 @@ def report(
         years: period of the probability [a].
         title: title of the page.
         date: date that is printed on it; nothing is, if empty.
-        question: fields of block and shaking, ``sa_g`` and ``kind``, ``model`` (a name), ``level``
-            and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``, ``component``,
-            ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard` has them.
+        question: fields of block and shaking, ``sa_g`` and ``kind``, ``model`` (a name), ``level``,
+            ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``,
+            ``component``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard`
+            has them.
 
     Returns:
         The path.
@@ -73,7 +74,7 @@ def report(
         UnknownFieldError: a keyword that is none.
     """
     block, shaking, spectrum, meaning, answering = parts_of(
-        (), question, BlockKeywords, ShakingFields, _Spectrum, CurveKeywords, AnsweringFields
+        (), question, BlockKeywords, ShakingFields, _Spectrum, CurveKeywords, RangeFields
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     rate = RateQuestion(curve, years, meaning)
@@ -88,7 +89,7 @@ def write_report(
     *,
     title: str = TITLE,
     date: str = "",
-    **answering: Unpack[AnsweringFields],
+    **answering: Unpack[RangeFields],
 ) -> Contents:
     """Write the report of a block.
 

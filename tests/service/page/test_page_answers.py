@@ -29,6 +29,7 @@ def forgive(opened, words):
         {"pga": "0.4", "tm": "0.5"},
         {"pga": "0.7", "tm": "0.3", "kr": "0.03", "pgv": ""},
         {"pgd": "0.4", "tm": "0.6", "level": "0.8", "pgv": ""},
+        {"sites": "5", "level": "0.9"},
         {"pgv": "0"},
         {"pgv": "2.9", "kr": "0.0005"},
     ],
@@ -36,7 +37,7 @@ def forgive(opened, words):
 def test_the_answer_is_the_services(open_page, ask, typed):
     opened = open_page()
     page = opened.page
-    if set(typed) & {"tm", "pgd", "level"}:
+    if set(typed) & {"tm", "pgd", "level", "sites"}:
         for part in ("more-shaking", "model-part"):
             page.locator(f"#{part} summary").click()
     for name, text in typed.items():
@@ -50,7 +51,7 @@ def test_the_answer_is_the_services(open_page, ask, typed):
     assert agrees(high, answer["ci_high"])
     expect(page.locator("#meter .one-event")).to_be_attached()
     if answer["event_low"] is not None and answer["probability"] > 0.0:
-        assert "In one single earthquake" in opened.text("#in-words")
+        assert "of one earthquake" in opened.text("#in-words")
     warnings = [each for each in answer["warnings"] if not each.startswith(SAID_ELSEWHERE)]
     assert page.locator("#warnings li").all_text_contents() == warnings
     inside = "within" if answer["in_domain"] else "outside"

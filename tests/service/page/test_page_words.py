@@ -42,7 +42,7 @@ def test_words_count_what_the_numbers_say(run):
     answers = [
         {
             **{"kind": kind, "probability": p, "ci_low": low, "ci_high": high, "level": 0.95},
-            **{"event_low": least, "event_high": greatest},
+            **{"event_low": least, "event_high": greatest, "sites": 5},
         }
         for kind, p, low, high, least, greatest in [
             ("toppling", 0.12, 0.08, 0.17, 0.05, 0.4),
@@ -53,14 +53,14 @@ def test_words_count_what_the_numbers_say(run):
         ]
     ]
     twelve, few, most, hardly, none = run("percent.js", "inOneSentence", [[a] for a in answers])
-    assert twelve.startswith("Of 100 such blocks about 12 topple in shaking like this")
-    assert few.startswith("Of 1\u202f000 such blocks about 4 overturn")
-    assert most.startswith("Of 10\u202f000 such blocks about 9\u202f996 slide too far")
-    assert hardly.startswith("Of 10\u202f000 such blocks fewer than 1 slump")
+    assert twelve.endswith("shaking like this, about 12 topple.")
+    assert few.endswith("about 4 overturn.")
+    assert most.endswith("about 9\u202f996 slide too far.")
+    assert hardly.endswith("fewer than 1 slump.")
     assert none.startswith("No earthquake motion")
     twelve, few, most, hardly, none = run("percent.js", "ranges", [[a] for a in answers])
-    assert "it is between 8 and 17. In one single earthquake it may be between 5 and 40." in twelve
-    assert "single earthquake" not in few
+    assert "it is between 8 and 17. At 5 sites of one earthquake, facing all sides" in twelve
+    assert "earthquake" not in few
     assert "almost all" in most
     assert hardly.startswith("As far as the data tell, it is fewer than 1.")
     assert none == ""

@@ -4,7 +4,7 @@ import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
 import { quantity, readable } from "./numbers.js";
 import { byId } from "./page.js";
-import { inOneSentence, percent, ranges, verbOf } from "./percent.js";
+import { atSites, inOneSentence, percent, ranges, verbOf } from "./percent.js";
 import { writeText } from "./subscripts.js";
 
 const SPOKEN_AFTER_MS = 700;
@@ -69,7 +69,7 @@ export function showAnswer(answer) {
   const event =
     answer.event_low === null
       ? ""
-      : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
+      : ` At ${atSites(answer)} ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
   const failure = `Probability of ${answer.failure.replace("permanent displacement above", "sliding more than")}`;
   byId("answer-title").textContent = failure;
   speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
@@ -144,7 +144,7 @@ function mark(state) {
 }
 
 /**
- * The probability, its interval and the range of one earthquake on a line from 0 to 100 %.
+ * The probability, its interval and the range at some sites on a line from 0 to 100 %.
  * @param {any} answer
  */
 function drawMeter(answer) {

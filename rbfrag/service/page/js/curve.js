@@ -1,4 +1,4 @@
-/** The fragility curve of the reader's block, its interval and the range of one earthquake. */
+/** The fragility curve of the reader's block, its interval and the range at some sites. */
 
 import { drawAxis, drawGrid, gridLines } from "./axes.js";
 import { MARGINS } from "./chart.js";
@@ -25,7 +25,7 @@ export function fragilityCurve(place) {
   /** @type {{x: number, probability: number, ci_low: number, ci_high: number} | null} */
   let spot = null;
   const name =
-    "Fragility curve of this block with its interval and the range of one single earthquake";
+    "Fragility curve of this block with its interval and, if asked for, the range at some sites";
   const sheet = sheetIn(place, name, MARGINS, () => 230, draw);
   const { svg, plot } = sheet();
   const clip = svg.append("clipPath").attr("id", "curve-clip").append("rect");

@@ -16,7 +16,7 @@ const NAMES = [
 
 /** Fields of which no 0 is answered. */
 const ABOVE_ZERO = new Set(
-  "height width p2 kr restitution displacement r3 s1 s2 tm magnitude level dt".split(" "),
+  "height width p2 kr restitution displacement r3 s1 s2 tm magnitude level sites dt".split(" "),
 );
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
@@ -57,7 +57,7 @@ export function formFields(form, changed) {
     }
     const { values } = question;
     if (FURTHER.some((name) => values[name])) open(byId("more-shaking"));
-    if (values.model || values.level !== DEFAULTS.level) open(byId("model-part"));
+    if (values.model || values.sites || values.level !== DEFAULTS.level) open(byId("model-part"));
     const { kind } = question.values;
     for (const radio of radios("shape")) radio.checked = radio.value === shape;
     for (const radio of radios("kind")) radio.checked = radio.value === kind;

@@ -8,7 +8,7 @@ import { latest } from "./latest.js";
 import { modelNamed } from "./models.js";
 import { fromField, quantity } from "./numbers.js";
 import { byId } from "./page.js";
-import { percent, verbOf } from "./percent.js";
+import { atSites, percent, verbOf } from "./percent.js";
 import { labelOf, planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
@@ -121,8 +121,8 @@ export function figures(moved, failed) {
       if (hasChart) writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
         `Share of such blocks that ${verbOf(answer)}. Dark band: as far as the data tell it.` +
-        (answer.event_low === null ? "" : " Light band: in one single earthquake.") +
-        ` (Each ${percent(answer.level)}.)`;
+        (answer.event_low === null ? "" : ` Light band: at ${atSites(answer)}.`) +
+        ` (${percent(answer.level)}.)`;
     },
     /**
      * Show the point where the reader has moved it, before there is an answer.

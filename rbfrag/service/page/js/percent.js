@@ -33,7 +33,8 @@ export function verbOf({ kind }) {
 
 /**
  * @typedef {{kind: string, probability: number, ci_low: number, ci_high: number,
- *   event_low: number | null, event_high: number | null, level: number}} Answer
+ *   event_low: number | null, event_high: number | null, level: number,
+ *   sites?: number | null}} Answer
  */
 
 /**
@@ -46,17 +47,18 @@ export function inOneSentence(answer) {
   if (p === 0 && high === 0) return "No earthquake motion with this shaking makes the block fail.";
   const of = among(p);
   return (
-    `Of ${grouped(of)} such blocks ${about(p, of)} ${verbOf(answer)} in shaking like this, ` +
-    "over all earthquakes and sites."
+    `This block fails or stands: of ${grouped(of)} such cases, over all earthquakes and sites with ` +
+    `shaking like this, ${about(p, of)} ${verbOf(answer)}.`
   );
 }
 
 /**
- * What its interval and the range of one earthquake mean.
+ * What its interval and the range at some sites of one earthquake mean.
  * @param {Answer} answer
  * @returns {string}
  */
-export function ranges({ probability: p, ci_low: low, ci_high: high, event_low, event_high, level }) {
+export function ranges(answer) {
+  const { probability: p, ci_low: low, ci_high: high, event_low, event_high, level } = answer;
   if (p === 0 && high === 0) return "";
   const of = among(p);
   const between = (/** @type {number} */ a, /** @type {number} */ b) =>
@@ -64,8 +66,18 @@ export function ranges({ probability: p, ci_low: low, ci_high: high, event_low, 
   const event =
     event_low === null || event_high === null
       ? ""
-      : ` In one single earthquake it may be ${between(event_low, event_high)}.`;
-  return `As far as the data tell, it is ${between(low, high)}.${event} (Each ${percent(level)}.)`;
+      : ` At ${atSites(answer)}, facing all sides, ${percent(event_low)} to ${percent(event_high)} of ` +
+        `such blocks ${verbOf(answer)}.`;
+  const each = event ? "Each " : "";
+  return `As far as the data tell, it is ${between(low, high)}.${event} (${each}${percent(level)}.)`;
+}
+
+/**
+ * Which sites the range of one earthquake is of.
+ * @param {{sites?: number | null}} answer
+ */
+export function atSites({ sites }) {
+  return `${sites} site${sites === 1 ? "" : "s"} of one earthquake`;
 }
 
 /**

@@ -28,7 +28,7 @@ export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa20_g", "sa30_g", "ar
 
 export const MEASURES = ["pgv", "pga", ...FURTHER];
 
-export const MODEL_FIELDS = ["model", "level"];
+export const MODEL_FIELDS = ["model", "level", "sites"];
 
 /** A block in each of its descriptions, and a strong shaking. */
 export const DEFAULTS = {
@@ -60,6 +60,7 @@ export const DEFAULTS = {
   magnitude: "",
   model: "",
   level: "0.95",
+  sites: "",
 };
 
 /** Friction of a block that is no rectangle, of which it must be known [deg]. */

@@ -3,7 +3,7 @@
 import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
-import { blockOf, MEASURES, only } from "./question.js";
+import { blockOf, MEASURES, MODEL_FIELDS, only } from "./question.js";
 import { sizesFor, spectrumOf } from "./record.js";
 
 /**
@@ -32,7 +32,7 @@ export function askDrawing(question) {
 export function askProbability(question, kind) {
   const { no_back, ...block } = blockOf(question);
   const free = question.shape === "numbers" ? {} : { no_back };
-  const names = [...MEASURES, "model", "level"];
+  const names = [...MEASURES, ...MODEL_FIELDS];
   return get("v1/predict", {
     ...{ ...block, ...free, kind },
     ...only(question.values, [...optionsOf(kind), ...names]),
@@ -84,6 +84,7 @@ export async function askCurve(plane, model, failing, question) {
     [plane.across]: xs.map(rounded),
     model,
     level: fromField(question.values.level),
+    ...(question.values.sites === "" ? {} : { sites: fromField(question.values.sites) }),
   });
   const { probability, ci_low, ci_high, event_low, event_high, in_domain } = answer;
   return { plane, xs, probability, ci_low, ci_high, event_low, event_high, in_domain };
