@@ -67,24 +67,28 @@ MODELS: tuple[dict[str, Any], ...] = (
     {"method": "bounded", "term": "pga_sa10"},
     {"method": "bounded", "term": "pga_sa03_sa10_sa30"},
     {"method": "record", "term": "xp"},
-    {"method": "wls", "term": "pgv"},
-    {"method": "logistic", "term": "pga_tm"},
-    {"method": "logistic", "term": "pgd_tm"},
-    {"kind": "sliding", "term": "pgv_pga"},
-    {"kind": "sliding", "term": "pgv"},
+    *(
+        {"method": method, "term": term}
+        for method in ("wls", "logistic")
+        for term in ("pgv", "pga_tm", "pgd_tm")
+    ),
+    *({"kind": "sliding", "term": term} for term in ("pgv_pga_m", "pgv_pga", "pgv_pga_ia", "pgv")),
 )
 """The models that are shipped and fitted to what is shipped."""
 
 MODELS_OF_ALL: tuple[dict[str, Any], ...] = (
-    {"kind": "rocking", "term": "pgv_pga"},
-    {"kind": "rocking", "term": "pga_sa10"},
-    {"kind": "rocking", "term": "pgv"},
-    {"kind": "rocking", "term": "sa10"},
-    {"kind": "slumping", "term": "pgv_pga_m", "rotation_deg": None},
-    {"kind": "slumping", "term": "pgv_pga", "rotation_deg": None},
-    {"kind": "slumping", "term": "pgv_pga_m", "rotation_deg": 2.0},
-    {"kind": "slumping", "term": "pgv_pga", "rotation_deg": 2.0},
-)
+    *(
+        {"kind": "rocking", "term": term}
+        for term in (
+            "pgv_pga_sa10_sa30", "pgv_pga", "pgv", "sa10", "pga_sa10", "pga_sa10_sa30", "pga_m",
+        )
+    ),
+    *(
+        {"kind": "slumping", "term": term, "rotation_deg": rotation}
+        for rotation in (None, 2.0)
+        for term in ("pgv_pga_m", "pgv_pga")
+    ),
+)  # fmt: skip
 """The models that are fitted to the full database: what they read is too much to be shipped."""
 
 MODELS_ALONE = tuple(dict.fromkeys(model["kind"] for model in MODELS_OF_ALL))

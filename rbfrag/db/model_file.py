@@ -182,6 +182,8 @@ RETIRED = {
     "logistic-sa03": "bounded-pga_sa03_sa10_sa30 (with PGA and SA(1.0), SA(3.0))",
     "logistic-sa20": "logistic-sa10 (with SA(1.0))",
     "logistic-sa30": "logistic-sa10 (with SA(1.0))",
+    "slumping-recovery-pgv": "slumping-recovery-pgv_pga (with PGA)",
+    "slumping-2deg-pgv": "slumping-2deg-pgv_pga (with PGA)",
 }
 """What answers in the place of models that were shipped once."""
 
