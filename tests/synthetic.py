@@ -55,7 +55,7 @@ def write_suite(folder: Path, count: int = 6) -> Path:
 
 
 def unknown_spectrum(n: int) -> dict[str, np.ndarray]:
-    """Return the columns of spectral accelerations of n motions of which none is known."""
+    """Return the columns of what is not known of n motions: spectrum, energy and magnitude."""
     from rbfrag.db.rows import SPECTRAL_COLUMNS
 
-    return {name: np.full(n, np.nan) for name in SPECTRAL_COLUMNS}
+    return {name: np.full(n, np.nan) for name in (*SPECTRAL_COLUMNS, "arias_m_s", "magnitude")}

@@ -120,6 +120,8 @@ def rockmass(
         pgd_m: peak ground displacement [m].
         sa03_g, sa10_g, sa20_g, sa30_g: spectral accelerations [g]; or all of them as sa_g, by
             their period [s], as in :func:`rbfrag.predict`.
+        arias_m_s: Arias intensity [m/s].
+        magnitude: magnitude of the earthquake.
         motion: accelerogram, or its file, that every block is run under in its own mode.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` (positive samples drive out of the slope; if left out) or ``reverse``.

@@ -150,7 +150,7 @@ def combination_table(
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = (
         "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s", "pga_g", "pgv_m_s",
-        "tm_s",
+        "tm_s", "arias_m_s", "magnitude",
     )  # fmt: skip
     others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
@@ -316,12 +316,13 @@ def _combination_query() -> Select[Any]:
         "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
         "upper", "kr", "y_m_s",
     )  # fmt: skip
-    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *SPECTRAL_COLUMNS, "flags")
+    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", "arias_m_s", *SPECTRAL_COLUMNS, "flags")
     return select(
         *(combination.c[name] for name in own),
         *(motion.c[name] for name in of_motion),
         earthquake.c.event_id,
         earthquake.c.guessed,
+        earthquake.c.magnitude,
     ).select_from(
         combination.join(motion, motion.c.id == combination.c.motion_id)
         .join(recording)

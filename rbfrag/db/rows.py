@@ -128,7 +128,8 @@ class CombinationTable:
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``,
     `upper`, the upper end of the bracket of `kr_over_pga`, where there is none;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
-    is in doubt, unless it was asked for; spectral accelerations where they were not computed.
+    is in doubt, unless it was asked for; spectral accelerations and Arias intensity where they
+    were not computed, `magnitude` where it is not known.
     `block` is JSON text, None where p² says all; `yield_g` is NaN where that names no strength.
     `numerics_version` is the same in all rows.
     """
@@ -157,3 +158,5 @@ class CombinationTable:
     sa10_g: NDArray[np.float64]
     sa20_g: NDArray[np.float64]
     sa30_g: NDArray[np.float64]
+    arias_m_s: NDArray[np.float64]
+    magnitude: NDArray[np.float64]

@@ -54,6 +54,8 @@ _DESCRIPTIONS = {
         name: ("g", f"the spectral acceleration at {period:g} s and 5 % damping in g, 0 or more")
         for period, name in SPECTRAL.items()
     },
+    "arias_m_s": ("m/s", "the Arias intensity in m/s, 0 or more"),
+    "magnitude": ("", "the magnitude of the earthquake, above 0"),
     "xp_m_s": ("m/s", "the toppling spectrum X(p) in m/s, 0 or more"),
     "intensity_m_s": ("m/s", ""),
     "y_m_s": ("m/s", ""),
@@ -67,7 +69,10 @@ def _described(name: str) -> tuple[str, str]:
     return _DESCRIPTIONS.get(name, ("", f"{name}, a number"))
 
 
-_ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s": "earthquake"}
+_ABOVE_ZERO = {
+    **dict.fromkeys(("p2", "ps2", "displacement_m"), "block"),
+    **dict.fromkeys(("tm_s", "magnitude"), "earthquake"),
+}
 
 
 @dataclass(frozen=True)
@@ -204,7 +209,7 @@ def answer_with_findings(
         at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
     )
     floored = dict(given)
-    for name in (block.strength, "pga_g", *SPECTRAL.values()):
+    for name in (block.strength, "pga_g", "arias_m_s", *SPECTRAL.values()):
         if name in floored:
             floored[name] = ns.maximum(floored[name], LEAST)
     values = block.completed(floored, term, ns)

@@ -197,7 +197,7 @@ TERMS: Mapping[str, Term] = {
 }
 """The terms by name; those of one level by falling skill (docs/theory/fragility.md)."""
 
-STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m")
+STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m", "arias_m_s", "magnitude")
 """The measures that a question may state, by name."""
 
 MEASURES = frozenset({*STATED, "xp_m_s"})
@@ -274,6 +274,8 @@ CREDIBLE = {
         "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
         "s): is PGV in m/s and PGA in g?",
     ),
+    "arias_m_s": (0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
+    "magnitude": (3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
     "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
     "kr": (0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
     "ky": (0.0, 5.0, _STEEP),

@@ -48,7 +48,7 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
-    extra = [name for name in given if name in STATED]
+    extra = [name for name in given if name in STATED and name != "magnitude"]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
@@ -122,7 +122,7 @@ def measures_of(
         spectrum: spectral accelerations too.
     """
     measures: dict[str, float] = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s}
-    measures["pgd_m"] = motion.pgd_m
+    measures |= {"pgd_m": motion.pgd_m, "arias_m_s": motion.measures.arias_m_s}
     if motion.tm_s is not None:
         measures["tm_s"] = motion.tm_s
     if spectrum:

@@ -54,6 +54,8 @@ FIXED = {
     "pgv_m_s": "PGV = {:g} m/s",
     "pga_g": "PGA = {:g} g",
     "tm_s": "$T_m$ = {:g} s",
+    "arias_m_s": "$I_a$ = {:g} m/s",
+    "magnitude": "$M$ = {:g}",
     **{name: f"SA({period:.1f} s) = {{:g}} g" for period, name in SPECTRAL.items()},
 }
 

@@ -298,6 +298,25 @@ class ShakingFields(TypedDict, Generic[V], total=False):
     sa10_g: Annotated[V, _spectral("1.0")]
     sa20_g: Annotated[V, _spectral("2.0")]
     sa30_g: Annotated[V, _spectral("3.0")]
+    arias_m_s: Annotated[
+        V,
+        Field(
+            "Arias intensity, π/2g times ∫a² dt",
+            "m/s",
+            ("arias", "ia", "arias_intensity"),
+            least=0.0,
+        ),
+    ]
+    magnitude: Annotated[
+        V,
+        Field(
+            "Magnitude of the earthquake",
+            "",
+            ("mag", "mw", "moment_magnitude"),
+            above=0.0,
+            most=10.0,
+        ),
+    ]
 
 
 _KIND = Field(

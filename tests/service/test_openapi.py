@@ -54,7 +54,7 @@ def test_every_operation_documents_its_errors(client):
 NO_UNIT = {"kr", "ky", "ks", "kind", "model", "level", "trace", "units", "n", "seed", "imt", "site",
            "convert", "convert_sigma", "component", "polarity", "reverse", "map",
            "no_back", "restitution", "p2_sigma", "kr_sigma", "ky_sigma", "ks_sigma", "ps2_sigma",
-           "restitution_sigma"}  # fmt: skip
+           "restitution_sigma", "magnitude"}  # fmt: skip
 
 
 def test_every_quantity_has_its_unit(client):

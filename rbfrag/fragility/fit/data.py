@@ -22,7 +22,7 @@ from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
-from rbfrag.fragility.measures import SPECTRAL, Term
+from rbfrag.fragility.measures import STATED, Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
@@ -433,8 +433,7 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
-    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", *SPECTRAL.values())
-    return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in names}}
+    return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in STATED}}
 
 
 def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

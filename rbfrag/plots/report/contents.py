@@ -40,6 +40,8 @@ _MEASURES = {
     **{
         name: (f"spectral acceleration, SA({period:g} s)", "g") for period, name in SPECTRAL.items()
     },
+    "arias_m_s": ("Arias intensity", "m/s"),
+    "magnitude": ("magnitude", ""),
 }
 
 SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
@@ -242,7 +244,7 @@ def _block_rows(
 
 def _shaking_rows(measures: Mapping[str, float]) -> Rows:
     return tuple(
-        (name, f"{measures[key]:g} {unit}")
+        (name, f"{measures[key]:g} {unit}".strip())
         for key, (name, unit) in _MEASURES.items()
         if key in measures
     )

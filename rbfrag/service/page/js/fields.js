@@ -16,7 +16,7 @@ const NAMES = [
 
 /** Fields of which no 0 is answered. */
 const ABOVE_ZERO = new Set(
-  "height width p2 kr restitution displacement r3 s1 s2 tm level dt".split(" "),
+  "height width p2 kr restitution displacement r3 s1 s2 tm magnitude level dt".split(" "),
 );
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */

@@ -124,9 +124,10 @@ function lines([low, high], edges, count) {
  */
 function acrossOf(term) {
   if (term.startsWith("pgd")) return "pgd";
+  if (term.startsWith("pgv")) return "pgv";
   if (/(^|_)sa10(_|$)/.test(term)) return "sa10_g";
   if (/^sa[0-9]/.test(term)) return /** @type {Across} */ (`${term}_g`);
-  return term.startsWith("pga") ? "pga" : "pgv";
+  return "pga";
 }
 
 /**

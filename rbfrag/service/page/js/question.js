@@ -24,7 +24,7 @@ const OWN_FIELDS = /** @type {[Shape, string[]][]} */ ([
 ]);
 
 /** Of the shaking, what stands in the part of the form that is closed at first. */
-export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa20_g", "sa30_g"];
+export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa20_g", "sa30_g", "arias", "magnitude"];
 
 export const MEASURES = ["pgv", "pga", ...FURTHER];
 
@@ -56,6 +56,8 @@ export const DEFAULTS = {
   sa10_g: "",
   sa20_g: "",
   sa30_g: "",
+  arias: "",
+  magnitude: "",
   model: "",
   level: "0.95",
 };
