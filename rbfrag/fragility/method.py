@@ -195,7 +195,8 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
-        stored: names of what combinations say of their block beside its size, for `adjust`.
+        stored: what combinations say of their block beside its size, for `adjust`, by name: the
+            values of which fits read combinations, as those between tell them little more.
         fractions: those of the options that lie between 0 and 1 and whose scatter is one of
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
@@ -216,7 +217,7 @@ class BlockParameters:
     at_rest: Bound
     criterion: str | None = None
     options: tuple[str, ...] = ()
-    stored: tuple[str, ...] = ()
+    stored: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
     fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()

@@ -474,6 +474,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
     of_motion |= source.of_block
+    for name, values in method.block.stored.items():
+        readable &= np.isin(source.of_block[name], values)
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -595,7 +597,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     slid = np.full(n * m, np.nan) if given is None else given.ravel()
     measures = {name: value[own] for name, value in _measures(source).items()}
     beyond = np.maximum(slid, LEAST_DISPLACEMENT_M)
-    values = {name: measures[name] for name in ("pgv_m_s", "pga_g")}
+    values = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     values |= {
         method.block.strength: k * values["pga_g"],
         "intensity_m_s": term.intensity_m_s(values),
@@ -603,6 +605,8 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
         usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
+        for name in term.inputs:
+            usable &= np.isfinite(values[name])
         observed = slid >= LEAST_DISPLACEMENT_M
         failed = (beyond[:, None] > distances).astype(np.float64)
     return _Points(

@@ -2,11 +2,13 @@
 
 Sliding further than d on a level plane, with r = k_y/PGA:
 
-    eta = [c + b1 ln(PGV²/(k_y g)) + b2 ln(1 - r) - ln d]/σ,       ln σ = s0 + s1 r
+    eta = [c + b1 ln(PGV²/(k_y g)) + b2 ln(1 - r) + b3 m - ln d]/σ,       ln σ = s0 + s1 r
+
+where m is M - 6.5 if the magnitude is known, ln(Ia/PGV²) if the Arias intensity Ia [m/s] is,
 
 and, where PGA is not known, with u = ln(1 + k_y/(κ PGV)):
 
-    eta = [c + b1 ln(PGV²/(k_y g)) - b2 u - ln d]/σ,               ln σ = s0 + s1 u
+    eta = [c + b1 ln(PGV²/(k_y g)) - b2 u - ln d]/σ,               ln σ = s0 + s1 ln k_y
 
 P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
 """
@@ -14,12 +16,15 @@ P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import mul
 from typing import Any
 
 from rbfrag.fragility import fits
 from rbfrag.fragility.method import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+Formula = Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
 
 
 def _level(values: dict[str, Any], ns: Numbers) -> None:
@@ -61,16 +66,22 @@ BLOCK = BlockParameters(
 """Blocks known by k_y = tan(φ - β) and the displacement that is too far [m]."""
 
 
-def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    ky, pgv = v["ky"], v["pgv_m_s"]
-    r = ky / v["pga_g"]
-    size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
-    left = ns.log(1.0 - r)
-    log_sigma = b[3] + b[4] * r
-    per = ns.exp(-log_sigma)
-    eta = (b[0] + b[1] * size + b[2] * left - ns.log(v["displacement_m"])) * per
-    slopes = (per, size * per, left * per, -eta, -eta * r)
-    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, 1.0, r))
+def _eta(further: Callable[[Mapping[str, Any], Numbers], tuple[Any, ...]]) -> Formula:
+    """Return the formula with further terms of the median, from values and functions."""
+
+    def formula(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+        ky, pgv = v["ky"], v["pgv_m_s"]
+        r = ky / v["pga_g"]
+        size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
+        columns = (1.0, size, ns.log(1.0 - r), *further(v, ns))
+        log_sigma = b[-2] + b[-1] * r
+        per = ns.exp(-log_sigma)
+        median = sum(map(mul, b, columns))
+        eta = (median - ns.log(v["displacement_m"])) * per
+        slopes = (*(each * per for each in columns), -eta, -eta * r)
+        return Eta(eta, slopes, log_sigma, (*(0.0 for _ in columns), 1.0, r))
+
+    return formula
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -78,13 +89,14 @@ def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
     a = ky / (ns.exp(b[3]) * pgv)
     u = ns.log(1.0 + a)
-    w = a / (1.0 + a)
-    log_sigma = b[4] + b[5] * u
+    # of the strength, not of u: a scatter that grows as PGV falls would make P rise again
+    strength = ns.log(ky)
+    log_sigma = b[4] + b[5] * strength
     per = ns.exp(-log_sigma)
     eta = (b[0] + b[1] * size - b[2] * u - ns.log(v["displacement_m"])) * per
-    slope = (b[2] * per + eta * b[5]) * w
-    slopes = (per, size * per, -u * per, slope, -eta, -eta * u)
-    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, -b[5] * w, 1.0, u))
+    slope = b[2] * per * a / (1.0 + a)
+    slopes = (per, size * per, -u * per, slope, -eta, -eta * strength)
+    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, 0.0, 1.0, strength))
 
 
 METHOD = Method(
@@ -93,12 +105,23 @@ METHOD = Method(
     link=NORMAL,
     forms={
         "pgv_pga": Form(
-            ("c", "b1", "b2", "s0", "s1"), _pgv_pga, 0, (BLOCK.at_rest,),
-            start=(0.3, 0.8, 3.5, -0.5, 1.3),
+            ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), 0, (BLOCK.at_rest,),
+            start=(0.6, 0.9, 3.7, -0.6, 0.9),
+        ),
+        "pgv_pga_m": Form(
+            ("c", "b1", "b2", "b_magnitude", "s0", "s1"),
+            _eta(lambda v, _: (v["magnitude"] - 6.5,)), 0, (BLOCK.at_rest,),
+            start=(0.2, 0.8, 4.0, 0.4, -0.8, 1.4),
+        ),
+        "pgv_pga_ia": Form(
+            ("c", "b1", "b2", "b_arias", "s0", "s1"),
+            _eta(lambda v, ns: (ns.log(v["arias_m_s"] / (v["pgv_m_s"] * v["pgv_m_s"])),)),
+            0, (BLOCK.at_rest,),
+            start=(-0.9, 1.2, 2.7, 0.7, -0.8, 1.0),
         ),
         "pgv": Form(
             ("c", "b1", "b2", "ln_kappa", "s0", "s1"), _pgv, 0,
-            start=(0.8, 0.5, 2.9, -2.0, -0.3, 0.6),
+            start=(2.9, 0.1, 3.0, -3.3, 1.1, 0.3),
         ),
     },
     reads="critical",

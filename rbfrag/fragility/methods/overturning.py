@@ -1,26 +1,22 @@
 """The method ``overturning``: what free-standing blocks did, logistic, with their restitution.
 
-    P = 1/(1 + exp(-eta)), 0 from r = 1 on,   h(p) = exp(A l - B l²)
+    P = 1/(1 + exp(-eta)), 0 from r = 1 on,   eta = h(p) [sum of b times what the forms name]
 
-    pgv_pga    A = .15, B = .08   eta = h (b0 + b1 L + b2 ln z + b3 s + b4 s L)
-    pga_sa10   A = .40, B = .04         h (b0 + b1 L + b2 l + b3 l² + b4 s + b5 s L + b6 Q)
-    pgv        A = .35, B = .02         h (b0 + b1 u + b2 l + b3 l² + b4 s + b5 s u)
-    sa10       A = .45, B = .04         the same
-
-r = k_r/PGA, L = ln(r/(1 - r)), z = p PGV/(PGA g), l = ln p, u = ln(y/x), x being PGV or
-SA(1.0) g/2π, Q = ln(SA(1.0)/(2π PGA)), s = sqrt(1 - e). e is the speed after an impact over that
-before it: Housner's 1 - 1.5 sin² α (1963) of the rectangle with tan α = k_r, unless it is given.
-Of terms of second order in ln z P would rise again towards weak shaking. How well the models do
-stands in docs/theory/rocking.md.
+r = k_r/PGA, z = p PGV/(PGA g), l = ln p, V_T = SA g T/2π, u = ln(y/PGV) or ln(y/V_1),
+w_T = ln(V_T/PGV), Q_T = ln(V_T/(PGA g)), k' of :func:`rbfrag.fragility.method.log_strength`,
+s = sqrt(1 - e). e is the speed after an impact over that before it: Housner's 1 - 1.5 sin² α (1963)
+of the rectangle with tan α = k_r, unless it is given. Of terms of second order in ln z P would rise
+again towards weak shaking. How well the models do stands in docs/theory/rocking.md.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits, method
+from rbfrag.fragility.measures import spectral_velocity_m_s
 from rbfrag.fragility.method import (
     BlockParameters,
     Bound,
@@ -58,7 +54,7 @@ BLOCK = BlockParameters(
         "cannot overturn: P = 0 by mechanics, not by the model"
     ),
     options=("restitution",),
-    stored=("restitution_factor",),
+    stored={"restitution_factor": (1.0, 0.9)},
     fractions=("restitution",),
     adjust=_restitution,
     refuses=(
@@ -81,41 +77,90 @@ def _log_odds(v: Mapping[str, Any], ns: Numbers) -> Any:
     return ns.log(r / (1.0 - r))
 
 
-def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    odds, s = _log_odds(v, ns), v["speed_loss"]
-    z = ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    return linear(b, 1.0, odds, z, s, s * odds)
+def _log_z(v: Mapping[str, Any], ns: Numbers) -> Any:
+    return ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
 
 
-def _velocity(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    s = v["speed_loss"]
-    u, l = ns.log(v["y_m_s"] / v["intensity_m_s"]), ns.log(v["p"])  # noqa: E741  as in the formula
-    return linear(b, 1.0, u, l, l * l, s, s * u)
+def _small_magnitude(v: Mapping[str, Any], ns: Numbers) -> Any:
+    """Return M - 6.5, 0 from 6.5 on."""
+    return ns.minimum(v["magnitude"], _LARGE_MAGNITUDE) - _LARGE_MAGNITUDE
 
 
-def _pga_sa10(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    odds, s = _log_odds(v, ns), v["speed_loss"]
-    l = ns.log(v["p"])  # noqa: E741  as in the formula
-    q = ns.log(v["sa10_g"] / v["pga_g"] * (0.5 / math.pi))
-    return linear(b, 1.0, odds, l, l * l, s, s * odds, q)
+def _over_pgv(measure: str, period_s: float) -> Callable[[Mapping[str, Any], Numbers], Any]:
+    return lambda v, ns: ns.log(spectral_velocity_m_s(v[measure], period_s) / v["pgv_m_s"])
 
 
-_OF_VELOCITY = ("b0", "b_ln_y_over_x", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_ln_y_over_x")
+def _over_pga(measure: str, period_s: float) -> Callable[[Mapping[str, Any], Numbers], Any]:
+    # g drops out
+    return lambda v, ns: ns.log(v[measure] / v["pga_g"] * (period_s / (2.0 * math.pi)))
+
+
+_LARGE_MAGNITUDE = 6.5
+_FEATURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], Numbers], Any]]] = {
+    "logit_r": (r"\ln\frac{r}{1 - r}", _log_odds),
+    "ln_z": (r"\ln z", _log_z),
+    "ln_y_over_x": (r"\ln(y/x)", lambda v, ns: ns.log(v["y_m_s"] / v["intensity_m_s"])),
+    "s": ("s", lambda v, _: v["speed_loss"]),
+    "ln_p": (r"\ln p", lambda v, ns: ns.log(v["p"])),
+    "w10": ("w_1", _over_pgv("sa10_g", 1.0)),
+    "w30": ("w_3", _over_pgv("sa30_g", 3.0)),
+    "q10": ("Q_1", _over_pga("sa10_g", 1.0)),
+    "q30": ("Q_3", _over_pga("sa30_g", 3.0)),
+    "strength": ("k'", method.log_strength),
+    "magnitude": ("M'", _small_magnitude),
+}
+"""What forms are sums of, by the names of their coefficients: as mathtext, and from values."""
+
+
+def _form(
+    features: str, *products: tuple[str, str], a: float = 0.0, b: float = 0.0, of_pga: bool = True
+) -> Form:
+    """Return the form of a constant, some features, and products of two of them.
+
+    Args:
+        features: their names, with blanks between.
+        a: A of the factor h of size.
+        b: its B.
+        of_pga: whether PGA is read, which a block's strength is bounded by.
+    """
+    names = features.split()
+    parts = {name: _FEATURES[name] for name in names}
+
+    def formula(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+        known = {name: of(v, ns) for name, (_, of) in parts.items()}
+        return linear(b, 1.0, *known.values(), *[known[x] * known[y] for x, y in products])
+
+    return Form(
+        ("b0", *(f"b_{name}" for name in names), *(f"b_{x}_{y}" for x, y in products)),
+        formula, 0, (BLOCK.at_rest,) if of_pga else (),
+        size_factor=SizeFactor(a, b) if a else None,
+        terms=(
+            "1", *(text for text, _ in parts.values()),
+            *(rf"{parts[x][0]}\,{parts[y][0]}" for x, y in products),
+        ),
+    )  # fmt: skip
+
+
+_LOSS_AND_STRENGTH, _SQUARE = ("s", "logit_r"), ("ln_p", "ln_p")
 
 METHOD = Method(
     name="overturning",
     block=BLOCK,
     link=method.LOGIT,
     forms={
-        "pgv_pga": Form(
-            ("b0", "b_logit_r", "b_ln_z", "b_s", "b_s_logit_r"),
-            _pgv_pga, 0, (BLOCK.at_rest,), size_factor=SizeFactor(0.15, 0.08),
+        "pgv_pga_sa10_sa30": _form(
+            "logit_r ln_z s ln_p w10 w30",
+            _LOSS_AND_STRENGTH, ("w10", "ln_p"), ("w30", "ln_p"), a=0.15, b=0.08,
         ),
-        "pgv": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.35, 0.02)),
-        "sa10": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.45, 0.04)),
-        "pga_sa10": Form(
-            ("b0", "b_logit_r", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_logit_r", "b_ln_q10"),
-            _pga_sa10, 0, (BLOCK.at_rest,), size_factor=SizeFactor(0.4, 0.04),
+        "pgv_pga": _form("logit_r ln_z s", _LOSS_AND_STRENGTH),
+        "pgv": _form("ln_y_over_x ln_p s", _SQUARE, a=0.25, of_pga=False),
+        "sa10": _form("ln_y_over_x ln_p s strength", _SQUARE, a=0.30, of_pga=False),
+        "pga_sa10": _form("logit_r ln_p s q10", _SQUARE, _LOSS_AND_STRENGTH, a=0.30),
+        "pga_sa10_sa30": _form(
+            "logit_r ln_p s q10 q30", _SQUARE, ("q10", "ln_p"), ("q30", "ln_p"), a=0.20
+        ),
+        "pga_m": _form(
+            "logit_r ln_p s strength magnitude", _SQUARE, _LOSS_AND_STRENGTH, a=0.20
         ),
     },
     reads="outcomes",
