@@ -204,6 +204,8 @@ class BlockParameters:
         doubts: the combinations that make an answer doubtful.
         safe_steps: how many steps the stored grid goes on for fits above its strongest block, all
             of them safe by mechanics.
+        judged_kr: strength up to which fits are judged, where their grid goes on far beyond what
+            fails.
         points: how stored combinations become what a fit reads (`rbfrag.fragility.fit.data`): of
             blocks of any strength, of stored blocks under scaled records, or of displacements.
         support: what answers for its own kind take for granted of how a block stands; empty for
@@ -223,6 +225,7 @@ class BlockParameters:
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
     safe_steps: int = 0
+    judged_kr: float = math.inf
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
     support: str = ""
 

@@ -36,7 +36,7 @@ FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
 KR = (0.02, 1.0)
-"""k_r of the weakest and the strongest block that fits read: no rock stands at one degree."""
+"""k_r, or k_y, of the weakest and the strongest block that fits read: no rock stands at 1 degree."""
 
 REAL_KR = 0.05
 """Scores are also stated of the blocks from this k_r on, as most rock blocks are."""
@@ -484,6 +484,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     read = some_block & (kr <= KR[1])
     scored = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
     scored[:, simulated:] = False
+    scored &= kr <= method.block.judged_kr
     failed, source_of_outcomes = source.judged_outcomes(y0, y, least)
     some = (read | scored).any(axis=0)
     of_outcomes = method.reads == "outcomes"
@@ -605,6 +606,8 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
         usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
+        strength = values[method.block.strength]
+        usable &= (strength >= KR[0]) & (strength <= KR[1])
         for name in term.inputs:
             usable &= np.isfinite(values[name])
         observed = slid >= LEAST_DISPLACEMENT_M
@@ -623,6 +626,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
             **ratio_columns(measures),
             "pgv_m_s": values["pgv_m_s"],
             "pga_g": values["pga_g"],
+            method.block.strength: np.tile(KR, (k.size, 1)),
             "displacement_m": np.where(observed, beyond, np.nan),
             "k_over_pga": np.column_stack([k, np.ones(k.size)]),
         },

@@ -55,6 +55,7 @@ BLOCK = BlockParameters(
     ),
     options=("restitution",),
     stored={"restitution_factor": (1.0, 0.9)},
+    judged_kr=1.0,
     fractions=("restitution",),
     adjust=_restitution,
     refuses=(
