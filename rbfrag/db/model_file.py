@@ -205,18 +205,23 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-def held_out_loss(row: ModelRow, of: str = "") -> float:
+DECIDING = ("log_loss_held_out_kr05", "log_loss_held_out")
+"""Scores that models are chosen by: of blocks of k_r >= 0.05, or else of all."""
+
+
+def held_out_loss(row: ModelRow, *names: str) -> float:
     """Return the log loss of a model on earthquakes left out; infinite where it has none.
 
     Args:
-        of: ``_kr05`` for that of blocks of k_r >= 0.05; empty for that of all that it is judged on.
+        names: scores, of which the first that there is counts; empty for `DECIDING`.
     """
     scores = row.diagnostics.get("scores")
-    value = scores.get(f"log_loss_held_out{of}") if isinstance(scores, Mapping) else None
-    return float(value) if isinstance(value, int | float) else math.inf
+    known = scores if isinstance(scores, Mapping) else {}
+    values = (known.get(name) for name in names or DECIDING)
+    return next((float(value) for value in values if isinstance(value, int | float)), math.inf)
 
 
-def _last_of_all(row: ModelRow) -> bool:
+def answers_special_questions(row: ModelRow) -> bool:
     """Return whether a model answers special questions only: of a record, or of one rotation."""
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
@@ -232,7 +237,7 @@ def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | 
         of_kind,
         key=lambda row: (
             not row.is_default,
-            _last_of_all(row),
+            answers_special_questions(row),
             held_out_loss(row),
             row.created,
             row.name,

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
-from rbfrag.db.model_file import ModelRow, held_out_loss, unknown_model
+from rbfrag.db.model_file import (
+    ModelRow,
+    answers_special_questions,
+    held_out_loss,
+    unknown_model,
+)
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import MEASURES, STATED, least_inputs, terms_from
+from rbfrag.fragility.measures import MEASURES, STATED, TERMS, least_inputs, terms_from
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
@@ -98,11 +103,8 @@ def find_model(
 ) -> FragilityModel:
     """Return the model that answers for a block and the given measures of the motion.
 
-    The more is known of the motion, the better the model: one on X(p), then PGV with PGA and Tm,
-    then PGV with PGA, then PGV, then PGA with spectral accelerations and the single measures, in
-    the order of their skill. Of the stored models that the measures suffice for, the database's
-    default answers if no other reads more of the motion, else the one of the least log loss on
-    earthquakes left out.
+    Of the stored models that the measures suffice for, one on X(p) answers if there is one, then
+    the database's default, else the one of the least log loss on earthquakes left out.
 
     Args:
         model: a model, the name of a stored one, or None.
@@ -185,9 +187,8 @@ def _suited_in(
 ) -> list[FragilityModel]:
     possible = terms_from(given)
     if not possible:
-        enough = ", or ".join(" and ".join(inputs) for inputs in least_inputs())
         raise InputError(
-            f"{_measures(given)} is given: a prediction needs {enough}, or a motion",
+            f"{_measures(given)} is given: a prediction needs {_enough(TERMS)}, or a motion",
             fields=STATED,
         )
     block_of_question = block_of(given)
@@ -212,26 +213,37 @@ def _suited_in(
         elif _merit(before.row) == _merit(row):  # else it is no better, and its method not loaded
             best[row.term] = min(before, store.model(row), key=lambda model: model.form.rank)
     if not best:
-        have = ", ".join(f"{row.name} ({row.term}{_of_criterion(row, block)})" for row in of_kind)
-        of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
-        raise (InputError if block.criterion is None else UnknownModelError)(
-            f"no stored {kind} model{of} works with {_measures(given)}; stored are {have}: give "
-            f"the measures that one of them needs, or fit a model "
-            f"of {' or '.join(possible)}"
+        if suited:
+            have = ", ".join(
+                f"{row.name} ({_failure(block.criterion_of(row.diagnostics))})" for row in of_kind
+            )
+            raise UnknownModelError(
+                f"no stored {kind} model of {_failure(rotation_deg)} works with "
+                f"{_measures(given)}; stored are {have}"
+            )
+        raise InputError(
+            f"no stored {kind} model works with {_measures(given)}: give "
+            f"{_enough(row.term for row in of_kind)}, or fit a model of {' or '.join(possible)}",
+            fields=STATED,
         )
     # those that are kept for comparison answer where there is no other, or where one was chosen
     usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
     best = usual or best
-    most = max(model.term.level for model in best.values())
     return sorted(
         best.values(),
         key=lambda m: (
-            not (m.row.is_default and m.term.level == most),
-            held_out_loss(m.row),
-            -m.term.level,
+            not answers_special_questions(m.row),
+            *_merit(m.row),
+            # without scores what reads more is taken to be better
+            -len(m.term.inputs),
             possible.index(m.term.name),
         ),
     )
+
+
+def _enough(terms: Iterable[str]) -> str:
+    """Return in words what suffices for one of some terms."""
+    return ", or ".join(" and ".join(inputs) for inputs in least_inputs(terms))
 
 
 def _how_to_make(kind: str) -> str:
@@ -295,10 +307,6 @@ def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | No
 
 def _failure(rotation_deg: float | None) -> str:
     return "failure past recovery" if rotation_deg is None else f"a rotation of {rotation_deg:g}°"
-
-
-def _of_criterion(row: ModelRow, block: BlockParameters) -> str:
-    return "" if block.criterion is None else f", {_failure(block.criterion_of(row.diagnostics))}"
 
 
 def _measures(given: Collection[str]) -> str:

@@ -6,7 +6,7 @@ Each is pure arithmetic on single numbers or arrays and loads no library.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -29,7 +29,6 @@ class Term:
             how strong the shaking is, and is zero when there is none.
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
-        level: how much it knows of the motion: 3 the record itself, 0 less than PGV with PGA.
         of_block: what the formula reads of the block, after the inputs.
         advice: what every answer says of a term that knows little; empty for nothing.
     """
@@ -39,8 +38,7 @@ class Term:
     symbol: str
     inputs: tuple[str, ...]
     formula: Callable[..., Any]
-    variance_degree: int
-    level: int = 0
+    variance_degree: int = 1
     of_block: tuple[str, ...] = ()
     advice: str = ""
 
@@ -115,16 +113,14 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s",),
             pgv_m_s,
-            1,
         ),
-        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s, 1, 0),
+        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s),
         Term(
             "pga_sa03_sa10_sa30",
             "spectral acceleration at 1 s, as a velocity, with PGA and those at 0.3 and 3 s",
             "SA(1.0)·g·T/2π",
             ("sa10_g", "pga_g", "sa03_g", "sa30_g"),
             _first_at_1s,
-            1,
         ),
         Term(
             "pga_tm",
@@ -132,8 +128,6 @@ TERMS: Mapping[str, Term] = {
             "PGA·g·Tm/2π",
             ("pga_g", "tm_s"),
             pga_tm_m_s,
-            1,
-            0,
         ),
         Term(
             "pga_sa10",
@@ -141,7 +135,6 @@ TERMS: Mapping[str, Term] = {
             "SA(1.0)·g·T/2π",
             ("sa10_g", "pga_g"),
             _first_at_1s,
-            1,
         ),
         Term(
             "sa10",
@@ -149,7 +142,6 @@ TERMS: Mapping[str, Term] = {
             "SA(1.0)·g·T/2π",
             ("sa10_g",),
             partial(spectral_velocity_m_s, period_s=1.0),
-            1,
         ),
         Term(
             "pga",
@@ -157,7 +149,6 @@ TERMS: Mapping[str, Term] = {
             "PGA·g/p",
             ("pga_g",),
             pga_over_p_m_s,
-            1,
             of_block=("p",),
             advice=_KNOWS_LITTLE,
         ),
@@ -167,8 +158,7 @@ TERMS: Mapping[str, Term] = {
             "2π·PGD/Tm",
             ("pgd_m", "tm_s"),
             pgd_tm_m_s,
-            2,
-            0,
+            variance_degree=2,
         ),
         Term(
             "pgv_pga",
@@ -176,8 +166,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g"),
             first_m_s,
-            1,
-            1,
         ),
         Term(
             "pgv_pga_tm",
@@ -185,8 +173,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "tm_s"),
             first_m_s,
-            1,
-            2,
         ),
         Term(
             "pgv_pga_sa10_sa30",
@@ -194,8 +180,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "sa10_g", "sa30_g"),
             first_m_s,
-            1,
-            2,
         ),
         Term(
             "pga_sa10_sa30",
@@ -203,7 +187,6 @@ TERMS: Mapping[str, Term] = {
             "SA(1.0)·g·T/2π",
             ("sa10_g", "pga_g", "sa30_g"),
             _first_at_1s,
-            1,
         ),
         Term(
             "pga_m",
@@ -211,7 +194,6 @@ TERMS: Mapping[str, Term] = {
             "PGA·g/p",
             ("pga_g", "magnitude"),
             _first_over_p,
-            1,
             of_block=("p",),
             advice="PGA and magnitude alone say little of overturning: PGV, or SA(1.0) with PGA, "
             "would lower the log loss on earthquakes left out from 0.22 to 0.19 or 0.17",
@@ -222,7 +204,6 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "magnitude"),
             first_m_s,
-            1,
         ),
         Term(
             "pgv_pga_ia",
@@ -230,12 +211,11 @@ TERMS: Mapping[str, Term] = {
             "PGV",
             ("pgv_m_s", "pga_g", "arias_m_s"),
             first_m_s,
-            1,
         ),
-        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1, 3),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s),
     )
 }
-"""The terms by name; those of one level by falling skill (docs/theory/fragility.md)."""
+"""The terms by name."""
 
 STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m", "arias_m_s", "magnitude")
 """The measures that a question may state, by name."""
@@ -248,9 +228,6 @@ ALONE = ("pgv_m_s", "sa10_g", "pga_g")
 
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number of the shaking: what the dissertation compares."""
-
-BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
-"""The terms by falling skill on held-out earthquakes (docs/evidence/model-choice.md)."""
 
 
 def spectral(sa_g: Mapping[float, T]) -> dict[str, T]:
@@ -283,13 +260,16 @@ def intensity_term(name: str) -> Term:
 
 
 def terms_from(given: Collection[str]) -> tuple[str, ...]:
-    """Return the names of the terms that the given measures suffice for, best first."""
-    return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))
+    """Return the names of the terms that the given measures suffice for."""
+    return tuple(name for name in TERMS if set(TERMS[name].inputs) <= set(given))
 
 
-def least_inputs() -> list[tuple[str, ...]]:
-    """Return the sets of measures of which each suffices for a term and none holds another."""
-    stated = [term.inputs for term in TERMS.values() if set(term.inputs) <= set(STATED)]
+def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
+    """Return the sets of measures of which each suffices for one of some terms, none of which holds
+    another.
+    """
+    known = [TERMS[name].inputs for name in terms if name in TERMS]
+    stated = [inputs for inputs in known if set(inputs) <= set(STATED)]
     least = [own for own in stated if not any(set(other) < set(own) for other in stated)]
     return list(dict.fromkeys(least))
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import (
@@ -19,12 +19,16 @@ from rbfrag.fragility.prediction import (
     answer_given,
     is_single,
     single,
+    with_remarks,
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 
 Polarity = Literal["forward", "reverse", "both"]
+
+UNRECORDED = ("magnitude",)
+"""What is known of an earthquake and not seen in its record."""
 
 SIMULATED = (
     "what a known motion does to an uncertain block is simulated, by rbfrag respond with draws or "
@@ -48,7 +52,7 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
-    extra = [name for name in given if name in STATED and name != "magnitude"]
+    extra = [name for name in given if name in STATED and name not in UNRECORDED]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
@@ -65,15 +69,24 @@ def predict_motion(
             "block, or use rbfrag.toppling_spectrum and a model of the term xp"
         )
     block = {name: single(name, value) for name, value in given.items()}
+    measures = {name: value for name, value in block.items() if name in UNRECORDED}
+    measures |= measures_of(motion)
+    known = {*SPECTRAL.values(), *(("xp_m_s",) if "p2" in block else ())}
+    chosen = find_model(
+        model, (*block, *measures, *known), db, kind=kind, rotation_deg=rotation_deg
+    )
     answers: dict[str, Prediction] = {}
     for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
-        # what the term X(p) does not read is of use only to a model that is named
-        known = measures_of(motion, block.get("p2"), direction, spectrum=model is not None)
-        own = {**block, **known}
-        chosen = find_model(model, own, db, kind=kind, rotation_deg=rotation_deg)
+        own = {**block, **measures}
+        for name in known.intersection(chosen.term.inputs):
+            own[name] = (
+                motion.spectral_accelerations[name]
+                if name in SPECTRAL.values()
+                else _spectrum_of(motion, block["p2"], direction)
+            )
         answer = answer_given(chosen, own, level)
         assert isinstance(answer, Prediction)
-        answers[direction] = answer
+        answers[direction] = with_remarks(answer, unused_measures(chosen, block))
     if polarity != "both":
         return answers[polarity]
     return _mean(answers["forward"], answers["reverse"])
@@ -105,31 +118,20 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
     )
 
 
-def measures_of(
-    motion: GroundMotion,
-    p2: float | None,
-    polarity: Literal["forward", "reverse"],
-    *,
-    spectrum: bool = False,
-) -> dict[str, float]:
-    """Return the measures of a motion by the names of :func:`rbfrag.predict`, and X(p).
+def measures_of(motion: GroundMotion) -> dict[str, float]:
+    """Return the measures of a motion by the names of :func:`rbfrag.predict`.
 
-    Args:
-        motion: the accelerogram.
-        p2: frequency parameter p² of the block [1/s²]; None where the block has none that a
-            toppling spectrum is drawn for.
-        polarity: how the motion points at the slope.
-        spectrum: spectral accelerations too.
+    Without spectral accelerations, which take longer.
     """
-    measures: dict[str, float] = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s}
-    measures |= {"pgd_m": motion.pgd_m, "arias_m_s": motion.measures.arias_m_s}
+    measures = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s, "pgd_m": motion.pgd_m}
+    measures["arias_m_s"] = motion.measures.arias_m_s
     if motion.tm_s is not None:
         measures["tm_s"] = motion.tm_s
-    if spectrum:
-        spectral = motion.spectral_accelerations
-        measures |= {name: spectral[name] for name in SPECTRAL.values()}
-    if p2 is not None:
-        # a p2 that cannot be used is refused by the prediction
-        drawn = p2 if math.isfinite(p2) and p2 > 0.0 else 1.0
-        measures["xp_m_s"] = float(toppling_spectrum(motion, drawn, polarity))
     return measures
+
+
+def _spectrum_of(motion: GroundMotion, p2: float, polarity: Literal["forward", "reverse"]) -> float:
+    """Return X(p) [m/s]."""
+    # a p2 that cannot be used is refused by the prediction
+    drawn = p2 if math.isfinite(p2) and p2 > 0.0 else 1.0
+    return float(toppling_spectrum(motion, drawn, polarity))

@@ -36,7 +36,7 @@ FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
 KR = (0.02, 1.0)
-"""k_r, or k_y, of the weakest and the strongest block that fits read: no rock stands at 1 degree."""
+"""k_r, or k_y, of the weakest and the strongest block that fits read: no rock stands at 1°."""
 
 REAL_KR = 0.05
 """Scores are also stated of the blocks from this k_r on, as most rock blocks are."""
@@ -206,7 +206,7 @@ class FitData:
         scored: which it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
-        n_excluded: found combinations left out because the term is not defined.
+        n_excluded: combinations left out because a measure that the term reads is not known.
         n_outside_model: combinations for which the block model does not apply.
         guessed_events: number of earthquakes read off file headers.
         fingerprint: hash of natural keys and fitted values.
@@ -311,6 +311,7 @@ class _Points:
     scored: NDArray[np.bool_] | None = None
     sensitive: FloatArray | None = None
     least_y_m_s: FloatArray | None = None
+    undefined: int = 0
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -365,7 +366,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         outcomes=points.outcomes,
         domain=ranges_of({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
-        n_excluded=int((points.observed & ~np.isfinite(points.values["intensity_m_s"])).sum()),
+        n_excluded=points.undefined,
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
         fingerprint=_fingerprint(
@@ -511,6 +512,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
         observed=observed,
         usable=defined & readable,
+        undefined=int((~defined & readable).sum()),
         combination=np.arange(x.size),
         order=np.zeros(x.size),
         blocks=blocks,
@@ -598,24 +600,23 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     slid = np.full(n * m, np.nan) if given is None else given.ravel()
     measures = {name: value[own] for name, value in _measures(source).items()}
     beyond = np.maximum(slid, LEAST_DISPLACEMENT_M)
-    values = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
-    values |= {
-        method.block.strength: k * values["pga_g"],
-        "intensity_m_s": term.intensity_m_s(values),
-    }
+    read = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
+    strength = k * measures["pga_g"]
+    values = {
+        **read, method.block.strength: strength, "intensity_m_s": term.intensity_m_s(read),
+    }  # fmt: skip
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
         usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
-        strength = values[method.block.strength]
         usable &= (strength >= KR[0]) & (strength <= KR[1])
-        for name in term.inputs:
-            usable &= np.isfinite(values[name])
+        defined = np.isfinite([values[name] for name in term.inputs]).all(axis=0)
         observed = slid >= LEAST_DISPLACEMENT_M
         failed = (beyond[:, None] > distances).astype(np.float64)
     return _Points(
         values={**values, "displacement_m": beyond},
         observed=observed,
-        usable=usable,
+        usable=usable & defined,
+        undefined=np.unique(own[usable & ~defined]).size,
         combination=own,
         order=k,
         blocks={**_column(values), "displacement_m": distances},
@@ -624,8 +625,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
         outcomes="simulated outcomes",
         ranges={
             **ratio_columns(measures),
-            "pgv_m_s": values["pgv_m_s"],
-            "pga_g": values["pga_g"],
+            **read,
             method.block.strength: np.tile(KR, (k.size, 1)),
             "displacement_m": np.where(observed, beyond, np.nan),
             "k_over_pga": np.column_stack([k, np.ones(k.size)]),

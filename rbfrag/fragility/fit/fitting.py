@@ -293,8 +293,8 @@ def _data_warnings(data: FitData) -> list[str]:
         )
     if data.n_excluded:
         result.append(
-            f"{data.n_excluded} critical values are left out because their intensity term is not "
-            "defined (no mean period, a PGD in doubt, or no toppling spectrum stored)"
+            f"{data.n_excluded} combinations are left out because a measure that the term reads is "
+            "not known (no mean period or magnitude, a PGD in doubt, no toppling spectrum stored)"
         )
     if data.n_outside_model:
         result.append(
