@@ -18,8 +18,11 @@ from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
 G = 9.80665
-T2 = (7.377, -1.818, 4.575, -8.514, -1.102)
+T2 = (7.862, -1.901, 5.122, -9.677, -2.390)
 """Coefficients of the model of (p, k_r, e, PGV, PGA), near those that are fitted."""
+
+
+PGV = (0.656, -2.932, 1.915, -5.180, -0.747)
 
 
 def stored(term: str, b: tuple[float, ...], **changes: Any) -> FragilityModel:
@@ -47,9 +50,43 @@ def one(model: FragilityModel, **given: float) -> Prediction:
 def five_terms(p2: float, kr: float, e: float, pgv: float, pga: float) -> float:
     log_odds = math.log(kr / (pga - kr))
     z, s = math.sqrt(p2) * pgv / (pga * G), math.sqrt(1.0 - e)
-    eta = 7.377 - 1.818 * log_odds + 4.575 * math.log(z) - 8.514 * s - 1.102 * s * log_odds
-    l = math.log(math.sqrt(p2))  # noqa: E741  as in the formula
-    return 1.0 / (1.0 + math.exp(-eta * math.exp(0.15 * l - 0.08 * l * l)))
+    eta = 7.862 - 1.901 * log_odds + 5.122 * math.log(z) - 9.677 * s - 2.390 * s * log_odds
+    return 1.0 / (1.0 + math.exp(-eta))
+
+
+SPECTRAL = (5.228, -2.360, 4.288, -11.091, 1.157, -0.303, 2.522, -2.392, 1.823, -1.085)
+"""The same of the model with spectral accelerations."""
+
+
+def test_the_form_with_spectral_accelerations() -> None:
+    """1, L, ln z, s, l, w1, w3, s L, w1 l, w3 l, times h of A, B."""
+    p2, kr, e, pgv, pga, sa10, sa30 = 7.0, 0.15, 0.92, 0.7, 0.45, 0.5, 0.12
+    p, l = math.sqrt(p2), 0.5 * math.log(p2)  # noqa: E741  as in the formula
+    log_odds, s = math.log(kr / (pga - kr)), math.sqrt(1.0 - e)
+    w1 = math.log(sa10 * G * 1.0 / (2.0 * math.pi) / pgv)
+    w3 = math.log(sa30 * G * 3.0 / (2.0 * math.pi) / pgv)
+    terms = (
+        1.0, log_odds, math.log(p * pgv / (pga * G)), s, l, w1, w3, s * log_odds, w1 * l, w3 * l
+    )  # fmt: skip
+    eta = sum(b * x for b, x in zip(SPECTRAL, terms, strict=True))
+    eta *= math.exp(0.15 * l - 0.08 * l * l)
+    answer = one(
+        stored("pgv_pga_sa10_sa30", SPECTRAL), p2=p2, kr=kr, restitution=e, pgv_m_s=pgv, pga_g=pga,
+        sa10_g=sa10, sa30_g=sa30,
+    )  # fmt: skip
+    assert answer.probability == pytest.approx(1.0 / (1.0 + math.exp(-eta)), rel=1e-12)
+
+
+def test_only_magnitudes_below_6_5_make_a_difference() -> None:
+    model = stored("pga_m", (-1.7, -1.0, 3.4, -4.5, -1.9, 2.4, -0.34, -0.6))
+    p = [
+        one(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=m).probability
+        for m in (5.0, 6.0, 6.5, 7.0, 8.0)
+    ]
+    assert p[0] < p[1] < p[2] == p[3] == p[4]
+    assert "say little of overturning" in " ".join(
+        one(model, p2=3.0, kr=0.1, pga_g=0.4, magnitude=7.0).warnings
+    )
 
 
 @pytest.mark.parametrize("e", [None, 1.0, 0.7])
@@ -70,7 +107,7 @@ def test_restitution_is_that_of_the_rectangle_unless_it_is_given(e: float | None
 
 
 def test_a_block_that_the_ground_cannot_lift_cannot_overturn() -> None:
-    for term, b in (("pgv_pga", T2), ("pgv", (0.4, -1.9, 1.5, -0.3, -5.0, -1.2))):
+    for term, b in (("pgv_pga", T2), ("pgv", PGV)):
         model = stored(term, b)
         answer = one(model, p2=3.0, kr=0.5, pgv_m_s=2.0, pga_g=0.5)
         assert answer.probability == answer.ci_high == 0.0
@@ -110,7 +147,7 @@ def test_restitution_that_was_not_fitted_is_outside_the_domain() -> None:
 def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
     models = (
         stored("pgv_pga", T2),
-        stored("pgv", (0.43, -1.92, 1.54, -0.34, -5.0, -1.26)),
+        stored("pgv", PGV),
     )
     block = {"p2": 3.0, "kr": 0.2, "restitution": 0.9}
     for model in models:
@@ -133,4 +170,4 @@ def test_a_description_says_which_blocks_are_meant() -> None:
     assert block_of(["p2", "kr", "restitution"]) is BLOCK
     assert block_of(["ky"]).kind == "sliding"
     with pytest.raises(InputError, match="ky"):
-        find_model(stored("pgv", (0.0,) * 6), ["ky", "displacement_m", "pgv_m_s"])
+        find_model(stored("pgv", (0.0,) * 5), ["ky", "displacement_m", "pgv_m_s"])

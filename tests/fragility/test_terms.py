@@ -24,6 +24,8 @@ def test_terms_of_one_harmonic_motion_agree():
         "pgd_m": v * tm / (2 * math.pi),
         "tm_s": tm,
         "xp_m_s": v,
+        "arias_m_s": 1.0,
+        "magnitude": 6.5,
         "p": 2 * math.pi / tm,
         **{name: v * 2 * math.pi / period / 9.80665 for period, name in SPECTRAL.items()},
     }
@@ -35,6 +37,7 @@ def test_terms_of_one_harmonic_motion_agree():
 def test_array_and_scalar_have_the_same_bits(name):
     random = np.random.default_rng(3)
     names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", "xp_m_s", "p", *SPECTRAL.values())
+    names += ("arias_m_s", "magnitude")
     columns = {key: random.uniform(0.01, 2.0, 200) for key in names}
     together = TERMS[name].intensity_m_s(columns)
     for i in range(200):

@@ -8,8 +8,9 @@ where m is M - 6.5 if the magnitude is known, ln(Ia/PGV²) if the Arias intensit
 
 and, where PGA is not known, with u = ln(1 + k_y/(κ PGV)):
 
-    eta = [c + b1 ln(PGV²/(k_y g)) - b2 u - ln d]/σ,               ln σ = s0 + s1 ln k_y
+    eta = [c + b1 ln(PGV²/(k_y g)) - b2 u - ln d]/σ,               ln σ = s0
 
+A scatter that grew with u would make P rise again as PGV falls, one of k_y as the strength grows.
 P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
 """
 
@@ -89,14 +90,10 @@ def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
     a = ky / (ns.exp(b[3]) * pgv)
     u = ns.log(1.0 + a)
-    # of the strength, not of u: a scatter that grows as PGV falls would make P rise again
-    strength = ns.log(ky)
-    log_sigma = b[4] + b[5] * strength
-    per = ns.exp(-log_sigma)
+    per = ns.exp(-b[4])
     eta = (b[0] + b[1] * size - b[2] * u - ns.log(v["displacement_m"])) * per
-    slope = b[2] * per * a / (1.0 + a)
-    slopes = (per, size * per, -u * per, slope, -eta, -eta * strength)
-    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, 0.0, 1.0, strength))
+    slopes = (per, size * per, -u * per, b[2] * per * a / (1.0 + a), -eta)
+    return Eta(eta, slopes, b[4], (0.0, 0.0, 0.0, 0.0, 1.0))
 
 
 METHOD = Method(
@@ -120,8 +117,7 @@ METHOD = Method(
             start=(-0.9, 1.2, 2.7, 0.7, -0.8, 1.0),
         ),
         "pgv": Form(
-            ("c", "b1", "b2", "ln_kappa", "s0", "s1"), _pgv, 0,
-            start=(2.9, 0.1, 3.0, -3.3, 1.1, 0.3),
+            ("c", "b1", "b2", "ln_kappa", "s0"), _pgv, 0, start=(2.9, 0.2, 2.7, -3.5, 0.4),
         ),
     },
     reads="critical",

@@ -170,7 +170,7 @@ def test_undefined_mean_periods_are_counted_and_left_out(draw):
     report = fit(replace(table, tm_s=tm), term="pga_tm")
     assert report.details["n_excluded_undefined_term"] == 48
     assert report.n == table.p2.size - 48
-    assert any("48 critical values are left out" in w for w in report.warnings)
+    assert any("48 combinations are left out" in w for w in report.warnings)
     assert fit(replace(table, tm_s=tm), term="pgv").n == table.p2.size
 
 
