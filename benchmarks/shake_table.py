@@ -33,8 +33,12 @@ from benchmarks.shake_table_runs import (
     read,
 )
 from rbfrag.bench.tables import markdown
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
+from rbfrag.fragility.lookup import stored_rows
+from rbfrag.fragility.measures import SPECTRAL, TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
 from rbfrag.solver.models.rocking import MODEL as ROCKING
@@ -66,7 +70,7 @@ ANY_RESTITUTION_SIGMA, ANY_EVEN = (0.05, 0.10), (0.0, 0.5, 1.0)
 PGV_PGA, SHARE = "(b) PGV, PGA", "(f) share of simulated overturns"
 FREE = "(f) the same, spread of e and part of even blocks fitted, too"
 WEIGHTED = "(f) the same, all these distributions weighted by their likelihood"
-SHIPPED = "(g) shipped fragility of rocking blocks, best block"
+SHIPPED = "(g) shipped {}, best block"
 SHIPPED_OF_HOUSNER = "(g) the same, restitution by Housner"
 LOG_LOSS, BRIER = (0.20, 0.18), (0.06, 0.055)
 """Targets of the share, by specimen."""
@@ -217,28 +221,38 @@ def score(p: FloatArray, failed: FloatArray, base: Labels) -> Score:
     )
 
 
-def shipped_fragility(trials: Trials, restitution: Sequence[float | None]) -> Candidates:
-    """Return P by the model that rbfrag ships, for blocks of every angle and given restitutions.
+def shipped_fragility(
+    trials: Trials, model: ModelRow, restitution: Sequence[float | None]
+) -> Candidates:
+    """Return P by a model that rbfrag ships, for blocks of every angle and given restitutions.
 
     Settings are those of :func:`distributions`; sigma is NaN, and so is Housner's restitution.
 
     Args:
-        trials: the tests; PGV and PGA are those of the filtered traces.
+        trials: the tests; measures are those of the filtered traces.
         restitution: None for that of the rectangle.
     """
-    kr, pgv = np.broadcast_arrays(np.tan(MEDIAN_RAD)[:, None], trials.measured("pgv_m_s"))
-    pga = np.broadcast_to(trials.measured("pga_g"), kr.shape)
-    shaking = {"kr": kr.ravel(), "pgv_m_s": pgv.ravel(), "pga_g": pga.ravel()}
+    measures = {name: trials.measured(name) for name in TERMS[model.term].inputs}
+    given = {"kr": np.tan(MEDIAN_RAD)[:, None], **measures}
+    shaking = dict(zip(given, np.broadcast_arrays(*given.values()), strict=True))
     p, settings = [], []
     for e in restitution:
-        given = shaking if e is None else {**shaking, "restitution": e}
-        p.append(rbfrag.predict(kind=ROCKING.kind, p2=P2, **given).probability.reshape(kr.shape))
+        asked = shaking if e is None else {**shaking, "restitution": e}
+        p.append(rbfrag.predict(kind=ROCKING.kind, p2=P2, model=model, **asked).probability)
         settings += [(alpha, np.nan, np.nan if e is None else e) for alpha in MEDIAN_RAD]
     return Candidates(np.concatenate(p), np.array(settings))
 
 
+def shipped_models() -> list[ModelRow]:
+    """Return the shipped models of rocking whose measures a trace has, the best first."""
+    known = [*SPECTRAL.values(), "pgv_m_s", "pga_g"]
+    suited = (row for row in stored_rows(REFERENCE) if row.kind == ROCKING.kind)
+    readable = (row for row in suited if set(TERMS[row.term].inputs) <= set(known))
+    return sorted(readable, key=held_out_loss)
+
+
 def predictors(
-    trials: Trials, runs: Outcomes, blocks: Candidates, shipped: Candidates
+    trials: Trials, runs: Outcomes, blocks: Candidates, shipped: Mapping[str, Candidates]
 ) -> dict[str, Predictor]:
     """Return the predictors by what they read."""
     free, backed = overturned(runs.free), overturned(runs.backed)
@@ -263,8 +277,7 @@ def predictors(
         SHARE: best_of(blocks),
         FREE: best_of(any_blocks),
         WEIGHTED: weighted(any_blocks),
-        SHIPPED: best_of(shipped),
-        SHIPPED_OF_HOUSNER: best_of(shipped_fragility(trials, [None])),
+        **{name: best_of(each) for name, each in shipped.items()},
     }
 
 
@@ -364,7 +377,13 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
     """Return the tables, and whether the targets are reached."""
     base, fold = trials.base, folds(trials.base, SEED)
     blocks = distributions(overturned(runs.free))
-    shipped = shipped_fragility(trials, RESTITUTION.tolist())
+    models = shipped_models()
+    best = SHIPPED.format(models[0].name)
+    shipped = {
+        SHIPPED.format(row.name): shipped_fragility(trials, row, RESTITUTION.tolist())
+        for row in models
+    }
+    shipped[SHIPPED_OF_HOUSNER] = shipped_fragility(trials, models[0], [None])
     all_predictors = predictors(trials, runs, blocks, shipped)
     predicted = [
         {name: held_out(one, failed, fold) for name, one in all_predictors.items()}
@@ -375,7 +394,7 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
         for of, failed in zip(predicted, trials.overturned, strict=True)
     ]
     targets, reached = target_table(scores)
-    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, FREE, WEIGHTED, SHIPPED)}
+    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, FREE, WEIGHTED, best)}
     shares = " and ".join(f"{100.0 * failed.mean():.1f} %" for failed in trials.overturned)
     decided = np.isin(runs.free, (STABLE, TOPPLED))
     text = [
@@ -391,7 +410,7 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
         f"Log loss over {PARTITIONS} other divisions into folds, mean (least to greatest):",
         partition_table(trials, varied),
         "Blocks fitted to all tests (range over the fits without a fold):",
-        block_table({SHARE: blocks, SHIPPED: shipped}, trials.overturned, fold),
+        block_table({SHARE: blocks, best: shipped[best]}, trials.overturned, fold),
     ]
     return "\n\n".join(text), reached
 

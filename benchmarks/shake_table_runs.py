@@ -83,7 +83,9 @@ class Trials:
         return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
     def measured(self, name: str) -> FloatArray:
-        """Return a measure of each filtered trace by its name, `pgv_m_s` say."""
+        """Return a measure of each filtered trace by its name, `pgv_m_s` or `sa10_g` say."""
+        if name.startswith("sa"):
+            return np.array([motion.spectral_accelerations[name] for motion in self.motions])
         return np.array([getattr(motion, name) for motion in self.motions])
 
     def spectrum_m_s(self) -> FloatArray:
