@@ -145,8 +145,8 @@ def shakemap(
         kind=kind, **read, **answering,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
-    if chosen.term.advice:
-        warnings.append(chosen.term.advice)
+    if chosen.form.advice:
+        warnings.append(chosen.form.advice)
     first = shaking.median[:, 0][shaking.median[:, 0] > 0.0]
     if first.size:
         warnings += rise_in_words(chosen, read, float(first.min()), float(first.max()))

@@ -30,7 +30,6 @@ class Term:
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
         of_block: what the formula reads of the block, after the inputs.
-        advice: what every answer says of a term that knows little; empty for nothing.
     """
 
     name: str
@@ -40,7 +39,6 @@ class Term:
     formula: Callable[..., Any]
     variance_degree: int = 1
     of_block: tuple[str, ...] = ()
-    advice: str = ""
 
     @property
     def label(self) -> str:
@@ -98,12 +96,6 @@ def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
 SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 2.0: "sa20_g", 3.0: "sa30_g"}
 """Spectral accelerations (5 % damping, one component) that questions may state, by period [s]."""
 
-
-_KNOWS_LITTLE = (
-    "PGA alone says little of toppling: PGV or SA(1.0) would halve the log loss on earthquakes "
-    "left out or lower it by a quarter (0.25, against 0.13 and 0.19)"
-)
-
 TERMS: Mapping[str, Term] = {
     term.name: term
     for term in (
@@ -150,7 +142,6 @@ TERMS: Mapping[str, Term] = {
             ("pga_g",),
             pga_over_p_m_s,
             of_block=("p",),
-            advice=_KNOWS_LITTLE,
         ),
         Term(
             "pgd_tm",
@@ -195,8 +186,6 @@ TERMS: Mapping[str, Term] = {
             ("pga_g", "magnitude"),
             _first_over_p,
             of_block=("p",),
-            advice="PGA and magnitude alone say little of overturning: PGV, or SA(1.0) with PGA, "
-            "would lower the log loss on earthquakes left out from 0.22 to 0.19 or 0.17",
         ),
         Term(
             "pgv_pga_m",

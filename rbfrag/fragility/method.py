@@ -342,6 +342,7 @@ class Form:
         equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
             <+name> with their sign, <exp name>, as mathtext.
         where: what the symbols mean, likewise.
+        advice: what every answer says of a form that knows little; empty for nothing.
     """
 
     parameters: tuple[str, ...]
@@ -353,6 +354,7 @@ class Form:
     terms: tuple[str, ...] = ()
     equation: str = "<sum>"
     where: str = ""
+    advice: str = ""
 
     def unscaled(
         self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers

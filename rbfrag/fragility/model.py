@@ -156,7 +156,7 @@ class FragilityModel:
             )
         rho_e = None if row.dependence is None else row.dependence.get("rho_e")
         term = TERMS[row.term]
-        notes = (term.advice,) if term.advice else ()
+        notes = (form.advice,) if form.advice else ()
         event_spread = EventSpread.of(rho_e) if isinstance(rho_e, int | float) else None
         return cls(
             row=row,

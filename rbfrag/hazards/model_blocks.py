@@ -232,8 +232,7 @@ class ModelBlocks:
         """What the model and the curve's meaning take for granted."""
         block = self.model.method.block
         assumed = (block.support,) if self.model.kind == block.kind and block.support else ()
-        advice = (self.model.term.advice,) if self.model.term.advice else ()
-        return (*self.remarks, *self.shaking.warnings, *advice, *assumed, *self.model.notes)
+        return (*self.remarks, *self.shaking.warnings, *assumed, *self.model.notes)
 
     def placement(self) -> Placement | None:
         """Return the blocks as those of one site with unknown azimuths; None without a size."""

@@ -169,7 +169,6 @@ class Portfolio:
             text
             for model in self.answering
             for text in (
-                model.term.advice,
                 model.method.block.support if model.kind == model.method.block.kind else "",
                 *model.notes,
             )

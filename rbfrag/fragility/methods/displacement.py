@@ -104,6 +104,8 @@ METHOD = Method(
         "pgv_pga": Form(
             ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), 0, (BLOCK.at_rest,),
             start=(0.6, 0.9, 3.7, -0.6, 0.9),
+            advice="without the magnitude, which says how long it shakes, this is too high below "
+            "magnitude 6.4 and too low from 7.5: give it",
         ),
         "pgv_pga_m": Form(
             ("c", "b1", "b2", "b_magnitude", "s0", "s1"),

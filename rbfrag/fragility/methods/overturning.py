@@ -114,7 +114,12 @@ _FEATURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], Numbers], Any]]]
 
 
 def _form(
-    features: str, *products: tuple[str, str], a: float = 0.0, b: float = 0.0, of_pga: bool = True
+    features: str,
+    *products: tuple[str, str],
+    a: float = 0.0,
+    b: float = 0.0,
+    of_pga: bool = True,
+    advice: str = "",
 ) -> Form:
     """Return the form of a constant, some features, and products of two of them.
 
@@ -123,6 +128,7 @@ def _form(
         a: A of the factor h of size.
         b: its B.
         of_pga: whether PGA is read, which a block's strength is bounded by.
+        advice: as of :class:`Form`.
     """
     names = features.split()
     parts = {name: _FEATURES[name] for name in names}
@@ -139,6 +145,7 @@ def _form(
             "1", *(text for text, _ in parts.values()),
             *(rf"{parts[x][0]}\,{parts[y][0]}" for x, y in products),
         ),
+        advice=advice,
     )  # fmt: skip
 
 
@@ -161,7 +168,9 @@ METHOD = Method(
             "logit_r ln_p s q10 q30", _SQUARE, ("q10", "ln_p"), ("q30", "ln_p"), a=0.20
         ),
         "pga_m": _form(
-            "logit_r ln_p s strength magnitude", _SQUARE, _LOSS_AND_STRENGTH, a=0.20
+            "logit_r ln_p s strength magnitude", _SQUARE, _LOSS_AND_STRENGTH, a=0.20,
+            advice="PGA and magnitude alone say little of overturning: PGV, or SA(1.0) with PGA, "
+            "would lower the log loss on earthquakes left out from 0.22 to 0.19 or 0.17",
         ),
     },
     reads="outcomes",
