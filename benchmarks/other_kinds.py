@@ -148,7 +148,7 @@ def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[F
         slides = {term: fitted(c, "sliding", term) for term in ("pgv_pga", "pgv")}
         source = read_source(c, method_of_kind("sliding", None).block, kind="sliding")
         for facing in ("one", "either"):
-            found[f"sliding-{facing}"] = comparison(source, c, facing=facing)
+            found[f"sliding-{facing}"] = comparison(source, facing=facing)
         slumps = {
             (rotation, term): fitted(c, "slumping", term, rotation)
             for rotation in (None, 2.0)

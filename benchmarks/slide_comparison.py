@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
-from sqlalchemy import Connection, select
 
 from benchmarks.published_slides import KY_G, PUBLISHED, Published
 from rbfrag.bench.tables import markdown
-from rbfrag.db import schema
 from rbfrag.fragility.fit.clusters import left_out
 from rbfrag.fragility.fit.critical import most_likely
-from rbfrag.fragility.fit.data import LEAST_DISPLACEMENT_M, FitSource
+from rbfrag.fragility.fit.data import KR, LEAST_DISPLACEMENT_M, FitSource
 from rbfrag.fragility.fit.likelihood import CensoredNormal, Standardised
 from rbfrag.fragility.fit.scores import CLIP, brier, calibration, log_loss
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -46,28 +44,15 @@ class Slides:
     event: NDArray[np.intp]
 
     @classmethod
-    def of_source(
-        cls, source: FitSource, arias_m_s: Mapping[int, float], magnitude: Mapping[str, float]
-    ) -> Slides:
-        """Return the rows of the stored grids.
-
-        Args:
-            source: of kind sliding.
-            arias_m_s: Arias intensity by motion [m/s].
-            magnitude: by earthquake.
-        """
+    def of_source(cls, source: FitSource) -> Slides:
+        """Return the rows of the stored grids of kind sliding, of strengths that fits read."""
         assert source.displacement_m is not None
         table, k = source.table, source.k_over_pga
-        of_row = {
-            "pga_g": table.pga_g,
-            "pgv_m_s": table.pgv_m_s,
-            "arias_m_s": np.array([arias_m_s.get(i, np.nan) for i in table.motion_id.tolist()]),
-            "magnitude": np.array([magnitude.get(e, np.nan) for e in table.event_id.tolist()]),
-        }
-        columns = {name: np.broadcast_to(v[:, None], k.shape) for name, v in of_row.items()}
-        columns["ky"] = k * table.pga_g[:, None]
+        names = ("pga_g", "pgv_m_s", "arias_m_s", "magnitude")
+        columns = {n: np.broadcast_to(getattr(table, n)[:, None], k.shape) for n in names}
+        columns["ky"] = ky = k * table.pga_g[:, None]
         event = np.unique(table.event_id.astype(str), return_inverse=True)[1]
-        used = np.isfinite(source.displacement_m) & (k < 1.0)
+        used = np.isfinite(source.displacement_m) & (k < 1.0) & (ky >= KR[0]) & (ky <= KR[1])
         rows = np.broadcast_to(event[:, None], k.shape)[used].astype(np.intp)
         return cls({n: v[used] for n, v in columns.items()}, source.displacement_m[used], rows)
 
@@ -90,22 +75,6 @@ def larger_of_two(source: FitSource) -> FitSource:
     return replace(source.only(forward), displacement_m=further)
 
 
-def arias_of_motions(connection: Connection) -> dict[int, float]:
-    """Return the Arias intensity of each motion that has one [m/s]."""
-    motion = schema.motion.c
-    rows = connection.execute(
-        select(motion.id, motion.arias_m_s).where(motion.arias_m_s.is_not(None))
-    )
-    return {row.id: row.arias_m_s for row in rows}
-
-
-def magnitudes(connection: Connection) -> dict[str, float]:
-    """Return the magnitude of each earthquake that has one."""
-    c = schema.earthquake.c
-    rows = connection.execute(select(c.event_id, c.magnitude).where(c.magnitude.is_not(None)))
-    return {row.event_id: row.magnitude for row in rows}
-
-
 def columns_of(predictors: Sequence[str], v: Mapping[str, FloatArray]) -> FloatArray:
     """Return the regressors of our form on some measures, shape (n, k).
 
@@ -120,8 +89,7 @@ def columns_of(predictors: Sequence[str], v: Mapping[str, FloatArray]) -> FloatA
         size = np.log(v["pgv_m_s"] ** 2 / (ky * STANDARD_GRAVITY_M_S2))
         columns = [one, size, left]
         if "arias_m_s" in predictors:
-            columns += [np.log(v["arias_m_s"] / (v["pga_g"] * v["pgv_m_s"]))]
-            columns += [np.log(v["pgv_m_s"] / v["pga_g"])]
+            columns += [np.log(v["arias_m_s"] / v["pgv_m_s"] ** 2)]
         return np.column_stack(columns)
     columns = [one, np.log(ky / v["pga_g"]), left, np.log(v["pga_g"])]
     columns += [np.log(v["arias_m_s"])] if "arias_m_s" in predictors else []
@@ -206,18 +174,17 @@ def clustered_mean(values: FloatArray, event: NDArray[np.intp]) -> tuple[float, 
     return mean, float(np.sqrt(g / (g - 1.0) * (sums**2).sum()) / values.size)
 
 
-def comparison(source: FitSource, connection: Connection, *, facing: str) -> str:
+def comparison(source: FitSource, *, facing: str) -> str:
     """Return the table of published regressions beside ours, by what they read.
 
     Args:
         source: displacements of both polarities.
-        connection: the database of its motions.
         facing: ``one``: each polarity for itself, all strengths; ``either``: the larger of the two,
             k_y of 0.05 to 0.30 g, which the published ones were made for.
     """
     if facing == "either":
         source = larger_of_two(source)
-    every = Slides.of_source(source, arias_of_motions(connection), magnitudes(connection))
+    every = Slides.of_source(source)
     rows, ours_of = [], {}
     for published in PUBLISHED:
         names = published.predictors

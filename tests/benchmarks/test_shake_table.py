@@ -25,6 +25,7 @@ from benchmarks.shake_table import (
     main,
     score,
     shipped_fragility,
+    shipped_models,
     weighted,
 )
 from benchmarks.shake_table_runs import ALPHA_RAD, P2, RESTITUTION, overturned, read, run_blocks
@@ -100,7 +101,8 @@ def test_tables_come_out_and_outcomes_are_kept(
 
 def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
     trials = read(folder)
-    made = shipped_fragility(trials, [0.75, None])
+    row = next(row for row in shipped_models() if row.term == "pgv_pga")
+    made = shipped_fragility(trials, row, [0.75, None])
     number, test = MEDIAN_RAD.size + 7, 5
     assert made.p.shape == (2 * MEDIAN_RAD.size, len(trials.motions))
     motion, alpha = trials.motions[test], MEDIAN_RAD[7]
@@ -108,7 +110,7 @@ def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
         assert made.settings[k][0] == alpha
         answer = rbfrag.predict(
             kind="rocking", p2=P2, kr=math.tan(alpha), restitution=e,
-            pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g,
+            pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row,
         )  # fmt: skip
         assert made.p[k, test] == pytest.approx(answer.probability, rel=1e-12)
     assert made.settings[7][2] == 0.75

@@ -60,8 +60,9 @@ def test_stronger_blocks_slide_less_and_only_what_is_named_is_read(published: Pu
 
 def slides_of(n: int = 3000) -> Slides:
     source = drawn("sliding", "pgv_pga", n)
-    motions = source.table.motion_id.tolist()
-    return Slides.of_source(source, dict.fromkeys(motions, 1.0), {"event-00": 6.5})
+    table = source.table
+    magnitude = np.where(table.event_id == "event-00", 6.5, np.nan)
+    return Slides.of_source(replace(source, table=replace(table, magnitude=magnitude)))
 
 
 def test_our_form_finds_what_made_the_data_and_beats_one_that_did_not() -> None:
