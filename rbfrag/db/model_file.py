@@ -207,21 +207,20 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-LOSSES = ("log_loss_held_out_kr05", "log_loss_held_out")
-"""Names of the log loss on earthquakes left out: of blocks of k_r >= 0.05, as most rock blocks are,
-and of all that a model is judged on."""
+DECIDING = ("log_loss_held_out_kr05", "log_loss_held_out")
+"""Scores that models are chosen by: of blocks of k_r >= 0.05, or else of all."""
 
 
 def held_out_loss(row: ModelRow, *names: str) -> float:
     """Return the log loss of a model on earthquakes left out; infinite where it has none.
 
     Args:
-        names: of `LOSSES`, the first that a model has; none for all of them.
+        names: scores, of which the first that there is counts; empty for `DECIDING`.
     """
     scores = row.diagnostics.get("scores")
-    stored = scores if isinstance(scores, Mapping) else {}
-    value = next((stored[name] for name in names or LOSSES if name in stored), None)
-    return float(value) if isinstance(value, int | float) else math.inf
+    known = scores if isinstance(scores, Mapping) else {}
+    values = (known.get(name) for name in names or DECIDING)
+    return next((float(value) for value in values if isinstance(value, int | float)), math.inf)
 
 
 def answers_special_questions(row: ModelRow) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, cast
 
-from rbfrag.db.model_file import MODEL_FORM, ModelRow
+from rbfrag.db.model_file import MODEL_FORM, RETIRED, ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
@@ -115,6 +115,11 @@ class FragilityModel:
             method = None
         form = method.forms.get(row.term) if method is not None else None
         if method is None or form is None:
+            if (successor := RETIRED.get(f"{row.method}-{row.term}")) is not None:
+                raise ModelError(
+                    f"model {row.name!r} is of a form that answers no more: use {successor}, "
+                    "which rbfrag fit makes of the same data"
+                )
             raise ModelError(
                 f"model {row.name!r} is of kind {row.kind}, term {row.term!r} and method "
                 f"{row.method!r}, which this rbfrag does not know (terms {', '.join(TERMS)}; "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rbfrag.db.model_file import LOSSES, ModelRow, held_out_loss
+from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.measures import TERMS
 
 
@@ -20,8 +20,8 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             },
             "n": fitted_number(row.diagnostics),
             "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
-            "log_loss": _finite(held_out_loss(row, LOSSES[1])),
-            "log_loss_kr05": _finite(held_out_loss(row, LOSSES[0])),
+            "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
+            "log_loss_kr05": loss if (loss := held_out_loss(row, "_kr05")) < math.inf else None,
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
@@ -29,10 +29,6 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
         }
         for row in rows
     ]
-
-
-def _finite(loss: float) -> float | None:
-    return loss if loss < math.inf else None
 
 
 def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:

@@ -9,7 +9,7 @@ import pytest
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
-from rbfrag.errors import UnknownModelError
+from rbfrag.errors import ModelError, UnknownModelError
 from rbfrag.fragility.checks import CREDIBLE
 from rbfrag.fragility.measures import SPECTRAL, TERMS
 from rbfrag.fragility.methods import method_named
@@ -120,6 +120,12 @@ def test_retired_models_name_their_successors(name: str, successor: str) -> None
     with pytest.raises(UnknownModelError, match=f"no model '{name}' any more: use {successor}"):
         predict(3.0, 0.1, pgv_m_s=0.4, model=name, db=REFERENCE)
     assert name not in {row.name for row in read_models(REFERENCE)}
+
+
+def test_a_stored_model_of_a_retired_form_names_its_successor() -> None:
+    row = model_row("pgv", name="mine", method="bounded")
+    with pytest.raises(ModelError, match=r"'mine' is of a form .*: use bounded-pgv_kr"):
+        FragilityModel.from_row(row)
 
 
 def test_blocks_beyond_those_that_were_fitted_are_told() -> None:
