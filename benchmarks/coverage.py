@@ -28,7 +28,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.clusters import cr3, event_derivatives, jackknife_steps
 from rbfrag.fragility.fit.likelihood import Binomial, maximise
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
-from rbfrag.fragility.joint import SIDES, overdispersion, share_range
+from rbfrag.fragility.joint import COMPONENTS, overdispersion, share_range
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.method import arrays
 
@@ -205,7 +205,9 @@ def range_coverage(blocks: pd.DataFrame, laws: Mapping[str, Dependence]) -> Rang
             without their earthquake.
         laws: the copula by earthquake, estimated without it.
     """
-    alike = _like_blocks(blocks)
+    # what stands free is run on one side, and does the same on the other
+    sides = COMPONENTS * blocks["polarity"].nunique()
+    alike = _like_blocks(blocks, sides)
     of_earthquake, of_site = (
         alike.groupby([*label, "p2", "class"])
         .agg(p=("probability", "mean"), fell=("failed", "mean"), n=("failed", "size"))
@@ -215,24 +217,24 @@ def range_coverage(blocks: pd.DataFrame, laws: Mapping[str, Dependence]) -> Rang
     held = []
     for cells in (of_earthquake, of_site):
         ends = [
-            share_range(p, laws[event], n // SIDES, LEVEL)
+            share_range(p, laws[event], n // sides, LEVEL)
             for event, p, n in zip(cells["earthquake"], cells["p"], cells["n"], strict=True)
         ]
         low, high = np.array(ends).reshape(-1, 2).T
         held.append(float(((cells["fell"] >= low - 1e-9) & (cells["fell"] <= high + 1e-9)).mean()))
     return RangeCoverage(
         *held,
-        _bias(of_earthquake, laws),
+        _bias(of_earthquake, laws, sides),
         (len(of_earthquake), len(of_site)),
-        float(of_earthquake["n"].mean() / SIDES),
+        float(of_earthquake["n"].mean() / sides),
     )
 
 
-def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence]) -> float:
+def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence], sides: int) -> float:
     """Return the greatest standardised difference between what fell and P over the classes."""
     p, n = cells["p"].to_numpy(), cells["n"].to_numpy()
     rho = [
-        float(overdispersion(np.array(one), laws[event], number // SIDES))
+        float(overdispersion(np.array(one), laws[event], number // sides))
         for event, one, number in zip(cells["earthquake"], p, n, strict=True)
     ]
     sums = pd.DataFrame({
@@ -246,7 +248,7 @@ def _bias(cells: pd.DataFrame, laws: Mapping[str, Dependence]) -> float:
     return float((total["more"].abs() / np.sqrt(total["sd"])).max())
 
 
-def _like_blocks(blocks: pd.DataFrame) -> pd.DataFrame:
+def _like_blocks(blocks: pd.DataFrame, sides: int) -> pd.DataFrame:
     """Return one block of each size and class of P on every side of sites that have all of them."""
     p = blocks["probability"]
     own = blocks[(p > CLASSES[0]) & (p < CLASSES[-1])].copy()
@@ -258,7 +260,7 @@ def _like_blocks(blocks: pd.DataFrame) -> pd.DataFrame:
     own = own.sort_values("away", kind="stable")
     place = ["earthquake", "site", "p2", "class"]
     own = own.drop_duplicates([*place, "component", "polarity"])
-    return own[own.groupby(place)["failed"].transform("size") == SIDES]
+    return own[own.groupby(place)["failed"].transform("size") == sides]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -267,7 +267,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
     """Return what is shown without --verbose."""
     ends = {
         "interval": (document["ci_low"], document["ci_high"]),
-        f"at {document.get('sites')} site(s)": (document["event_low"], document["event_high"]),
+        "at the sites": (document["event_low"], document["event_high"]),
     }
     return {
         "probability": percent(document["probability"]),

@@ -196,7 +196,7 @@ def share_range(
     """
     p, n = np.asarray(probability, dtype=np.float64), SIDES * sites
     rho, tail = overdispersion(p, law, sites), 0.5 - 0.5 * level
-    low, high = (_beta_binomial_quantile(n, p, rho, q) / n for q in (tail, 1.0 - tail))
+    low, high = _beta_binomial_quantiles(n, p, rho, np.array([tail, 1.0 - tail])) / n
     return low, high
 
 
@@ -218,30 +218,29 @@ def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
     return np.clip(rho, _LEAST_RHO, _MOST_RHO)
 
 
-def _beta_binomial_quantile(n: int, share: FloatArray, rho: FloatArray, q: float) -> FloatArray:
-    """Return the smallest number of n that is not exceeded with probability q.
+def _beta_binomial_quantiles(
+    n: int, share: FloatArray, rho: FloatArray, q: FloatArray
+) -> FloatArray:
+    """Return the smallest numbers of n that are not exceeded with probabilities q, shape (q, …).
 
     Args:
         share: mean over n, any shape.
         rho: overdispersion, same shape.
     """
-    flat, result = share.ravel(), np.empty(share.size)
-    more = 1.0 / rho.ravel() - 1.0
-    k = np.arange(n + 1.0)
+    flat, more = share.ravel(), 1.0 / rho.ravel() - 1.0
+    result, k = np.empty((q.size, flat.size)), np.arange(n + 1.0)
     ways = -np.log(n + 1.0) - betaln(n - k + 1.0, k + 1.0)
     at_once = max(1, _PAIRS_AT_ONCE // (n + 1))
     for start in range(0, flat.size, at_once):
         some = slice(start, start + at_once)
-        alpha, beta = (
-            part[:, None] for part in (flat[some] * more[some], (1 - flat[some]) * more[some])
-        )
+        alpha = (flat[some] * more[some])[:, None]
+        beta = more[some, None] - alpha
         with np.errstate(invalid="ignore"):
             chance = np.exp(ways + betaln(k + alpha, n - k + beta) - betaln(alpha, beta))
-        result[some] = (np.cumsum(chance, axis=1) < q).sum(axis=1)
-    decided = (flat <= 0.0) | (flat >= 1.0)
-    result[decided] = n * flat[decided]
-    result[np.isnan(flat)] = np.nan
-    return np.minimum(result, n).reshape(share.shape)
+        below = np.cumsum(chance, axis=1)
+        result[:, some] = [(below < each).sum(axis=1) for each in q]
+    result = np.where((flat > 0.0) & (flat < 1.0), np.minimum(result, n), n * flat)
+    return result.reshape(q.shape + share.shape)
 
 
 def count_moments(
@@ -378,8 +377,7 @@ class FailureCount:
             counts = np.full(levels.shape, self.mean)
         elif rho > _LEAST_RHO:
             law = np.array(share), np.array(min(rho, _MOST_RHO))
-            each = [_beta_binomial_quantile(self.n, *law, one) for one in levels.ravel().tolist()]
-            counts = np.reshape(each, levels.shape)
+            counts = _beta_binomial_quantiles(self.n, *law, levels.ravel()).reshape(levels.shape)
         else:  # of whole blocks: the mean stays
             n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
             counts = binom.ppf(levels, n, self.mean / n)

@@ -51,10 +51,8 @@ def predict_motion(
 ) -> Prediction:
     """Return the probability for one block; arguments as for :func:`rbfrag.predict`."""
     if sites is not None:
-        raise InputError(
-            "sites given beside a motion: it shakes one site; give its measures instead",
-            fields=("sites",),
-        )
+        text = "sites given beside a motion, which shakes one: give its measures instead"
+        raise InputError(text, fields=("sites",))
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
@@ -106,11 +104,8 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
     warnings = [f"forward: {text}" for text in forward.warnings]
     warnings += [f"reverse: {text}" for text in reverse.warnings]
     means: dict[str, Any] = {
-        name: mean(name)
-        for name in (
-            "probability", "ci_low", "ci_high", "intensity_m_s", "block_sd",
-        )
-    }  # fmt: skip
+        name: mean(name) for name in ("probability", "ci_low", "ci_high", "intensity_m_s")
+    }
     return MotionPrediction(
         **{
             **vars(forward),

@@ -39,7 +39,7 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         f"({_range(low, high, of)} as far as the data tell it, {level})."
     ]
     if sites is not None:
-        where = f"At {sites:,} site{'s' if sites > 1 else ''} of one earthquake"
+        where = f"At {at_sites(sites)}"
         sentences.append(
             f"{where} it is not known what share of such blocks {fall}s together."
             if event_low is None
@@ -52,6 +52,11 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
             f"{of_block:.2g}."
         )
     return tuple(sentences)
+
+
+def at_sites(number: float) -> str:
+    """Return what the range of one earthquake is of."""
+    return f"{number:,g} site{'s' if number > 1 else ''} of one earthquake"
 
 
 def _count(share: float, of: int) -> str:

@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
+from rbfrag.fragility.words import at_sites
 from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
@@ -172,10 +173,10 @@ def draw_curve(
     answer = array_answer(model, {**block, varied: x, **held}, level, sites=sites)
     known = answer.in_domain
     percent = f"{100.0 * level:g} %"
-    if not np.isnan(answer.event_low).all():
+    if sites is not None and not np.isnan(answer.event_low).all():
         axes.fill_between(
             x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,
-            label=f"share failing at {sites:g} site(s) of one earthquake ({percent})",
+            label=f"share failing at {at_sites(sites)} ({percent})",
         )  # fmt: skip
     axes.fill_between(
         x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,

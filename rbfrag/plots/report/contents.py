@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Unpack
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import SYMBOLS, block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import SYMBOLS, at_sites, block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
@@ -259,8 +259,7 @@ def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[T
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        of = f"share at {document['sites']} site(s) of one earthquake ({level})"
-        answer.append((of, _interval(*ends)))
+        answer.append((f"share at {at_sites(document['sites'])} ({level})", _interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
