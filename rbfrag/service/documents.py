@@ -168,9 +168,10 @@ class ModelListed(_Document):
     """A stored model: what `rbfrag models list` prints as JSON.
 
     `reads` names the measures of the shaking that it needs. `log_loss` is that of outcomes of
-    earthquakes left out, the smaller the better among models of a kind, `log_loss_kr05` of those of
-    blocks of k_r >= 0.05 alone, null of blocks not known by it; `sensitive_share` is the share of the simulated outcomes behind it that a change of the
-    motion by a millionth changes; null of kinds of which that is not asked.
+    earthquakes left out, the smaller the better among models of a kind; `log_loss_kr05` that of
+    those of blocks of k_r >= 0.05 alone, null of blocks that are not known by it;
+    `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
+    by a millionth changes; null of kinds of which that is not asked.
     """
 
     reads: list[str]
