@@ -81,7 +81,7 @@ def test_curves_of_blocks_that_slide_and_slump(
     shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
           "--displacement", "0.1", "--pga", "0.5")  # fmt: skip
     assert "model sliding-pgv_pga" in path.read_text(encoding="utf-8")
-    shell(*drawn, "--ks", "0.2", "--ps2", "3")
+    shell(*drawn, "--ks", "0.2", "--ps2", "3", "--pga", "0.5")
     assert "the block slumps" in path.read_text(encoding="utf-8")
     told = refuses(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
     assert "no stored sliding model works with sa10_g" in told

@@ -27,50 +27,58 @@ from tests.fragility.test_overturning import T2, one, stored
 G = 9.80665
 
 
-def lognormal(c: float, b: float, sigma: float, **changes: Any) -> FragilityModel:
-    """P = Φ((ln PGV - c - b ln y)/σ): lognormal in a slumping block's strength and size."""
+B0, B_Z, B_K = 6.5, 4.0, -3.6
+COVARIANCE = np.array([[0.1, 0.02, 0.01], [0.02, 0.04, 0.01], [0.01, 0.01, 0.03]])
+
+
+def lognormal() -> FragilityModel:
+    """P = Φ(b0 + b_z ln z + b_k ln k_s): lognormal in a slumping block's strength and size."""
     method = method_named("capacity")
-    names = method.forms["pgv"].parameters
-    values: dict[str, Any] = {
-        "name": "closed",
-        "kind": method.block.kind,
-        "term": "pgv",
-        "method": "capacity",
-        "coefficients": dict(zip(names, (c, b, math.log(sigma)), strict=True)),
-        "covariance": ((0.01, 0.002, 0.0), (0.002, 0.004, 0.0), (0.0, 0.0, 0.0)),
-        "domain": {},
-        "data_fingerprint": "f",
-        "diagnostics": {},
-        "dependence": {"rho_e": 0.3},
-    }
-    return FragilityModel.from_row(ModelRow(**{**values, **changes}))
+    covariance = np.zeros((4, 4))
+    covariance[np.ix_((0, 2, 3), (0, 2, 3))] = COVARIANCE
+    names = method.forms["pgv_pga"].parameters
+    row = ModelRow(
+        name="closed",
+        kind=method.block.kind,
+        term="pgv_pga",
+        method="capacity",
+        coefficients=dict(zip(names, (B0, 0.0, B_Z, B_K), strict=True)),
+        covariance=tuple(map(tuple, covariance.tolist())),
+        domain={},
+        data_fingerprint="f",
+        diagnostics={},
+        dependence={"rho_e": 0.3},
+    )
+    return FragilityModel.from_row(row)
 
 
-QUESTION = {"ks": 0.2, "ps2": 4.0, "pgv_m_s": 0.9}
+# PGA far above k_s: no block that it may be stays at rest
+QUESTION = {"ks": 0.2, "ps2": 4.0, "pgv_m_s": 0.9, "pga_g": 4.0}
 
 
 @pytest.mark.parametrize("sigmas", [(0.3, 0.0), (0.0, 0.5), (0.15, 0.4), (0.6, 0.6)])
 def test_lognormal_blocks_and_fragilities_add_their_variances(sigmas: tuple[float, float]) -> None:
-    c, b, sigma = -0.2, 0.9, 0.25
-    model = lognormal(c, b, sigma)
-    y = QUESTION["ks"] * G / math.sqrt(QUESTION["ps2"])
-    of_block = b * math.hypot(sigmas[0], 0.5 * sigmas[1])
-    total = math.hypot(sigma, of_block)
-    eta = (math.log(QUESTION["pgv_m_s"]) - c - b * math.log(y)) / total
-    answer = one(model, **QUESTION, ks_sigma=sigmas[0], ps2_sigma=sigmas[1])
+    ln_z = math.log(math.sqrt(QUESTION["ps2"]) * QUESTION["pgv_m_s"] / (QUESTION["pga_g"] * G))
+    ln_k = math.log(QUESTION["ks"])
+    of_block = math.hypot(B_K * sigmas[0], 0.5 * B_Z * sigmas[1])
+    total = math.hypot(1.0, of_block)
+    eta = (B0 + B_Z * ln_z + B_K * ln_k) / total
+    answer = one(lognormal(), **QUESTION, ks_sigma=sigmas[0], ps2_sigma=sigmas[1])
+    assert 0.01 < answer.probability < 0.99
     assert answer.probability == pytest.approx(norm.cdf(eta), abs=1e-6)
     # Φ(a + s z)² is that two normal variables of correlation ρ are both below the quantile
     rho = (of_block / total) ** 2
     both = multivariate_normal([0.0, 0.0], [[1.0, rho], [rho, 1.0]]).cdf([eta, eta])
     assert answer.block_sd == pytest.approx(math.sqrt(both - norm.cdf(eta) ** 2), abs=1e-5)
-    # the mean moves with c by 1/total and with b by ln y/total, less what b adds to the scatter
-    slope_b = -(math.log(y) / total) - eta * of_block**2 / (b * total**2)
-    x = np.array([-1.0 / total, slope_b])
-    reach = norm.ppf(0.975) * math.sqrt(x @ np.array([[0.01, 0.002], [0.002, 0.004]]) @ x)
+    # the quantile moves with each parameter by its term, less what it adds to the scatter
+    x = np.array([1.0, ln_z, ln_k]) / total
+    x -= eta / total**2 * np.array([0.0, B_Z * (0.5 * sigmas[1]) ** 2, B_K * sigmas[0] ** 2])
+    reach = norm.ppf(0.975) * math.sqrt(x @ COVARIANCE @ x)
     assert answer.ci_low == pytest.approx(norm.cdf(eta - reach), abs=2e-6)
     assert answer.ci_high == pytest.approx(norm.cdf(eta + reach), abs=2e-6)
 
 
+<<<<<<< HEAD
 def test_ranges_at_sites_are_taken_at_the_mean() -> None:
     question: dict[str, Any] = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, "sites": 5}
     answer: Any = predict(**question, kr_sigma=0.3)
@@ -79,6 +87,20 @@ def test_ranges_at_sites_are_taken_at_the_mean() -> None:
     ends = share_range(answer.probability, law, 5)
     assert (answer.event_low, answer.event_high) == ends
     assert answer.event_low < answer.probability < answer.event_high
+=======
+def test_one_earthquake_moves_all_blocks_alike() -> None:
+    model = lognormal()
+    spread = model.event_spread
+    assert spread is not None
+    z = np.linspace(-8.0, 8.0, 20001)
+    weight = np.exp(-0.5 * z * z) / np.exp(-0.5 * z * z).sum()
+    of_each = answer_given(model, {**QUESTION, "ks": 0.2 * np.exp(0.3 * z)}, 0.9)
+    answer = one(model, **QUESTION, ks_sigma=0.3)
+    normal = quantiles_of(0.95).normal
+    ends = spread.ends(norm.ppf(of_each.probability), normal, arrays().ndtr)
+    assert answer.event_low == pytest.approx(weight @ ends[0], abs=1e-6)
+    assert answer.event_high == pytest.approx(weight @ ends[1], abs=1e-6)
+>>>>>>> 2b6f1d70 (Doors, curves and uncertain blocks: slumps with PGA)
 
 
 @pytest.mark.parametrize("pga", [None, 0.5, 0.19])
