@@ -245,20 +245,39 @@ def test_an_unknown_model_or_kind_is_named(tmp_path: Any, monkeypatch: pytest.Mo
         predict(**SLUMP, pgv_m_s=0.5, pga_g=0.5, rotation_deg=7.0)
 
 
-@settings(max_examples=80)
-@given(
-    ks=st.floats(0.02, 0.6),
-    ps2=st.floats(0.5, 30.0),
-    pga=st.floats(0.05, 1.5),
-    pulse=st.floats(0.02, 0.4),
-)
-def test_a_slump_fails_sooner_when_weaker_and_under_stronger_shaking(
-    ks: float, ps2: float, pga: float, pulse: float
-) -> None:
-    asked: dict[str, Any] = {"ps2": ps2, "model": row_of("slumping")}
-    pgv = pulse * pga * STANDARD_GRAVITY_M_S2
-    here = one(ks=ks, pgv_m_s=pgv, pga_g=pga, **asked).probability
-    assert one(ks=1.05 * ks, pgv_m_s=pgv, pga_g=pga, **asked).probability <= here
-    assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=pga, **asked).probability >= here
-    assert one(ks=ks, pgv_m_s=pgv, pga_g=1.05 * pga, **asked).probability >= here
-    assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=1.05 * pga, **asked).probability >= here
+FITTED = {
+    "slumping-recovery-pgv_pga_m": (1.346, 2.917, 2.461, 1.175, 0.727),
+    "slumping-recovery-pgv_pga": (1.667, 2.536, 2.553, 1.014),
+    "slumping-2deg-pgv_pga_m": (3.852, 3.063, 2.219, 1.298, 0.395),
+    "slumping-2deg-pgv_pga": (3.977, 2.922, 2.369, 1.232),
+}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_a_slump_fails_sooner_when_weaker_and_under_stronger_shaking(name: str) -> None:
+    term = name.rpartition("-")[2]
+    names = method_named("capacity").forms[term].parameters
+    model = row_of("slumping", term, coefficients=dict(zip(names, FITTED[name], strict=True)))
+    rng, n = np.random.default_rng(7), 20_000
+    pga, pulse = (np.exp(rng.uniform(*np.log(ends), n)) for ends in ((0.01, 3.0), (0.01, 1.0)))
+    block = {
+        "ks": pga * np.exp(rng.uniform(np.log(0.001), 0.1, n)),
+        "ps2": np.exp(rng.uniform(np.log(0.05), np.log(50.0), n)),
+        **({"magnitude": rng.uniform(4.0, 9.0, n)} if term == "pgv_pga_m" else {}),
+    }
+    shaking = {"pgv_m_s": pulse * pga * STANDARD_GRAVITY_M_S2, "pga_g": pga}
+
+    def p(more: float = 1.0, **factors: float) -> np.ndarray:
+        asked = {**block, **{each: more * value for each, value in shaking.items()}}
+        asked |= {each: factor * asked[each] for each, factor in factors.items()}
+        answer = predict(**asked, model=model, interval=False)
+        assert isinstance(answer, PredictionArray)
+        return answer.probability
+
+    here = p()
+    assert 0.0 < here.mean() < 1.0
+    assert (p(ks=1.02) <= here).all()
+    for factors in ({"more": 1.02}, {"pgv_m_s": 1.02}):
+        assert (p(**factors) >= here).all()
+    if "magnitude" in block:
+        assert (p(magnitude=1.02) >= here).all()
