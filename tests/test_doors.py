@@ -321,6 +321,32 @@ def client() -> Iterator[TestClient]:
         yield found
 
 
+@pytest.mark.parametrize("sites", [1, 5, 30])
+def test_the_range_of_some_sites_is_the_same_at_every_door(
+    shell: Shell, client: TestClient, sites: int
+) -> None:
+    question = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.8, "pga_g": 0.5}
+    one = rbfrag.predict(**question, sites=sites)
+    assert isinstance(one, Prediction)
+    ends = (one.event_low, one.event_high)
+    words = {"p2": 3.0, "kr": 0.1, "pgv": 0.8, "pga": 0.5, "sites": sites}
+    options = [text for name, value in words.items() for text in (f"--{name}", str(value))]
+    told = shell.json("predict", *options)
+    asked = client.get("/v1/predict", params=words).json()
+    for document in (told, asked):
+        assert document["sites"] == sites
+        assert (document["event_low"], document["event_high"]) == ends
+    body = {**words, "kr": [0.1, 0.2], "sites": float(sites)}
+    rows = client.post("/v1/predict", json=body).json()
+    assert (rows["event_low"][0], rows["event_high"][0]) == ends
+    many = rbfrag.predict(**{**question, "kr": np.array([0.1, 0.2])}, sites=sites)
+    assert isinstance(many, PredictionArray)
+    assert (many.event_low[0], many.event_high[0]) == ends
+    del words["sites"]
+    without = client.get("/v1/predict", params=words).json()
+    assert without["event_low"] is without["event_high"] is None
+
+
 def parameters(question: dict[str, Any]) -> dict[str, Any]:
     return {parameter_of(name): value for name, value in question.items()}
 
