@@ -223,7 +223,7 @@ def _suited_in(
             )
         raise InputError(
             f"no stored {kind} model works with {_measures(given)}: give "
-            f"{_enough(row.term for row in of_kind)}, or fit a model of {' or '.join(possible)}",
+            f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}",
             fields=STATED,
         )
     # those that are kept for comparison answer where there is no other, or where one was chosen
@@ -239,6 +239,12 @@ def _suited_in(
             possible.index(m.term.name),
         ),
     )
+
+
+def _or_fit(kind: str, terms: Iterable[str]) -> str:
+    fitted = {name for method in methods() if method.block.kind == kind for name in method.forms}
+    known = [name for name in terms if name in fitted]
+    return f", or fit a model of {' or '.join(known)}" if known else ""
 
 
 def _enough(terms: Iterable[str]) -> str:

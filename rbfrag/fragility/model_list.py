@@ -11,7 +11,7 @@ from rbfrag.fragility.measures import TERMS
 
 
 def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
-    """Return what `rbfrag models list` says of each model."""
+    """Return what `rbfrag models list` says of each model, the best of a kind first."""
     return [
         {
             **{
@@ -20,15 +20,19 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             },
             "n": fitted_number(row.diagnostics),
             "reads": list(TERMS[row.term].inputs) if row.term in TERMS else [],
-            "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
-            "log_loss_kr05": loss if (loss := held_out_loss(row, "_kr05")) < math.inf else None,
+            "log_loss": _finite(held_out_loss(row, "log_loss_held_out")),
+            "log_loss_kr05": _finite(held_out_loss(row, "log_loss_held_out_kr05")),
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
             "created": row.created,
         }
-        for row in rows
+        for row in sorted(rows, key=lambda row: (row.kind, held_out_loss(row)))
     ]
+
+
+def _finite(loss: float) -> float | None:
+    return loss if loss < math.inf else None
 
 
 def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:

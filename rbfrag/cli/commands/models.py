@@ -26,14 +26,15 @@ Name = Annotated[
 def list_models(db: options.Db = None, json: options.Json = False) -> None:
     """List the fitted models with their scores.
 
-    The log loss is that of earthquakes left out, the smaller the better among the models of a kind:
-    of those that what is given suffices for, the best answers, or the default, the one that was
-    chosen or else the best of all, if no other reads more of the motion. Of blocks known by k_r it
-    is that of k_r >= 0.02, and beside it that of k_r >= 0.05. Without a database the models that
+    The log loss is that of earthquakes left out, the smaller the better among the models of a kind;
+    of blocks known by k_r it is that of k_r >= 0.05. Of the models that what is given suffices for,
+    the default answers, the one that was chosen or else the best of all, or else the best; those
+    of a method that is kept for comparison answer by name alone. Without a database the models that
     are shipped are listed.
     """
     from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
+    from rbfrag.question.fields import word_of
 
     listed = model_list(stored_rows(db))
     if json:
@@ -45,14 +46,15 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
         f"first: {default or 'none'}."
     )
     print()
-    shown = ("name", "kind", "reads", "log_loss", "log_loss_kr05", "is_default", "events")
     print_table(
-        ("name", "for", "reads", "log_loss", "from k_r 0.05", "default", "earthquakes"),
+        ("name", "for", "reads", "log_loss", "default"),
         [
-            tuple(", ".join(each[name]) if name == "reads" else each[name] for name in shown)
+            (each["name"], each["kind"], ", ".join(map(word_of, each["reads"])),
+             "" if loss is None else f"{loss:.4f}", "yes" if each["is_default"] else "")
             for each in listed
+            for loss in [each["log_loss_kr05"] or each["log_loss"]]
         ],
-    )
+    )  # fmt: skip
 
 
 @app.command("show", epilog="Example:  rbfrag models show wls-pgv")
