@@ -68,6 +68,8 @@ def drawn_questions(model: FragilityModel, random: np.random.Generator, n: int) 
         "tm_s": np.exp(random.normal(-0.7, 0.4, n)),
         "pgd_m": 0.1 * pgv * np.exp(random.normal(0.0, 0.4, n)),
         "xp_m_s": pgv * random.uniform(0.3, 1.0, n),
+        "arias_m_s": pgv * pgv * random.uniform(2.0, 60.0, n),
+        "magnitude": random.uniform(5.0, 8.0, n),
         "p2": np.exp(random.uniform(np.log(0.1), np.log(30.0), n)),
         "ps2": np.exp(random.uniform(-1.0, 3.0, n)),
         "displacement_m": np.exp(random.uniform(-6.0, 0.0, n)),
