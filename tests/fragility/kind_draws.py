@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,8 @@ from tests.synthetic import unknown_spectrum
 
 TRUE = {
     ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
+    ("sliding", "pgv_pga_m"): (0.2, 0.8, 3.8, 0.4, -0.8, 1.4),
+    ("sliding", "pgv_pga_ia"): (-0.9, 1.1, 2.9, 0.7, -0.9, 1.4),
     ("slumping", "pgv_pga_m"): (1.2, 3.0, 2.5, 1.2, 0.5),
     ("slumping", "pgv_pga"): (1.2, 3.0, 2.5, 1.2),
 }
@@ -35,13 +39,17 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
             "pga_g": pga,
             "pgv_m_s": pulse * pga * STANDARD_GRAVITY_M_S2,
             "displacement_m": np.ones(n),
+            "magnitude": rng.uniform(5.0, 8.0, 20)[event],
         }
+        values["arias_m_s"] = values["pgv_m_s"] ** 2 * np.exp(rng.normal(2.5, 0.7, n))
         unit = METHOD_OF[kind].forms[term].eta(TRUE[kind, term], values, arrays())
         slid = np.exp((unit.eta + z) * np.exp(unit.log_sigma))
         assert (slid < LEAST_DISPLACEMENT_M).any()
         k = values["ky"] / pga
+        table = _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan))
+        of_motion = {name: values[name] for name in ("magnitude", "arias_m_s")}
         return FitSource(
-            _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan)),
+            replace(table, **of_motion),
             np.full(n, np.nan), k[:, None], np.full((n, 1), np.nan), slid[:, None],
         )  # fmt: skip
     ks, ps2 = np.exp(rng.normal(-1.5, 0.4, n)), np.exp(rng.normal(1.0, 0.8, n))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rbfrag.db.engine import opened_database
 from rbfrag.db.model_file import ModelRow
+from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import block_of, find_model
+from rbfrag.fragility.lookup import block_of, find_model, unused_measures
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.methods.overturning import BLOCK
 from rbfrag.fragility.model import FragilityModel
@@ -162,6 +165,26 @@ def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
         rising = [p(pgv_m_s=v) for v in np.geomspace(1e-4, 10.0, 60).tolist()]
         assert np.all(np.diff(rising) >= 0.0)
         assert rising[0] < 1e-3
+
+
+def test_pga_alone_is_refused_and_told_what_would_suffice(tmp_path: Path) -> None:
+    path = tmp_path / "rocking.db"
+    with opened_database(path, create=True) as engine, engine.begin() as connection:
+        for term, b in (("pgv", PGV), ("pga_m", (0.0,) * 8), ("pgv_pga", T2)):
+            save_model(connection, stored(term, b).row)
+    block = ["p2", "kr"]
+    with pytest.raises(InputError, match=r"give pga_g and magnitude, or pgv_m_s$") as refused:
+        find_model(None, [*block, "pga_g"], path, kind="rocking")
+    assert len(str(refused.value)) < 500
+    assert (
+        find_model(None, [*block, "pga_g", "magnitude"], path, kind="rocking").term.name == "pga_m"
+    )
+    most = [*block, "pgv_m_s", "pga_g", "magnitude"]
+    chosen = find_model(None, most, path, kind="rocking")
+    assert chosen.term.name == "pgv_pga"
+    assert unused_measures(chosen, most) == (
+        "magnitude was not used: model rocking-pgv_pga reads pgv_m_s and pga_g",
+    )
 
 
 def test_a_description_says_which_blocks_are_meant() -> None:

@@ -78,7 +78,6 @@ def test_lognormal_blocks_and_fragilities_add_their_variances(sigmas: tuple[floa
     assert answer.ci_high == pytest.approx(norm.cdf(eta + reach), abs=2e-6)
 
 
-<<<<<<< HEAD
 def test_ranges_at_sites_are_taken_at_the_mean() -> None:
     question: dict[str, Any] = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6, "sites": 5}
     answer: Any = predict(**question, kr_sigma=0.3)
@@ -87,20 +86,6 @@ def test_ranges_at_sites_are_taken_at_the_mean() -> None:
     ends = share_range(answer.probability, law, 5)
     assert (answer.event_low, answer.event_high) == ends
     assert answer.event_low < answer.probability < answer.event_high
-=======
-def test_one_earthquake_moves_all_blocks_alike() -> None:
-    model = lognormal()
-    spread = model.event_spread
-    assert spread is not None
-    z = np.linspace(-8.0, 8.0, 20001)
-    weight = np.exp(-0.5 * z * z) / np.exp(-0.5 * z * z).sum()
-    of_each = answer_given(model, {**QUESTION, "ks": 0.2 * np.exp(0.3 * z)}, 0.9)
-    answer = one(model, **QUESTION, ks_sigma=0.3)
-    normal = quantiles_of(0.95).normal
-    ends = spread.ends(norm.ppf(of_each.probability), normal, arrays().ndtr)
-    assert answer.event_low == pytest.approx(weight @ ends[0], abs=1e-6)
-    assert answer.event_high == pytest.approx(weight @ ends[1], abs=1e-6)
->>>>>>> 2b6f1d70 (Doors, curves and uncertain blocks: slumps with PGA)
 
 
 @pytest.mark.parametrize("pga", [None, 0.5, 0.19])

@@ -44,6 +44,38 @@ def test_a_fit_finds_the_parameters_that_made_the_data(kind: str, term: str) -> 
         assert key in report.as_dict()
 
 
+def test_rows_without_magnitude_are_left_out_and_told() -> None:
+    source = drawn("sliding", "pgv_pga_m", n=2000)
+    magnitude = np.where(source.table.event_id == "event-03", np.nan, source.table.magnitude)
+    lacking = replace(source, table=replace(source.table, magnitude=magnitude))
+    ky = source.k_over_pga[:, 0] * source.table.pga_g
+    without = int((np.isnan(magnitude) & (ky >= 0.02) & (ky <= 1.0)).sum())
+    assert without > 20
+    report = fit(lacking, kind="sliding", term="pgv_pga_m")
+    assert report.details["n_excluded_undefined_term"] == without
+    assert any("measure that the term reads is not known" in text for text in report.warnings)
+    assert report.events == 19
+    assert report.model.row.domain["ky"] == (0.02, 1.0)
+    least, most = report.model.row.domain["magnitude"]
+    assert 5.0 <= least < most <= 8.0
+    assert fit(lacking, kind="sliding", term="pgv_pga").events == 20
+
+
+def test_fits_of_rocking_read_two_factors_on_restitution_and_blocks_up_to_one_g() -> None:
+    source = drawn_outcomes("bounded", "pgv_pga", TRUTH["bounded", "pgv_pga"])
+    n = source.table.p2.size
+    factor = np.resize([1.0, 0.95, 0.9, 0.8], n)
+    strong = replace(
+        source, of_block={"restitution_factor": factor}, k_over_pga=4.0 * source.k_over_pga
+    )
+    data = fit_data(strong, method_named("overturning"), TERMS["pgv_pga"])
+    assert set(factor[data.combination]) == {1.0, 0.9}
+    kr = data.grid("kr")
+    assert kr.max() > 1.0
+    for part in (data.read, data.scored):
+        assert 0.02 <= kr[part].min() < kr[part].max() <= 1.0
+
+
 def test_leaving_the_censored_rows_out_would_be_wrong() -> None:
     method, term = METHOD_OF["sliding"], TERMS["pgv_pga"]
     data = fit_data(drawn("sliding", "pgv_pga"), method, term)
