@@ -22,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from multiprocessing import get_context
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, delete, func, select
@@ -39,6 +40,7 @@ from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
+from rbfrag.db.motions import add_to_suite
 from rbfrag.fragility.fit.data import KR
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.fit.report import FitReport
@@ -56,6 +58,12 @@ rocking blocks are fitted to is left out."""
 PAGE = ROOT / "docs" / "evidence" / "reference-data.md"
 
 SUITE = "reference"
+
+FEW = "two-recordings"
+"""Suite of the campaign of slumping blocks, whose runs take a hundred times as long."""
+
+RECORDINGS = 2
+"""Recordings of each earthquake in it, drawn at random."""
 
 MODELS: tuple[dict[str, Any], ...] = (
     {"method": "bounded", "term": "pgv_kr"},
@@ -84,7 +92,7 @@ MODELS_OF_ALL: tuple[dict[str, Any], ...] = (
         )
     ),
     *(
-        {"kind": "slumping", "term": term, "rotation_deg": rotation}
+        {"kind": "slumping", "term": term, "rotation_deg": rotation, "suite": FEW}
         for rotation in (None, 2.0)
         for term in ("pgv_pga_m", "pgv_pga")
     ),
@@ -116,8 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     summary = simulate(kind="toppling", vertical="both", **run)
     simulate(kind="sliding", **run)
     if not chosen.without_models:
+        draw_recordings(full)
         for kind in MODELS_ALONE:
-            simulate(kind=kind, **run)
+            simulate(kind=kind, **{**run, "suite": FEW if kind == "slumping" else SUITE})
     made = chosen.work / "reference.db"
     reduce(full, made)
     reports = []
@@ -133,6 +142,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
     beside.replace(chosen.out)
     chosen.page.write_text(provenance(made, roots, summary, reports), encoding="utf-8")
     print(f"{chosen.out}: {made.stat().st_size:,} bytes\n{chosen.page}")
+
+
+def draw_recordings(full: Path) -> None:
+    """Put the horizontal motions of some recordings of each earthquake into a suite."""
+    motion, recording, earthquake = schema.motion.c, schema.recording.c, schema.earthquake.c
+    query = (
+        select(earthquake.event_id, recording.id, motion.id)
+        .join(schema.recording, recording.earthquake_id == earthquake.id)
+        .join(schema.motion, motion.recording_id == recording.id)
+        .where(~motion.is_vertical)
+        .order_by(earthquake.event_id, recording.id, motion.id)
+    )
+    random = Random(31)
+    with opened_database(full) as engine, engine.begin() as connection:
+        of_events: dict[str, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+        for event, place, number in connection.execute(query):
+            of_events[event][place].append(number)
+        events = list(of_events)
+        random.shuffle(events)
+        for event in events:
+            places = list(of_events[event])
+            random.shuffle(places)
+            for place in places[:RECORDINGS]:
+                for number in of_events[event][place]:
+                    add_to_suite(connection, FEW, number)
 
 
 def show(progress: CampaignProgress) -> None:
