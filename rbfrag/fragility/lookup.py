@@ -224,7 +224,6 @@ def _suited_in(
         raise InputError(
             f"no stored {kind} model works with {_measures(given)}: give "
             f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}",
-            fields=STATED,
         )
     # those that are kept for comparison answer where there is no other, or where one was chosen
     usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
