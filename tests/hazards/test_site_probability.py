@@ -151,6 +151,12 @@ def test_correlations_of_the_residuals() -> None:
     assert correlation("sa30_g", "sa10_g") == pytest.approx(0.609, abs=0.001)
     assert correlation("pga_g", "sa10_g") == pytest.approx(0.519, abs=0.001)
     assert correlation("pgv_m_s", "pga_g") == 0.733
+    # by hand from the published coefficients
+    assert correlation("pgv_m_s", "sa03_g") == pytest.approx(0.689, abs=0.001)
+    assert correlation("sa10_g", "pgv_m_s") == pytest.approx(0.786, abs=0.001)
+    assert correlation("pgv_m_s", "sa30_g") == pytest.approx(0.758, abs=0.001)
+    every = correlations(("pgv_m_s", "pga_g", "sa03_g", "sa10_g", "sa20_g", "sa30_g"))
+    assert np.linalg.eigvalsh(every).min() > 0.0
     matrix = correlations(ALL)
     assert (matrix == matrix.T).all()
     assert (np.linalg.eigvalsh(matrix) > 0.0).all()
