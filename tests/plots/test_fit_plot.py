@@ -205,9 +205,9 @@ def test_nothing_to_draw_is_refused(table, model, tmp_path):
 
 def test_models_of_other_blocks_are_refused(table, tmp_path):
     row = ModelRow(
-        name="slumps", kind="slumping", term="pgv", method="capacity",
-        coefficients={"c": 0.0, "b": 1.0, "s0": -1.0}, covariance=((0.01, 0.0, 0.0),) * 3,
-        domain={}, data_fingerprint="",
+        name="slumps", kind="slumping", term="pgv_pga", method="capacity",
+        coefficients={"b0": 1.0, "b_ln_excess": 3.0, "b_ln_z": 2.5, "b_ln_k": 1.2},
+        covariance=((0.01, 0.0, 0.0, 0.0),) * 4, domain={}, data_fingerprint="",
     )  # fmt: skip
     with pytest.raises(InputError, match="blocks known by ks and ps2"):
         plot_fit(table, FragilityModel.from_row(row), tmp_path / "fit.png")
