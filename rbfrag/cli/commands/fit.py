@@ -53,15 +53,16 @@ def fit(
         "Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
         "pgv_pga, pgv_pga_tm and pgv_pga_sa10_sa30: PGV with PGA (and Tm, or spectral "
         "accelerations at 1 and 3 s); xp: the toppling spectrum X(p); pgv_kr: PGV with the block's "
-        "strength; pga; sa10; pga_sa10 and pga_sa03_sa10_sa30: PGA with these.",
+        "strength; pga; sa10; pga_sa10, pga_sa10_sa30 and pga_sa03_sa10_sa30: PGA with these; "
+        "pga_m, pgv_pga_m and pgv_pga_ia: with magnitude or Arias intensity.",
         ...,
         show_default=False,
     ),
     data: Data,
     kind: str = option(
-        "What the blocks do: toppling; sliding, on the terms pgv and pgv_pga; slumping, on "
-        "pgv_pga and pgv_pga_m (with magnitude); rocking (free-standing), also on sa10 and "
-        "pga_sa10; or another kind that campaigns store.",
+        "What the blocks do: toppling; slumping, on pgv_pga and pgv_pga_m (with magnitude); "
+        "sliding, on these, pgv and pgv_pga_ia; rocking (free-standing), on pgv, pgv_pga, sa10, "
+        "pga_sa10, pga_m and those of sa10_sa30; or another kind that campaigns store.",
         "toppling",
     ),
     rotation: float | None = option(

@@ -22,6 +22,10 @@ const KNOWS = {
   sa10: "SA(1 s)",
   pga_sa10: "PGA, SA(1 s)",
   pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
+  pga_sa10_sa30: "PGA, SA(1, 3 s)",
+  pga_m: "PGA, M",
+  pgv_pga_m: "PGV, PGA, M",
+  pgv_pga_ia: "PGV, PGA, Arias intensity",
 };
 
 /** How the sentence of the service begins that the page says in its own place. */
