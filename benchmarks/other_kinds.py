@@ -3,10 +3,10 @@
     python -m benchmarks.other_kinds DATABASE [--slumping DATABASE] [--suite NAME] [--write]
 
 reads the campaigns of a database (sliding, slumping by 2 degrees and past recovery), fits the
-models, compares them with published regressions, and prints the tables; --write keeps them and
-draws the figure of docs/evidence/other-kinds.md. Slumping may be in another database, there run
-under the motions of a suite alone. What the blocks of one earthquake share is that of the shipped
-models.
+models and prints the tables (`benchmarks.sliding_models` compares those of sliding); --write keeps
+them and draws the figure of docs/evidence/other-kinds.md. Slumping may be in another database,
+there run under the motions of a suite alone. What the blocks of one earthquake share is that of the
+shipped models.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from sqlalchemy import Connection
 
 from benchmarks.other_kinds_figure import plot_other_kinds
 from benchmarks.page import ROOT, write_table
-from benchmarks.slide_comparison import comparison
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
@@ -137,9 +136,6 @@ def tables(
     found: dict[str, str] = {}
     with opened_database(database, read_only=True) as engine, engine.connect() as c:
         slides = {term: fitted(c, "sliding", term) for term in ("pgv_pga", "pgv")}
-        source = read_source(c, method_of_kind("sliding", None).block, kind="sliding")
-        for facing in ("one", "either"):
-            found[f"sliding-{facing}"] = comparison(source, facing=facing)
     with opened_database(slumping or database, read_only=True) as engine, engine.connect() as c:
         slumps = [
             fitted(c, "slumping", term, rotation_deg=rotation, suite=suite)
