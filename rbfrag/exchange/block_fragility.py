@@ -15,7 +15,6 @@ from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.hazards.measure_type import IntensityType
-from rbfrag.hazards.shaking import rises_below
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
@@ -24,7 +23,6 @@ from rbfrag.solver.results import FloatArray
 FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped"}
 """The limit state of a block by its mode."""
 
-BEGINS = "the functions begin there, and nothing fails below"
 """What becomes of such models."""
 
 SMALLEST = 1e-7
@@ -98,7 +96,14 @@ def block_functions(
         for name, row in zip(names, rows, strict=True)
     ]
     begun = [each.no_damage_limit for each in functions if each.no_damage_limit is not None]
-    warnings = (rises_below(model, max(begun), BEGINS),) if begun else ()
+    warnings = (
+        (
+            f"P of model {model.name} rises again below {measure} = {max(begun):.2g}, where it was "
+            "fitted on too little: the functions begin there, and nothing fails below",
+        )
+        if begun
+        else ()
+    )
     return BlockFunctions(functions, about_model(model), warnings)
 
 

@@ -17,7 +17,6 @@ from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.map_failures import MapFailures, Places, map_failures
-from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.hazards.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import AnsweringFields, V
@@ -148,9 +147,6 @@ def shakemap(
     shaking, chosen = answer.shaking, answer.shaking.model
     if chosen.form.advice:
         warnings.append(chosen.form.advice)
-    first = shaking.median[:, 0][shaking.median[:, 0] > 0.0]
-    if first.size:
-        warnings += rise_in_words(chosen, read, float(first.min()), float(first.max()))
     if "pgv_m_s" not in measures:
         names = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
         warnings.append(f"the map has no PGV, which tells most: a model of {names} answers")

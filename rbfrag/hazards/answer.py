@@ -247,8 +247,6 @@ def hazard(
     for of_model in own:
         kinds[of_model.places] = of_model.model.row.kind
     warnings.extend(one.form.advice for one in models if one.form.advice)
-    for of_model in own:
-        warnings.extend(reading.rise_in_words(curves[0], of_model.model, of_model.numbers))
     blocks = _SiteBlocks.of(own, reading, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (

@@ -27,7 +27,7 @@ from rbfrag.hazards.event_counts import (
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.shaking import NOTABLE, rise_in_words
+from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
@@ -615,22 +615,7 @@ def _warnings(
                 f"{int(rare.sum())} of {portfolio.size} blocks fail less than once in the "
                 f"{effective:.6g} years that the events cover: their rates are not resolved"
             )
-    return (*warnings, *_rises(events, portfolio), *_weakest_at_thin_shaking(events, portfolio))
-
-
-def _rises(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
-    """Yield where P of a model rises again towards weak shaking that the events have."""
-    for number, model in enumerate(portfolio.answering):
-        x = events.measures[model.term.inputs[0]]
-        ends = x[x > 0.0] / portfolio.component.ratio
-        block, own = model.method.block, portfolio.model == number
-        numbers = {
-            n: portfolio.numbers[n][own]
-            for n in (*block.names, *block.options)
-            if n in portfolio.numbers
-        }
-        if ends.size:
-            yield from rise_in_words(model, numbers, float(ends.min()), float(ends.max()))
+    return (*warnings, *_weakest_at_thin_shaking(events, portfolio))
 
 
 def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator[str]:

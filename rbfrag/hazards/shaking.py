@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
-from rbfrag.question.fields import declared
 from rbfrag.solver.results import FloatArray
 
 _SCATTER_POINTS = 25
@@ -68,13 +65,6 @@ class LevelShaking:
         xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
         median = factor / meaning.ratio
         return cls(name, median * np.exp(scatter * xi), weight, median, tuple(warnings))
-
-    def rise_in_words(
-        self, curve: HazardCurve, model: FragilityModel, numbers: Mapping[str, FloatArray]
-    ) -> tuple[str, ...]:
-        """Return what is to be said where P rises again towards weak shaking of a curve."""
-        low, high = (self.median * float(curve.levels[end]) for end in (0, -1))
-        return rise_in_words(model, numbers, low, high)
 
 
 def _measure(
@@ -152,42 +142,3 @@ def ends_in_words(
             f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
             f"is already {float(below.max()):.3g}: weaker shaking is not counted"
         )
-
-
-_LEVELS, _MOST_BLOCKS, _NOTABLE_RISE = 129, 256, 1e-3
-
-
-def rise_in_words(
-    model: FragilityModel, numbers: Mapping[str, FloatArray], low: float, high: float
-) -> tuple[str, ...]:
-    """Return what is to be said where a model's P rises again towards weak shaking; () nowhere.
-
-    Args:
-        model: the model; one of several measures is passed over.
-        numbers: what it reads of blocks, by field, shape (m,) each.
-        low: least value of its measure that counts, above zero.
-        high: greatest.
-    """
-    if len(model.term.inputs) > 1 or not 0.0 < low < high:
-        return ()
-    (name,) = model.term.inputs
-    x = np.geomspace(low, high, _LEVELS)
-    every = 1 + next(iter(numbers.values())).size // _MOST_BLOCKS
-    some = {field: values[::every, None] for field, values in numbers.items()}
-    given = {**model.method.block.filled(some), name: x}
-    p = array_answer(model, given, interval=False).probability
-    rises = p[:, 0] - p.min(axis=1) > _NOTABLE_RISE
-    if not rises.any():
-        return ()
-    level = float(x[p[rises].argmin(axis=1)].max())
-    return (rises_below(model, level, "P is too high there"),)
-
-
-def rises_below(model: FragilityModel, level: float, effect: str) -> str:
-    """Return the sentence for a model's P that rises again below a level of its measure."""
-    (name,) = model.term.inputs
-    unit = declared()[name].unit
-    return (
-        f"P of model {model.name} rises again below {name.partition('_')[0].upper()} = "
-        f"{level:.2g} {unit}, where it was fitted on too little: {effect}"
-    )

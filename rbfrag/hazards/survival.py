@@ -292,7 +292,6 @@ def _warnings(
         yield from quantile_warning(curve, "survival")
     if (known := blocks.of_model) is not None:
         yield from known.warnings
-        yield from known.shaking.rise_in_words(curves[0], known.model, known.medians)
     for rate in rates:
         yield from rate.warnings
     outside = max(rate.outside for rate in rates)

@@ -15,7 +15,6 @@ from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.words import at_sites
-from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -199,12 +198,6 @@ def draw_curve(
         p = float(pointed.probability[0])
         axes.plot([at, at, 0.0], [0.0, p, p], color=RED, lw=0.9, ls="--")
         axes.plot(at, p, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9)
-
-
-def rise_of_curve(model: FragilityModel, block: Mapping[str, float]) -> tuple[str, ...]:
-    """Return what is to be said where the curve rises again towards weak shaking."""
-    numbers = {name: np.array([value]) for name, value in block.items()}
-    return rise_in_words(model, numbers, 1e-3, 10.0)
 
 
 def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | None:

@@ -169,7 +169,7 @@ def curve(
         question: fields of the block, with ``kind``, the measures that are held, and ``model``,
             ``level``, ``sites`` and ``db``, as :func:`rbfrag.predict` has them.
     """
-    from rbfrag.plots.curve import plot_curve, rise_of_curve
+    from rbfrag.plots.curve import plot_curve
 
     numbers = [each for each in (p2, kr) if each is not None]
     block, held, answering, drawing = parts_of(
@@ -198,8 +198,7 @@ def curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
         level=answering.get("level", LEVEL), beside=others, sites=answering.get("sites"),
     )  # fmt: skip
-    warnings = (*blocks.remarks, *rise_of_curve(chosen, group.numbers))
-    return replace(picture, warnings=warnings)
+    return replace(picture, warnings=blocks.remarks)
 
 
 def sensitivity(

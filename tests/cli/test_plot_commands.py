@@ -76,7 +76,7 @@ def test_curves_of_blocks_that_slide_and_slump(
     path = tmp_path / "other.svg"
     drawn = ("plot", "curve", "--db", REFERENCE, "--out", path)
     done = shell(*drawn, "--ky", "0.2", "--displacement", "0.1")
-    assert "P of model sliding-pgv rises again below PGV = 0.1 m/s" in done.stderr
+    assert "rises again" not in done.stderr
     assert "slides too far" in path.read_text(encoding="utf-8")
     shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
           "--displacement", "0.1", "--pga", "0.5")  # fmt: skip

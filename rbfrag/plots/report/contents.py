@@ -18,7 +18,6 @@ from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.report import as_dict, beyond_in_words, once_in, rate_in_words
 from rbfrag.plots.canvas import mode_title
-from rbfrag.plots.curve import rise_of_curve
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
@@ -160,7 +159,7 @@ def contents_of(
             ("Shaking", _shaking_rows(measures)),
             *_answer_tables(document, answered),
         ),
-        remarks=tuple(dict.fromkeys((*warnings, *rise_of_curve(model, numbers)))),
+        remarks=tuple(dict.fromkeys(warnings)),
         versions=tuple(_versions(model, answered, document["data"])),
         drawing=_drawing(shape, numbers, free=facts.free_standing),
         numbers=numbers,
