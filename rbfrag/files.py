@@ -126,7 +126,7 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
         content = bounded_bytes(source, most_bytes)
         if content is None:
             raise InputError(
-                f"{source} has more than {most_bytes} bytes: {what} cannot be so large"
+                f"{source} is larger than {most_bytes} bytes: {what} cannot be so long"
             )
         text = content.decode("utf-8-sig")
     text = text.replace("\r\n", "\n").replace("\r", "\n")

@@ -269,7 +269,7 @@ def test_a_free_standing_rectangle_says_what_it_is_taken_as(open_page, ask):
             "ky = 0.176 g",
         ),
         (
-            {"s1": 1, "s2": 0.6, "gamma": 25, "beta": 20, "phi": 32},
+            {"s1": 1, "s2": 0.6, "gamma": 25, "beta": 20, "phi": 32, "pga": 0.6},
             {"kind": "slumping"},
             "Probability of failure past recovery",
             "ks = 0.202 g",
@@ -355,10 +355,10 @@ def test_a_model_can_be_chosen(open_page, ask):
     opened = open_page()
     page = opened.page
     page.locator("#model-part summary").click()
-    page.select_option("#model", "lognormal-pgv")
-    expect(page.locator("#about")).to_contain_text("Model lognormal-pgv of models.db.")
+    page.select_option("#model", "logistic-pgv")
+    expect(page.locator("#about")).to_contain_text("Model logistic-pgv of models.db.")
     opened.settled()
-    answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.6, model="lognormal-pgv")
+    answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.6, model="logistic-pgv")
     assert agrees(probability_shown(page), answer["probability"])
     offered = page.eval_on_selector_all("#model option", "all => all.map((each) => each.value)")
     assert "record-xp" not in offered
