@@ -101,7 +101,7 @@ def _eta(b, v, ns):
 METHOD = Method(
     name="pads",
     block=BlockParameters(
-        ("p2", "kr", "pad_m"), "padded", "kr", "p2", method.NOT_LIFTED, stored=("pad_m",)
+        ("p2", "kr", "pad_m"), "padded", "kr", "p2", method.NOT_LIFTED, stored={"pad_m": ()}
     ),
     link=method.LOGIT,
     forms={"pgv": Form(("b0", "b_ln_x_over_y", "b_pad"), _eta, 0)},

@@ -196,7 +196,8 @@ class BlockParameters:
             several.
         options: names of what else a question may state.
         stored: what combinations say of their block beside its size, for `adjust`, by name: the
-            values of which fits read combinations, as those between tell them little more.
+            values of which fits read combinations, as those between tell them little more; empty
+            for all.
         fractions: those of the options that lie between 0 and 1 and whose scatter is one of
             their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.

@@ -465,7 +465,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
     of_motion |= source.of_block
     for name, values in method.block.stored.items():
-        readable &= np.isin(source.of_block[name], values)
+        if values:
+            readable &= np.isin(source.of_block[name], values)
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
