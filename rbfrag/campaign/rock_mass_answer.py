@@ -118,7 +118,7 @@ def rockmass(
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
         pgd_m: peak ground displacement [m].
-        sa03_g, sa10_g, sa20_g, sa30_g: spectral accelerations [g]; or all of them as sa_g, by
+        sa03_g, sa10_g, sa30_g: spectral accelerations [g]; or all of them as sa_g, by
             their period [s], as in :func:`rbfrag.predict`.
         arias_m_s: Arias intensity [m/s].
         magnitude: magnitude of the earthquake.

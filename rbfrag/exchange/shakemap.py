@@ -26,7 +26,6 @@ _MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "PGA": ("pga_g", _G),
     "PSA03": ("sa03_g", _G),
     "PSA10": ("sa10_g", _G),
-    "PSA20": ("sa20_g", _G),
     "PSA30": ("sa30_g", _G),
 }
 """Measures that are read of a grid: our name, and its units with their factors; a blank unit is the
@@ -42,7 +41,7 @@ _FIELDS: Mapping[str, tuple[str, Mapping[str, float]]] = {
     },
 }
 
-_MOST = {"pgv_m_s": 20.0, **dict.fromkeys(("pga_g", "sa03_g", "sa10_g", "sa20_g", "sa30_g"), 10.0)}
+_MOST = {"pgv_m_s": 20.0, **dict.fromkeys(("pga_g", "sa03_g", "sa10_g", "sa30_g"), 10.0)}
 _MOST_STD = 5.0
 
 

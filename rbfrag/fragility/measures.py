@@ -93,7 +93,7 @@ def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
     return pgd_m * (2.0 * math.pi) / tm_s
 
 
-SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 2.0: "sa20_g", 3.0: "sa30_g"}
+SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 3.0: "sa30_g"}
 """Spectral accelerations (5 % damping, one component) that questions may state, by period [s]."""
 
 TERMS: Mapping[str, Term] = {
@@ -273,9 +273,7 @@ CREDIBLE = {
     **dict.fromkeys(
         ("sa03_g", "sa10_g"), (0.0, 10.0, "larger than ever recorded (it is in g): is it in g?")
     ),
-    **dict.fromkeys(
-        ("sa20_g", "sa30_g"), (0.0, 5.0, "larger than ever recorded (it is in g): is it in g?")
-    ),
+    "sa30_g": (0.0, 5.0, "larger than ever recorded (it is in g): is it in g?"),
     "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
     "pgv_over_pga_s": (
         0.005,

@@ -290,7 +290,6 @@ class ShakingFields(TypedDict, Generic[V], total=False):
     ]
     sa03_g: Annotated[V, _spectral("0.3")]
     sa10_g: Annotated[V, _spectral("1.0")]
-    sa20_g: Annotated[V, _spectral("2.0")]
     sa30_g: Annotated[V, _spectral("3.0")]
     arias_m_s: Annotated[
         V,

@@ -182,10 +182,10 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
     ("options", "words"),
     [
         (
-            ("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"),
-            "--sa20 is given: a prediction needs --pgv, or --sa10",
+            ("--p2", "3", "--kr", "0.1", "--imt", "SA(3)"),
+            "--sa30 is given: a prediction needs --pgv, or --sa10",
         ),
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "PGV, PGA, SA(0.3), SA(1), SA(2)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "PGV, PGA, SA(0.3), SA(1), SA(3)"),
         (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
         (

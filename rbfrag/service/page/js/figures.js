@@ -25,12 +25,12 @@ import { writeText } from "./subscripts.js";
 
 const NAMES = {
   ...{ pgv: "PGV", pga: "PGA", tm: "T_m", pgd: "PGD", sa03_g: "SA(0.3 s)" },
-  ...{ sa10_g: "SA(1 s)", sa20_g: "SA(2 s)", sa30_g: "SA(3 s)" },
+  ...{ sa10_g: "SA(1 s)", sa30_g: "SA(3 s)" },
   ...{ arias: "Arias intensity", magnitude: "M" },
 };
 const UNITS = {
   ...{ pgv: "m/s", pga: "g", tm: "s", pgd: "m" },
-  ...{ sa03_g: "g", sa10_g: "g", sa20_g: "g", sa30_g: "g" },
+  ...{ sa03_g: "g", sa10_g: "g", sa30_g: "g" },
   ...{ arias: "m/s", magnitude: "" },
 };
 

@@ -3,7 +3,7 @@
 import { fromField, ratios } from "./numbers.js";
 
 /**
- * @typedef {"pgv" | "pga" | "pgd" | "sa03_g" | "sa10_g" | "sa20_g" | "sa30_g"} Across the measure that runs across
+ * @typedef {"pgv" | "pga" | "pgd" | "sa03_g" | "sa10_g" | "sa30_g"} Across the measure that runs across
  * @typedef {{across: Across, x: [number, number], y: [number, number], perKr: number, p2: number,
  *   toIntensity: number, xEdges: number[], yEdges: number[]}} Plane
  *   x and y are the ranges shown, y being the toppling velocity [m/s]; perKr is y over k_r at this
@@ -13,7 +13,7 @@ import { fromField, ratios } from "./numbers.js";
 const SA = [0.03, 3];
 const PLAIN = {
   ...{ pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] },
-  ...{ sa03_g: SA, sa10_g: SA, sa20_g: SA, sa30_g: SA },
+  ...{ sa03_g: SA, sa10_g: SA, sa30_g: SA },
 };
 const PLAIN_Y = [0.02, 3];
 const MARGIN = 1.35;
@@ -31,7 +31,6 @@ const LABELS = {
   pgd: ["peak ground displacement PGD", "m"],
   sa03_g: ["spectral acceleration SA(0.3 s)", "g"],
   sa10_g: ["spectral acceleration SA(1 s)", "g"],
-  sa20_g: ["spectral acceleration SA(2 s)", "g"],
   sa30_g: ["spectral acceleration SA(3 s)", "g"],
 };
 

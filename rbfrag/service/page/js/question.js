@@ -24,7 +24,7 @@ const OWN_FIELDS = /** @type {[Shape, string[]][]} */ ([
 ]);
 
 /** Of the shaking, what stands in the part of the form that is closed at first. */
-export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa20_g", "sa30_g", "arias", "magnitude"];
+export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa30_g", "arias", "magnitude"];
 
 export const MEASURES = ["pgv", "pga", ...FURTHER];
 
@@ -54,7 +54,6 @@ export const DEFAULTS = {
   pgd: "",
   sa03_g: "",
   sa10_g: "",
-  sa20_g: "",
   sa30_g: "",
   arias: "",
   magnitude: "",
