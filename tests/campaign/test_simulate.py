@@ -20,10 +20,10 @@ from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
-from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table, database_info, outcome_grid
 from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.db.spectra import spectrum_values
+from rbfrag.db.stored_combination import intervals_of
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
@@ -68,8 +68,15 @@ def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
     k = np.geomspace(0.012, 1.1, 40)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         table = combination_table(connection)
-        told = outcome_maps(connection, table.combination_id).outcomes(k)
+        maps = intervals_of(connection, table.combination_id.tolist())
         motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
+    told = np.full((table.p2.size, k.size), np.nan)
+    for row, owner in zip(told, table.combination_id.tolist(), strict=True):
+        assert maps[owner]
+        for low, high, outcome, *_ in maps[owner]:
+            if outcome != "undecided":
+                row[(k >= low) & (k <= high)] = outcome == "topples"
+        row[k > max(high for _, high, *_ in maps[owner])] = 0.0
     decided = np.isfinite(told)
     assert decided.mean() > 0.99
     topples = np.where(decided, told, 0.0).astype(bool)
