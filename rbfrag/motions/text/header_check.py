@@ -1,0 +1,218 @@
+"""Header against samples: what a file says twice must agree, whatever its format.
+
+Mistakes of interval, unit and scale are factors of 2 and more. Honest headers are off by a few
+percent, where a record was cut or filtered again after its header was written.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.text.file import shown
+from rbfrag.motions.text.record_file import (
+    SAME_DT,
+    HeaderField,
+    ParsedTrace,
+    RecordFile,
+    number_or_none,
+)
+from rbfrag.motions.text.times import last_digit
+from rbfrag.motions.units import stated_in_g, unit_in_g
+
+DURATION_REFUSED, DURATION_NOTED = 0.05, 0.01
+"""How far durations may differ, as part of the longer one, beyond their last printed digit."""
+
+PEAK_REFUSED, PEAK_NOTED = 1.8, 1.05
+"""Factor between peaks."""
+
+UNKNOWN = (0.0, -999.0)
+"""What programs write that do not know a peak."""
+
+DOUBT = "header and samples: "
+"""How a remark begins that says where the two disagree."""
+
+Traces = Sequence[ParsedTrace]
+
+
+def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[ParsedTrace]:
+    """Return traces in g with the interval that holds, or refuse what contradicts itself.
+
+    What the caller states is believed where the header says it too, and where the header
+    contradicts itself and the rest of it agrees with the caller.
+
+    Args:
+        components: how many a file of the format always holds; None where the number differs.
+    """
+    few: tuple[str, ...] = ()
+    if components is not None and len(traces) < components:
+        few = (f"{DOUBT}the file holds {len(traces)} of the {components} components",)
+    return [_agreed(file, trace, traces, few) for trace in traces]
+
+
+def _agreed(
+    file: RecordFile, trace: ParsedTrace, traces: Traces, few: tuple[str, ...]
+) -> ParsedTrace:
+    dt, said = _believed(file, trace, traces)
+    missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
+    if trace.times:
+        file.refuse_other_times(trace.times, dt, trace.values.size)
+    said += () if said else _on_dt(file, trace, traces)
+    is_partial = trace.is_partial or bool(missing)
+    # where samples are missing, the largest may be among them
+    in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
+    further = (missing, trace.remark_if_partial if is_partial else "")
+    return replace(
+        trace,
+        dt_s=dt,
+        unit=unit,
+        scale=trace.scale * in_g,
+        is_partial=is_partial,
+        remarks=(*trace.remarks, *few, *said, *on_unit, *filter(None, further)),
+    )
+
+
+class _Statement(NamedTuple):
+    """How far, as a part, an interval is off a statement on time; a sentence, and its line."""
+
+    off: float
+    text: str
+    line: int | None = None
+
+
+def _believed(
+    file: RecordFile, trace: ParsedTrace, traces: Traces
+) -> tuple[float, tuple[str, ...]]:
+    """Return the header's interval [s], or the caller's with a remark, or refuse the caller's."""
+    dt, given = trace.dt_s, file.dt_s
+    if given is None or math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
+        return dt, ()
+    if all(_agreeing(file, trace, traces, dt)) or not any(_agreeing(file, trace, traces, given)):
+        raise file.error(
+            f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out", fields=("dt_s",)
+        )
+    return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
+
+
+def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
+    """Whether each statement on time agrees with an interval [s], printed times among them."""
+    agreeing = [each.off <= DURATION_REFUSED for each in _statements(trace, traces, dt)]
+    seconds = trace.count.seconds if trace.count else None
+    if trace.times is None and seconds is None:
+        return agreeing
+    try:
+        if trace.times:
+            file.refuse_other_times(trace.times, dt, trace.values.size)
+        if trace.count:
+            replace(file, allow_partial=False).missing_samples(
+                trace.count.at(dt), trace.values.size
+            )
+    except MotionFileError:
+        return [*agreeing, False]
+    return [*agreeing, True]
+
+
+def _on_dt(file: RecordFile, trace: ParsedTrace, traces: Traces) -> tuple[str, ...]:
+    """Return remarks where statements on time differ a little, or refuse the file."""
+    stated = _statements(trace, traces, trace.dt_s)
+    wrong = next((each for each in stated if each.off > DURATION_REFUSED), None)
+    if wrong and file.dt_s is None:
+        advice = "state the right interval with dt_s, or correct the header"
+        raise file.error(f"{wrong.text}: {advice}", wrong.line, fields=("dt_s",))
+    return tuple(f"{DOUBT}{each.text}" for each in stated if each.off > DURATION_NOTED)
+
+
+def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[_Statement]:
+    """What the header says of time: durations, and the intervals of the other components."""
+    found = []
+    counts = {trace.count.number if trace.count else trace.values.size, trace.values.size}
+    for field in trace.durations:
+        seconds = number_or_none(field.text)
+        if seconds is None and field.text:
+            text = f"the header's duration {shown(field.text)} is no number"
+            found.append(_Statement(DURATION_REFUSED, text, field.line))
+        if seconds is None:
+            continue
+        # some count the samples and some the intervals between them; all print few digits
+        lasting = min(
+            ((npts - one) * dt for npts in counts for one in (0, 1)),
+            key=lambda lasting: abs(lasting - seconds),
+        )
+        apart = max(0.0, abs(lasting - seconds) - last_digit(field.text))
+        text = (
+            f"{max(counts):.12g} samples at dt = {dt:g} s last {max(counts) * dt:g} s, but the "
+            f"header says {field.text} s"
+        )
+        off = apart / max(lasting, seconds) if apart else 0.0
+        found.append(_Statement(off, text, field.line))
+    # printed times prove each component's own
+    if not any(each.times for each in traces):
+        names = (trace.recording, trace.station, trace.event)
+        for each in traces:
+            if (each.recording, each.station, each.event) == names and each is not trace:
+                text = (
+                    f"the component {trace.component} has dt = {dt:g} s, but {each.component} "
+                    f"{each.dt_s:g} s"
+                )
+                found.append(_Statement(abs(dt - each.dt_s) / max(dt, each.dt_s), text))
+    return found
+
+
+def _unit(
+    file: RecordFile, trace: ParsedTrace
+) -> tuple[float, HeaderField | None, tuple[str, ...]]:
+    """Return how many g the unit is that holds, the unit, and remarks on the peak."""
+    if trace.unit is None:
+        file.require_units()
+    field = trace.unit or HeaderField(file.units or "", 1)
+    try:
+        in_g = stated_in_g(field.text)
+    except InputError as error:
+        raise file.error(str(error), field.line) from None
+    off, text = _peak(trace, in_g, field.text)
+    if file.units is not None and unit_in_g(file.units) != in_g:
+        other = unit_in_g(file.units)
+        if off < PEAK_REFUSED or _peak(trace, other, file.units)[0] >= PEAK_REFUSED:
+            trouble = f"the header says {field.text}, not {file.units}: leave units out"
+            raise file.error(trouble, field.line, fields=("units",))
+        said = f"{DOUBT}the header says {field.text}; {file.units} is what was stated"
+        return other, field._replace(text=file.units), (said,)
+    if off >= PEAK_REFUSED and file.units is None and trace.peak:
+        advice = "state the right unit of the samples with units, or correct the header"
+        raise file.error(f"{text}: {advice}", trace.peak.line, fields=("units",))
+    return in_g, trace.unit, (DOUBT + text,) if off > PEAK_NOTED else ()
+
+
+def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
+    """Return the factor between the largest sample and what the header says, and a sentence."""
+    peak, samples = trace.peak, trace.values
+    said = number_or_none(peak.text) if peak else None
+    if peak is None or said is None or said in UNKNOWN or not samples.size:
+        return 1.0, ""
+    try:
+        factor = trace.scale * in_g / stated_in_g(peak.unit)
+    except InputError:
+        return 1.0, ""
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = [float(np.abs(samples).max()) * factor]
+        if trace.is_corrected is False:
+            # before or after the instrument's offset was taken off: headers do either
+            largest.append(float(np.abs(samples - samples.mean()).max()) * factor)
+    off = min(_apart(each, abs(said), last_digit(peak.text)) for each in largest)
+    return off, (
+        f"the largest sample, read in {unit}, is {largest[0]:g} {peak.unit}, but the header says "
+        f"{peak.text} {peak.unit}"
+    )
+
+
+def _apart(one: float, other: float, digit: float) -> float:
+    """Factor between two numbers that differ by more than the last digit, else 1."""
+    low, high = sorted((one, other))
+    if not high - low > digit:
+        return 1.0
+    return high / low if low > 0.0 else math.inf
