@@ -77,6 +77,11 @@ def _agreed(
     )
 
 
+def doubts(remarks: Sequence[str]) -> list[str]:
+    """Return those remarks of a motion that say where header and samples disagree."""
+    return [remark for remark in remarks if remark.startswith(DOUBT)]
+
+
 class _Statement(NamedTuple):
     """How far, as a part, an interval is off a statement on time; a sentence, and its line."""
 
