@@ -29,7 +29,7 @@ _STATION = re.compile(r"^(.*\S)\s+Station\s.*\bAltitude\b")
 _ORIGIN = re.compile(r"^\s*Origin Time\s*:\s*(\S.*)")
 _POINTS = re.compile(r"NO\.\s*OF POINTS\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"DURATION\s*=\s*(\S+)", re.IGNORECASE)
-_UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10|\S+)", re.IGNORECASE)
+_UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10\b|\S+)", re.IGNORECASE)
 
 recognises = _BLOCK.match
 

@@ -41,11 +41,13 @@ _STATION = re.compile(r"^(station\s+no\..*)", re.IGNORECASE)
 _POINTS = re.compile(r"no\.\s*of points\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"record length\s*=\s*(\S+)\s*sec", re.IGNORECASE)
 _TRIGGER = re.compile(r"trigger time\s*:\s*(\S.*)", re.IGNORECASE)
-_UNIT = re.compile(r"units of uncor \w+ (?:are sec and|is|are)\s+(g\s*/\s*10|\S*\w)", re.IGNORECASE)
+_UNIT = re.compile(
+    r"units of uncor \w+ (?:are sec and|is|are)\s+(g\s*/\s*10\b|\S*\w)", re.IGNORECASE
+)
 _SERIES = re.compile(
     r"^\s*(\d+)\s+(?:accelerogram points|points of accel\w*\s+data)\b", re.IGNORECASE
 )
-_SERIES_UNIT = re.compile(r"(?:\bin units of\s+|\bunits:\s*)(g\s*/\s*10|\S*\w)", re.IGNORECASE)
+_SERIES_UNIT = re.compile(r"(?:\bin units of\s+|\bunits:\s*)(g\s*/\s*10\b|\S*\w)", re.IGNORECASE)
 _RATE = re.compile(r"\bat\s+(\S+)\s*pts\s*/\s*sec", re.IGNORECASE)
 _INTERVAL = re.compile(r"equally spaced at\s*(\S+)\s*sec", re.IGNORECASE)
 _PEAK = re.compile(r"\bmax\s*=\s*(\S+\s+g)\b", re.IGNORECASE)

@@ -71,11 +71,10 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 
 def _peak(stated: tuple[HeaderField, ...]) -> Peak | None:
     """The larger of two values such as ``10.287~  -11.410``."""
-    if not stated:
-        return None
-    values = stated[0].text.replace("~", " ").split()
-    largest = max(values, key=lambda text: abs(number_or_none(text) or 0.0), default="")
-    return Peak(largest, "gal", stated[0].line)
+    for text, line in stated:
+        values = text.replace("~", " ").split()
+        return Peak(max(values, key=lambda value: abs(number_or_none(value) or 0.0)), "gal", line)
+    return None
 
 
 def _components(file: RecordFile, sequence: HeaderField) -> list[str]:

@@ -68,11 +68,8 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
         # where lines are missing, a wrong count would take velocities for accelerations
         duration = field(_DURATION, "duration")
         if abs(file.positive(duration, "duration") - count.number * dt) > 2.0 * dt:
-            raise file.error(
-                f"{count.number:.12g} samples at dt = {dt:g} s do not last {duration.text} s: the "
-                "number of points is wrong, and where the accelerations end is not known",
-                duration.line,
-            )
+            trouble = "do not last the duration: where the accelerations end is not known"
+            raise file.error(f"{count.number:.12g} points at {dt:g} s {trouble}", count.line)
     elif len(data) != SERIES * rows:
         raise file.error(
             f"the header of {name} says {count.number} points, which are {SERIES} x {rows} "

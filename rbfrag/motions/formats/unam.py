@@ -20,6 +20,8 @@ _DATA = re.compile(r"DATOS DE ACELERACION")
 _RULE = re.compile(r"[-+=*]{10,}\s*")
 _UNIT = re.compile(r"[^\s(]+")
 
+PEAKS = "ACEL. MAX.(Gal)"
+
 recognises = _HEAD.search
 
 
@@ -44,12 +46,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     # a decimated file may state the interval of the instrument, not its own
     durations = fields.stated("DURACION DEL REGISTRO (s), C1-C6")
     durations = tuple(_same(file, each, "duration") for each in durations)
-    peaks = [
-        Peak(text, "gal", each.line)
-        for name in ("ACEL. MAX.(Gal), C1-C6", "ACEL. MAX.(Gal), C7-C12")
-        for each in fields.stated(name)
-        for text in _slashed(each.text)
-    ]
+    peaks = _slashed(fields.text(f"{PEAKS}, C1-C6")) + _slashed(fields.text(f"{PEAKS}, C7-C12"))
 
     layout = fields["FORMATO DATOS"]
     per_line, width = field_layout(layout.text) or (0, 0)
@@ -61,6 +58,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     table = file.fixed_table(rows, first + 1, (per_line, width), "acceleration")
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
+    line = next((each.line for each in fields.stated(PEAKS)), 1)
     for at, (component, values) in enumerate(zip(components, table.T, strict=True)):
         yield ParsedTrace(
             values,
@@ -74,7 +72,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             axis=component.split(";")[0].strip(),
             is_corrected=False,
             durations=durations,
-            peak=peaks[at] if len(peaks) == len(components) else None,
+            peak=Peak(peaks[at], "gal", line) if len(peaks) == channels else None,
         )
 
 

@@ -58,11 +58,10 @@ def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[Par
 def _agreed(
     file: RecordFile, trace: ParsedTrace, traces: Traces, few: tuple[str, ...]
 ) -> ParsedTrace:
-    dt, said = _believed(file, trace, traces)
+    dt, said = _interval(file, trace, traces)
     missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
     if trace.times:
         file.refuse_other_times(trace.times, dt, trace.values.size)
-    said += () if said else _on_dt(file, trace, traces)
     is_partial = trace.is_partial or bool(missing)
     # where samples are missing, the largest may be among them
     in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
@@ -90,18 +89,25 @@ class _Statement(NamedTuple):
     line: int | None = None
 
 
-def _believed(
+def _interval(
     file: RecordFile, trace: ParsedTrace, traces: Traces
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the header's interval [s], or the caller's with a remark, or refuse the caller's."""
+    """Return the interval [s] that holds and remarks, or refuse the header's or the caller's."""
     dt, given = trace.dt_s, file.dt_s
-    if given is None or math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
-        return dt, ()
-    if all(_agreeing(file, trace, traces, dt)) or not any(_agreeing(file, trace, traces, given)):
-        raise file.error(
-            f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out", fields=("dt_s",)
-        )
-    return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
+    if given is not None and not math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
+        if all(_agreeing(file, trace, traces, dt)) or not any(
+            _agreeing(file, trace, traces, given)
+        ):
+            raise file.error(
+                f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out", fields=("dt_s",)
+            )
+        return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
+    stated = _statements(trace, traces, dt)
+    for each in stated:
+        if each.off > DURATION_REFUSED and given is None:
+            advice = "state the right interval with dt_s, or correct the header"
+            raise file.error(f"{each.text}: {advice}", each.line, fields=("dt_s",))
+    return dt, tuple(f"{DOUBT}{each.text}" for each in stated if each.off > DURATION_NOTED)
 
 
 def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
@@ -111,25 +117,14 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
     if trace.times is None and seconds is None:
         return agreeing
     try:
+        if trace.count:
+            whole = replace(file, allow_partial=False)
+            whole.missing_samples(trace.count.at(dt), trace.values.size)
         if trace.times:
             file.refuse_other_times(trace.times, dt, trace.values.size)
-        if trace.count:
-            replace(file, allow_partial=False).missing_samples(
-                trace.count.at(dt), trace.values.size
-            )
     except MotionFileError:
         return [*agreeing, False]
     return [*agreeing, True]
-
-
-def _on_dt(file: RecordFile, trace: ParsedTrace, traces: Traces) -> tuple[str, ...]:
-    """Return remarks where statements on time differ a little, or refuse the file."""
-    stated = _statements(trace, traces, trace.dt_s)
-    wrong = next((each for each in stated if each.off > DURATION_REFUSED), None)
-    if wrong and file.dt_s is None:
-        advice = "state the right interval with dt_s, or correct the header"
-        raise file.error(f"{wrong.text}: {advice}", wrong.line, fields=("dt_s",))
-    return tuple(f"{DOUBT}{each.text}" for each in stated if each.off > DURATION_NOTED)
 
 
 def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[_Statement]:
@@ -208,16 +203,15 @@ def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
         if trace.is_corrected is False:
             # before or after the instrument's offset was taken off: headers do either
             largest.append(float(np.abs(samples - samples.mean()).max()) * factor)
-    off = min(_apart(each, abs(said), last_digit(peak.text)) for each in largest)
-    return off, (
+    text = (
         f"the largest sample, read in {unit}, is {largest[0]:g} {peak.unit}, but the header says "
         f"{peak.text} {peak.unit}"
     )
-
-
-def _apart(one: float, other: float, digit: float) -> float:
-    """Factor between two numbers that differ by more than the last digit, else 1."""
-    low, high = sorted((one, other))
-    if not high - low > digit:
-        return 1.0
-    return high / low if low > 0.0 else math.inf
+    off = math.inf
+    for each in largest:
+        low, high = sorted((each, abs(said)))
+        # what the header's last digit cannot show is no difference
+        if not high - low > last_digit(peak.text):
+            return 1.0, text
+        off = min(off, high / low if low > 0.0 else math.inf)
+    return off, text

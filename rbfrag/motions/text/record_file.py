@@ -426,10 +426,9 @@ def peak_of(stated: tuple[HeaderField, ...], unit: str | None = None) -> Peak | 
 def number_or_none(text: str) -> float | None:
     """Return the finite number that a field of the header states, None where it states none."""
     try:
-        value = finite_number(Path(), text, 1, "")
+        return finite_number(Path(), text, 1, "")
     except MotionFileError:
         return None
-    return value
 
 
 def positive_number(path: Path, field: HeaderField, what: str) -> float:
