@@ -212,6 +212,15 @@ def test_a_stated_unit_overrides(tmp_path: Path, name: str, unit: str | None) ->
         read(tmp_path, text, units="mm/s2")
 
 
+def test_what_is_stated_as_the_header_has_it_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "record.asc"
+    text = changed(made("ESM ASC"), r"PGA_CM/S\^2: (\S+)", "x3")
+    file.write_text(changed(text, r"\nDURATION_S: (\S+)", "x2"))
+    report = add_motions(file, db=tmp_path / "one.db", units="cm/s2", dt_s=0.02)
+    assert len(report.added) == 1
+    assert [word in " ".join(report.warnings) for word in ("largest", "last 8 s")] == [True, True]
+
+
 def test_an_interval_of_one_component(tmp_path: Path) -> None:
     # neither duration nor times say it, only the other components
     text = made("GeoNet V2A").replace("Duration", "Lasting")

@@ -20,8 +20,6 @@ COMPONENTS = 3
 LAYOUT = (10, 13)
 """Fields a line and characters a field."""
 
-REAL_WIDTH = 13
-
 _BLOCK = re.compile(r"\s*\*\s*VOL1DS FILE", re.IGNORECASE)
 _RECORD = re.compile(r"VOL1DS FILE:\s*(\S+)", re.IGNORECASE)
 _COMPONENT = re.compile(r"^\s*COMP\s+(\S+)")
@@ -48,8 +46,8 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     dt = file.dt_of_duration(duration, count.number)
     first, rows = file.volume_1_data(span, unit.line)
     values = file.fixed_width(rows, first + 1, LAYOUT, "acceleration")
-    # the third of the real numbers is the duration again, zero where nobody filled it in
-    again = HeaderField(file.lines[first - 7][2 * REAL_WIDTH : 3 * REAL_WIDTH].strip(), first - 6)
+    # the third of the real numbers, 13 wide, is the duration again, or zero
+    again = HeaderField(file.lines[first - 7][26:39].strip(), first - 6)
     component = file.find(span, _COMPONENT, "line 'COMP'").text
     # L1, V2, T3: the letter is the axis, the number counts the channels
     axis = component.rstrip("0123456789")

@@ -108,7 +108,7 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
         start=file.label(span, _TRIGGER),
         is_corrected=False,
         durations=(duration,),
-        peak=peak_of(file.stated(span, _PEAK)),
+        peak=peak_of(file.optional(span, _PEAK)),
     )
 
 

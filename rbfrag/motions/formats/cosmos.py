@@ -86,8 +86,8 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
         labels={"orientation_deg": azimuth, "is_vertical": vertical},
-        durations=file.stated(here, _SECONDS),
-        peak=peak_of(file.stated(header, _PEAK)),
+        durations=(file.optional(here, _SECONDS),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )
 
 

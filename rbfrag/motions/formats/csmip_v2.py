@@ -86,8 +86,8 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
         start=file.label(header, _START),
         is_corrected=True,
         remarks=remarks,
-        durations=file.stated(header, _DURATION),
-        peak=peak_of(file.stated(header, _PEAK)),
+        durations=(file.optional(header, _DURATION),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )
 
 

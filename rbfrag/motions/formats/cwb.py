@@ -65,16 +65,16 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             station=fields["StationCode"].text,
             event=fields.text("Origin Time"),
             is_corrected=False,
-            peak=_peak(fields.stated(f"AmplitudeMAX. {component}")),
+            peak=_peak(fields.optional(f"AmplitudeMAX. {component}")),
         )
 
 
-def _peak(stated: tuple[HeaderField, ...]) -> Peak | None:
+def _peak(field: HeaderField | None) -> Peak | None:
     """The larger of two values such as ``10.287~  -11.410``."""
-    for text, line in stated:
-        values = text.replace("~", " ").split()
-        return Peak(max(values, key=lambda value: abs(number_or_none(value) or 0.0)), "gal", line)
-    return None
+    if field is None:
+        return None
+    values = ["", *field.text.replace("~", " ").split()]
+    return Peak(max(values, key=lambda text: abs(number_or_none(text) or 0.0)), "gal", field.line)
 
 
 def _components(file: RecordFile, sequence: HeaderField) -> list[str]:

@@ -39,6 +39,6 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         event=fields.text("EVENT_NAME") or fields.text("EVENT_ID"),
         start=fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD"),
         is_corrected="NOT" not in baseline if "REMOVED" in baseline else None,
-        durations=fields.stated("DURATION_S"),
-        peak=peak_of(fields.stated("PGA_CM/S^2"), "cm/s2"),
+        durations=(fields.optional("DURATION_S"),),
+        peak=peak_of(fields.optional("PGA_CM/S^2"), "cm/s2"),
     )

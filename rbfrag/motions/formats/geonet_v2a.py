@@ -92,6 +92,6 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
         is_corrected=True,
         is_partial=is_cut,
         remark_if_partial=f"the file ends before {name} does",
-        durations=file.stated(header, _DURATION),
-        peak=peak_of(file.stated(header, _PEAK)),
+        durations=(file.optional(header, _DURATION),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )

@@ -22,8 +22,6 @@ NAME_CHARACTERS = 18
 
 LAST_FIELD = "Memo."
 
-MAXIMUM = "Max. Acc. (gal)"
-
 LARGEST_COUNT = 2.0**31
 
 LARGEST_SCALE = 1e3
@@ -86,7 +84,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         start=recorded,
         is_corrected=False,
         remarks=tuple(remarks),
-        peak=peak_of((fields[MAXIMUM],) if MAXIMUM in fields else (), "gal"),
+        peak=peak_of(fields.get("Max. Acc. (gal)"), "gal"),
     )
 
 

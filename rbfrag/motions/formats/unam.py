@@ -20,8 +20,6 @@ _DATA = re.compile(r"DATOS DE ACELERACION")
 _RULE = re.compile(r"[-+=*]{10,}\s*")
 _UNIT = re.compile(r"[^\s(]+")
 
-PEAKS = "ACEL. MAX.(Gal)"
-
 recognises = _HEAD.search
 
 
@@ -44,9 +42,10 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     stated = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
     count = file.count(stated, "number of samples")
     # a decimated file may state the interval of the instrument, not its own
-    durations = fields.stated("DURACION DEL REGISTRO (s), C1-C6")
-    durations = tuple(_same(file, each, "duration") for each in durations)
-    peaks = _slashed(fields.text(f"{PEAKS}, C1-C6")) + _slashed(fields.text(f"{PEAKS}, C7-C12"))
+    duration = fields.optional("DURACION DEL REGISTRO (s), C1-C6")
+    duration = _same(file, duration, "duration") if duration and duration.text else None
+    largest = fields.optional("ACEL. MAX.(Gal), C1-C6") or unit
+    peaks = _slashed(largest.text) + _slashed(fields.text("ACEL. MAX.(Gal), C7-C12"))
 
     layout = fields["FORMATO DATOS"]
     per_line, width = field_layout(layout.text) or (0, 0)
@@ -58,7 +57,6 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     table = file.fixed_table(rows, first + 1, (per_line, width), "acceleration")
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
-    line = next((each.line for each in fields.stated(PEAKS)), 1)
     for at, (component, values) in enumerate(zip(components, table.T, strict=True)):
         yield ParsedTrace(
             values,
@@ -71,8 +69,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             # rumbo;orientacion: the azimuth, then the axis of the instrument
             axis=component.split(";")[0].strip(),
             is_corrected=False,
-            durations=durations,
-            peak=Peak(peaks[at], "gal", line) if len(peaks) == channels else None,
+            durations=(duration,),
+            peak=Peak(peaks[at], "gal", largest.line) if len(peaks) == channels else None,
         )
 
 

@@ -77,7 +77,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         station=" ".join(file.label(header, _STATION).split()),
         event=" ".join(file.label(header, _EVENT).split()),
         is_corrected="UNCORRECTED" not in lines[0] if "CORRECTED" in lines[0] else None,
-        peak=peak_of(file.stated(header, _PEAK), UNIT),
+        peak=peak_of(file.optional(header, _PEAK), UNIT),
     )
 
 

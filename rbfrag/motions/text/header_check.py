@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,13 +31,13 @@ DURATION_REFUSED, DURATION_NOTED = 0.05, 0.01
 PEAK_REFUSED, PEAK_NOTED = 1.8, 1.05
 """Factor between peaks."""
 
-UNKNOWN = (0.0, -999.0)
-"""What programs write that do not know a peak."""
-
 DOUBT = "header and samples: "
 """How a remark begins that says where the two disagree."""
 
 Traces = Sequence[ParsedTrace]
+
+Statement: TypeAlias = tuple[float, str, int | None]
+"""How far, as a part, an interval is off what is said of time; a sentence, and its line."""
 
 
 def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[ParsedTrace]:
@@ -49,15 +49,13 @@ def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[Par
     Args:
         components: how many a file of the format always holds; None where the number differs.
     """
-    few: tuple[str, ...] = ()
+    few = ""
     if components is not None and len(traces) < components:
-        few = (f"{DOUBT}the file holds {len(traces)} of the {components} components",)
+        few = f"{DOUBT}the file holds {len(traces)} of the {components} components"
     return [_agreed(file, trace, traces, few) for trace in traces]
 
 
-def _agreed(
-    file: RecordFile, trace: ParsedTrace, traces: Traces, few: tuple[str, ...]
-) -> ParsedTrace:
+def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, few: str) -> ParsedTrace:
     dt, said = _interval(file, trace, traces)
     missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
     if trace.times:
@@ -65,14 +63,14 @@ def _agreed(
     is_partial = trace.is_partial or bool(missing)
     # where samples are missing, the largest may be among them
     in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
-    further = (missing, trace.remark_if_partial if is_partial else "")
+    further = (few, *said, *on_unit, missing, trace.remark_if_partial if is_partial else "")
     return replace(
         trace,
         dt_s=dt,
         unit=unit,
         scale=trace.scale * in_g,
         is_partial=is_partial,
-        remarks=(*trace.remarks, *few, *said, *on_unit, *filter(None, further)),
+        remarks=(*trace.remarks, *filter(None, further)),
     )
 
 
@@ -81,38 +79,28 @@ def doubts(remarks: Sequence[str]) -> list[str]:
     return [remark for remark in remarks if remark.startswith(DOUBT)]
 
 
-class _Statement(NamedTuple):
-    """How far, as a part, an interval is off a statement on time; a sentence, and its line."""
-
-    off: float
-    text: str
-    line: int | None = None
-
-
 def _interval(
     file: RecordFile, trace: ParsedTrace, traces: Traces
 ) -> tuple[float, tuple[str, ...]]:
     """Return the interval [s] that holds and remarks, or refuse the header's or the caller's."""
     dt, given = trace.dt_s, file.dt_s
     if given is not None and not math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
-        if all(_agreeing(file, trace, traces, dt)) or not any(
-            _agreeing(file, trace, traces, given)
-        ):
-            raise file.error(
-                f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out", fields=("dt_s",)
-            )
+        by_header, by_caller = (_agreeing(file, trace, traces, each) for each in (dt, given))
+        if all(by_header) or not any(by_caller):
+            trouble = f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out"
+            raise file.error(trouble, fields=("dt_s",))
         return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
     stated = _statements(trace, traces, dt)
-    for each in stated:
-        if each.off > DURATION_REFUSED and given is None:
+    for off, text, line in stated:
+        if off > DURATION_REFUSED and given is None:
             advice = "state the right interval with dt_s, or correct the header"
-            raise file.error(f"{each.text}: {advice}", each.line, fields=("dt_s",))
-    return dt, tuple(f"{DOUBT}{each.text}" for each in stated if each.off > DURATION_NOTED)
+            raise file.error(f"{text}: {advice}", line, fields=("dt_s",))
+    return dt, tuple(f"{DOUBT}{text}" for off, text, _ in stated if off > DURATION_NOTED)
 
 
 def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
     """Whether each statement on time agrees with an interval [s], printed times among them."""
-    agreeing = [each.off <= DURATION_REFUSED for each in _statements(trace, traces, dt)]
+    agreeing = [off <= DURATION_REFUSED for off, *_ in _statements(trace, traces, dt)]
     seconds = trace.count.seconds if trace.count else None
     if trace.times is None and seconds is None:
         return agreeing
@@ -127,39 +115,31 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
     return [*agreeing, True]
 
 
-def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[_Statement]:
+def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement]:
     """What the header says of time: durations, and the intervals of the other components."""
-    found = []
+    found: list[Statement] = []
     counts = {trace.count.number if trace.count else trace.values.size, trace.values.size}
+    # some count the samples and some the intervals between them
+    possible = [(npts - one) * dt for npts in counts for one in (0, 1)]
     for field in trace.durations:
-        seconds = number_or_none(field.text)
-        if seconds is None and field.text:
+        seconds = number_or_none(field.text) if field else None
+        if field and field.text and seconds is None:
             text = f"the header's duration {shown(field.text)} is no number"
-            found.append(_Statement(DURATION_REFUSED, text, field.line))
-        if seconds is None:
+            found.append((DURATION_REFUSED, text, field.line))
+        if field is None or seconds is None:
             continue
-        # some count the samples and some the intervals between them; all print few digits
-        lasting = min(
-            ((npts - one) * dt for npts in counts for one in (0, 1)),
-            key=lambda lasting: abs(lasting - seconds),
-        )
-        apart = max(0.0, abs(lasting - seconds) - last_digit(field.text))
-        text = (
-            f"{max(counts):.12g} samples at dt = {dt:g} s last {max(counts) * dt:g} s, but the "
-            f"header says {field.text} s"
-        )
-        off = apart / max(lasting, seconds) if apart else 0.0
-        found.append(_Statement(off, text, field.line))
+        apart = min(abs(lasting - seconds) for lasting in possible) - last_digit(field.text)
+        off = apart / max(*possible, seconds) if apart > 0.0 else 0.0
+        text = f"{max(counts):.12g} samples at dt = {dt:g} s last {max(possible):g} s"
+        found.append((off, f"{text}, but the header says {field.text} s", field.line))
     # printed times prove each component's own
     if not any(each.times for each in traces):
         names = (trace.recording, trace.station, trace.event)
         for each in traces:
             if (each.recording, each.station, each.event) == names and each is not trace:
-                text = (
-                    f"the component {trace.component} has dt = {dt:g} s, but {each.component} "
-                    f"{each.dt_s:g} s"
-                )
-                found.append(_Statement(abs(dt - each.dt_s) / max(dt, each.dt_s), text))
+                off = abs(dt - each.dt_s) / max(dt, each.dt_s)
+                text = f"the component {trace.component} has dt = {dt:g} s"
+                found.append((off, f"{text}, but {each.component} {each.dt_s:g} s", None))
     return found
 
 
@@ -192,7 +172,8 @@ def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
     """Return the factor between the largest sample and what the header says, and a sentence."""
     peak, samples = trace.peak, trace.values
     said = number_or_none(peak.text) if peak else None
-    if peak is None or said is None or said in UNKNOWN or not samples.size:
+    # zero and -999 are what programs write that do not know it
+    if peak is None or said in {None, 0.0, -999.0} or not samples.size:
         return 1.0, ""
     try:
         factor = trace.scale * in_g / stated_in_g(peak.unit)

@@ -102,7 +102,7 @@ class ParsedTrace:
         is_partial: True where more is missing than `count` tells.
         remark_if_partial: what a user should see besides where samples are missing.
         labels: labels of a motion that the file holds as such, before all that is derived.
-        durations: what the header says the samples last [s]; empty texts say nothing.
+        durations: what the header says the samples last [s], where it does.
         peak: what it says of the largest sample of these, not of the record before correction.
     """
 
@@ -123,7 +123,7 @@ class ParsedTrace:
     is_partial: bool = False
     remark_if_partial: str = ""
     labels: Mapping[str, object] = field(default_factory=dict)
-    durations: tuple[HeaderField, ...] = ()
+    durations: tuple[HeaderField | None, ...] = ()
     peak: Peak | None = None
 
 
@@ -164,11 +164,6 @@ class RecordFile:
             if match := pattern.search(self.lines[at][:LONGEST_LINE]):
                 return HeaderField(match[1].strip(), at + 1)
         return None
-
-    def stated(self, span: range, pattern: re.Pattern[str]) -> tuple[HeaderField, ...]:
-        """Return the first match's group 1 among the lines of a span; none where there is none."""
-        field = self.optional(span, pattern)
-        return (field,) if field else ()
 
     def label(self, span: range, pattern: re.Pattern[str]) -> str:
         """Return the first match's group 1 among the lines of a span; empty where there is none."""
@@ -415,12 +410,12 @@ class RecordFile:
             )
 
 
-def peak_of(stated: tuple[HeaderField, ...], unit: str | None = None) -> Peak | None:
+def peak_of(field: HeaderField | None, unit: str | None = None) -> Peak | None:
     """Return the peak acceleration of a field, in a unit that is its second word where none is."""
-    if not stated:
+    if field is None:
         return None
-    text, _, word = stated[0].text.partition(" ")
-    return Peak(text, unit or word.strip(), stated[0].line)
+    text, _, word = field.text.partition(" ")
+    return Peak(text, unit or word.strip(), field.line)
 
 
 def number_or_none(text: str) -> float | None:
@@ -452,24 +447,20 @@ class NamedFields:
 
     def __getitem__(self, name: str) -> HeaderField:
         """Return the field of this name, or else the first whose name begins so."""
-        field = self._find(name)
+        field = self.optional(name)
         if field is None:
             raise self._file.error(f"the header has no {name!r}: export the record again", line=1)
         if not field.text:
             raise self._file.error(f"the header's {name!r} is empty", field.line)
         return field
 
-    def stated(self, name: str) -> tuple[HeaderField, ...]:
-        """Return the field of a name; none where the header has none, or an empty one."""
-        field = self._find(name)
-        return (field,) if field and field.text else ()
-
     def text(self, name: str) -> str:
         """Return a field's text; empty where the header has none."""
-        field = self._find(name)
+        field = self.optional(name)
         return field.text if field else ""
 
-    def _find(self, name: str) -> HeaderField | None:
+    def optional(self, name: str) -> HeaderField | None:
+        """Return the field of this name, or else the first whose name begins so, or None."""
         if name in self._fields:
             return self._fields[name]
         return next((field for key, field in self._fields.items() if key.startswith(name)), None)
