@@ -15,7 +15,7 @@ from rbfrag.motions.text.record_file import (
     HeaderField,
     NamedFields,
     ParsedTrace,
-    Peak,
+    PeakField,
     PrintedTimes,
     RecordFile,
     number_or_none,
@@ -69,12 +69,14 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         )
 
 
-def _peak(field: HeaderField | None) -> Peak | None:
+def _peak(field: HeaderField | None) -> PeakField | None:
     """The larger of two values such as ``10.287~  -11.410``."""
     if field is None:
         return None
     values = ["", *field.text.replace("~", " ").split()]
-    return Peak(max(values, key=lambda text: abs(number_or_none(text) or 0.0)), "gal", field.line)
+    return PeakField(
+        max(values, key=lambda text: abs(number_or_none(text) or 0.0)), "gal", field.line
+    )
 
 
 def _components(file: RecordFile, sequence: HeaderField) -> list[str]:

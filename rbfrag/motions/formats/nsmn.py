@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, Peak, RecordFile
+from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, PeakField, RecordFile
 
 FORMAT = "AFAD NSMN text"
 
@@ -36,7 +36,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     dt = file.dt(fields["SAMPLING INTERVAL (sec)"])
     unit = file.find(header, _UNIT, "unit of the PGA values")
     count = file.count(fields["NUMBER OF DATA"], "number of data")
-    peaks = {name: Peak(text, unit.text, unit.line) for name, text in
+    peaks = {name: PeakField(text, unit.text, unit.line) for name, text in
              _PEAK.findall(file.lines[unit.line - 1])}  # fmt: skip
     rows = file.data(columns.line)
     table = file.table(rows, columns.line + 1, len(components), "acceleration")

@@ -11,7 +11,13 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import HeaderField, NamedFields, ParsedTrace, Peak, RecordFile
+from rbfrag.motions.text.record_file import (
+    HeaderField,
+    NamedFields,
+    ParsedTrace,
+    PeakField,
+    RecordFile,
+)
 
 FORMAT = "UNAM standard file"
 
@@ -70,7 +76,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             axis=component.split(";")[0].strip(),
             is_corrected=False,
             durations=(duration,),
-            peak=Peak(peaks[at], "gal", largest.line) if len(peaks) == channels else None,
+            peak=PeakField(peaks[at], "gal", largest.line) if len(peaks) == channels else None,
         )
 
 

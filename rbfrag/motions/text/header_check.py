@@ -56,14 +56,14 @@ def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[Par
 
 
 def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, few: str) -> ParsedTrace:
-    dt, said = _interval(file, trace, traces)
+    dt, on_dt = _interval(file, trace, traces)
     missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
     if trace.times:
         file.refuse_other_times(trace.times, dt, trace.values.size)
     is_partial = trace.is_partial or bool(missing)
     # where samples are missing, the largest may be among them
     in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
-    further = (few, *said, *on_unit, missing, trace.remark_if_partial if is_partial else "")
+    further = (few, *on_dt, *on_unit, missing, trace.remark_if_partial if is_partial else "")
     return replace(
         trace,
         dt_s=dt,
@@ -117,7 +117,7 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
 
 def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement]:
     """What the header says of time: durations, and the intervals of the other components."""
-    found: list[Statement] = []
+    statements: list[Statement] = []
     counts = {trace.count.number if trace.count else trace.values.size, trace.values.size}
     # some count the samples and some the intervals between them
     possible = [(npts - one) * dt for npts in counts for one in (0, 1)]
@@ -125,13 +125,13 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
         seconds = number_or_none(field.text) if field else None
         if field and field.text and seconds is None:
             text = f"the header's duration {shown(field.text)} is no number"
-            found.append((DURATION_REFUSED, text, field.line))
+            statements.append((DURATION_REFUSED, text, field.line))
         if field is None or seconds is None:
             continue
         apart = min(abs(lasting - seconds) for lasting in possible) - last_digit(field.text)
         off = apart / max(*possible, seconds) if apart > 0.0 else 0.0
         text = f"{max(counts):.12g} samples at dt = {dt:g} s last {max(possible):g} s"
-        found.append((off, f"{text}, but the header says {field.text} s", field.line))
+        statements.append((off, f"{text}, but the header says {field.text} s", field.line))
     # printed times prove each component's own
     if not any(each.times for each in traces):
         names = (trace.recording, trace.station, trace.event)
@@ -139,8 +139,8 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
             if (each.recording, each.station, each.event) == names and each is not trace:
                 off = abs(dt - each.dt_s) / max(dt, each.dt_s)
                 text = f"the component {trace.component} has dt = {dt:g} s"
-                found.append((off, f"{text}, but {each.component} {each.dt_s:g} s", None))
-    return found
+                statements.append((off, f"{text}, but {each.component} {each.dt_s:g} s", None))
+    return statements
 
 
 def _unit(
@@ -160,8 +160,8 @@ def _unit(
         if off < PEAK_REFUSED or _peak(trace, other, file.units)[0] >= PEAK_REFUSED:
             trouble = f"the header says {field.text}, not {file.units}: leave units out"
             raise file.error(trouble, field.line, fields=("units",))
-        said = f"{DOUBT}the header says {field.text}; {file.units} is what was stated"
-        return other, field._replace(text=file.units), (said,)
+        remark = f"{DOUBT}the header says {field.text}; {file.units} is what was stated"
+        return other, field._replace(text=file.units), (remark,)
     if off >= PEAK_REFUSED and file.units is None and trace.peak:
         advice = "state the right unit of the samples with units, or correct the header"
         raise file.error(f"{text}: {advice}", trace.peak.line, fields=("units",))
@@ -171,9 +171,9 @@ def _unit(
 def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
     """Return the factor between the largest sample and what the header says, and a sentence."""
     peak, samples = trace.peak, trace.values
-    said = number_or_none(peak.text) if peak else None
+    stated_peak = number_or_none(peak.text) if peak else None
     # zero and -999 are what programs write that do not know it
-    if peak is None or said in {None, 0.0, -999.0} or not samples.size:
+    if peak is None or stated_peak in {None, 0.0, -999.0} or not samples.size:
         return 1.0, ""
     try:
         factor = trace.scale * in_g / stated_in_g(peak.unit)
@@ -190,7 +190,7 @@ def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
     )
     off = math.inf
     for each in largest:
-        low, high = sorted((each, abs(said)))
+        low, high = sorted((each, abs(stated_peak)))
         # what the header's last digit cannot show is no difference
         if not high - low > last_digit(peak.text):
             return 1.0, text

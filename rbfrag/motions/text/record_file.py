@@ -67,7 +67,7 @@ class Count(NamedTuple):
         return self if self.seconds is None else self._replace(number=self.seconds / dt_s)
 
 
-class Peak(NamedTuple):
+class PeakField(NamedTuple):
     """The largest acceleration, of either sign, that a header states, its unit, and its line."""
 
     text: str
@@ -124,7 +124,7 @@ class ParsedTrace:
     remark_if_partial: str = ""
     labels: Mapping[str, object] = field(default_factory=dict)
     durations: tuple[HeaderField | None, ...] = ()
-    peak: Peak | None = None
+    peak: PeakField | None = None
 
 
 @dataclass(frozen=True)
@@ -410,12 +410,12 @@ class RecordFile:
             )
 
 
-def peak_of(field: HeaderField | None, unit: str | None = None) -> Peak | None:
+def peak_of(field: HeaderField | None, unit: str | None = None) -> PeakField | None:
     """Return the peak acceleration of a field, in a unit that is its second word where none is."""
     if field is None:
         return None
     text, _, word = field.text.partition(" ")
-    return Peak(text, unit or word.strip(), field.line)
+    return PeakField(text, unit or word.strip(), field.line)
 
 
 def number_or_none(text: str) -> float | None:
