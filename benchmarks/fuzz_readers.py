@@ -6,6 +6,8 @@ and lines dropped, doubled or swapped, numbers changed, ends cut off. A reader m
 printable sentence of less than 500 characters that names the file and a line of it, or read it;
 motions must then be fit for use: finite samples, a positive interval, measures and flags that can
 be computed.
+Beside each, one number of the header of a sound file is multiplied by a factor of 2 or more, which
+must not go unnoticed (`benchmarks/silent_changes.py`).
 Anything else is a failure and is printed with its number, from which it can be made again.
 """
 
@@ -27,6 +29,8 @@ import numpy as np
 
 from benchmarks.damage import damaged
 from benchmarks.readers import READERS, Reader
+from benchmarks.silent_changes import Silence, change, sound_files
+from benchmarks.silent_changes import table as table_of_silence
 from rbfrag.errors import MOST_CHARACTERS, InputError, RbfragError
 from rbfrag.motions.formats import rbfrag_csv
 from rbfrag.motions.ground_motion import GroundMotion
@@ -191,6 +195,23 @@ def unclear(error: RbfragError, path: Path, content: bytes) -> str:
     return ""
 
 
+def note(silence: Silence, name: str, content: bytes, path: Path, random: Random) -> None:
+    """Change a number of a sound file's header, and count what became of it."""
+    units, dt_s = NEEDS.get(name, (None, None))
+    try:
+        became, kind, line = change(name, content, path, random, units, dt_s)
+    except RbfragError:
+        return  # not every file of a set needs the same unit and interval
+    if not became:
+        return
+    silence.changed += 1
+    silence.refused += became == "refused"
+    silence.remarked += became == "remarked"
+    if became == "silent":
+        silence.silent[kind] += 1
+        silence.lines[line] += 1
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--inputs", type=int, default=100_000, help="damaged files in all")
@@ -201,6 +222,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = bases(chosen.records)
     names = list(found)
     tallies = {name: Tally() for name in names}
+    silences = {name: Silence() for name in names if name not in OTHERS}
+    sound = {name: sound_files(name, found[name]) for name in silences}
     failures = 0
     warnings.simplefilter("error")
     numbers = range(chosen.inputs) if chosen.only is None else [chosen.only]
@@ -218,7 +241,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 kept = Path(f"fuzz-{chosen.seed}-{number}")
                 kept.write_bytes(content)
                 print(f"kept as {kept}")
+            if name in silences:
+                content = random.choice(sound[name])
+                note(silences[name], name, content, Path(folder) / "record", random)
     print(table(tallies))
+    print(f"\n{table_of_silence(silences)}")
     total = sum(tally.inputs for tally in tallies.values())
     refused = sum(tally.refused for tally in tallies.values())
     print(f"\n{total} inputs: {refused} refused, {total - refused - failures} read, ", end="")

@@ -31,6 +31,7 @@ from rbfrag.motions.processing import (
     says_corrected,
 )
 from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.text.header_check import doubts
 
 AS_SUPPLIED = "as supplied"
 
@@ -56,7 +57,8 @@ class AddReport(Tabular):
         processed: ids of the new ones that were uncorrected and have been processed.
         failed: files that were left out, each with its reason.
         warnings: sentences about what was added: the same samples in two files, one trace
-            stored with two kinds of processing, a recording with several sampling intervals.
+            stored with two kinds of processing, a recording with several sampling intervals, a
+            header that disagrees with its samples.
         not_read: columns of the metadata that nothing is read from.
     """
 
@@ -141,8 +143,10 @@ def add_motions(
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
         units: unit of files that do not state it; one that states another is read by what it
-            states, with a warning, and refused where it is the only file.
-        dt_s: sampling interval [s] of text files that hold accelerations only.
+            states, with a warning, and refused where it is the only file; it overrides a unit
+            that the file's own peak contradicts.
+        dt_s: sampling interval [s] of text files that hold accelerations only; it overrides one
+            that the file's own duration contradicts.
         processing: what was done to records of which no metadata say it, ``corrected`` or
             ``uncorrected``; it may say otherwise than their format, and metadata that do need it.
         raw: store every record as its file has it; uncorrected ones are flagged.
@@ -192,6 +196,8 @@ def add_motions(
                 run.failed.append(FailedFile(str(file), _reason(error)))
             else:
                 _take_note(run, stored)
+                remarks = [each for trace in traces for each in trace.motion.remarks]
+                run.warnings += dict.fromkeys(f"{file}: {each}" for each in doubts(remarks))
             if on_file is not None:
                 on_file(number, len(files))
         if engine is not None:

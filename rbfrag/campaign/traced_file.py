@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rbfrag.errors import InputError, MotionFileError, UnitNotStatedError
+from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata
-from rbfrag.motions.recognise import read_motions, stated_in_g
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.units import acceleration_unit, stated_in_g, unit_in_g
 
 NOTHING_STATED = TraceMetadata(file="", line=0)
 
@@ -46,7 +46,8 @@ def read_traces(
     Args:
         metadata: the table, or None.
         units: unit that the caller states for files that state none, neither by themselves nor
-            by the table; :attr:`Trace.other_unit` names one that does state another.
+            by the table, or whose samples contradict it; :attr:`Trace.other_unit` names one that
+            does state another.
         dt_s: sampling interval that the caller states [s]; likewise.
         allow_partial: as for :func:`rbfrag.motions.recognise.read_motions`.
 
@@ -60,7 +61,10 @@ def read_traces(
     by_table = _known_unit(rows[0].units) if rows else None
     try:
         motions = read_motions(file, units=by_table, dt_s=dt_s, allow_partial=allow_partial)
-    except UnitNotStatedError:
+    except MotionFileError as error:
+        # stated by neither, or contradicted by the samples
+        if units is None or by_table is not None or "units" not in error.fields:
+            raise
         motions = read_motions(file, units=units, dt_s=dt_s, allow_partial=allow_partial)
     by_index = _rows_of_traces(file, rows, motions)
     for index, row in by_index.items():

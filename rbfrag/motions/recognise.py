@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -32,9 +31,10 @@ from rbfrag.motions.formats import (
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import cut_number, decoded, read_text
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.header_check import agreed
+from rbfrag.motions.text.record_file import ParsedTrace, RecordFile
 from rbfrag.motions.text.times import first_sample_time
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.units import acceleration_unit
 
 MotionLike: TypeAlias = GroundMotion | str | os.PathLike[str]
 """What an argument that is a motion may be: a motion, or ``FILE`` or ``FILE#trace_index``."""
@@ -60,13 +60,10 @@ READERS: tuple[ModuleType, ...] = (
 """One module a format, asked in this order; text without a mark of its own last.
 
 Each has `FORMAT`, its name; `recognises`, whether the first characters of a text are of it; and
-`parse`, which yields a file's traces.
+`parse`, which yields a file's traces; `COMPONENTS` is how many a file always holds.
 """
 
 HEAD_CHARACTERS = 4096
-
-TENTH_OF_G = re.compile(r"g\s*/\s*10", re.IGNORECASE)
-"""The unit of the uncorrected (volume 1) formats of the 1970s."""
 
 
 def read_motions(
@@ -81,8 +78,9 @@ def read_motions(
     Args:
         path: a file in any of the formats of :data:`READERS`.
         units: unit of acceleration, for text files that do not state it: ``g``, ``m/s2``,
-            ``cm/s2`` or ``mm/s2``. Refused where the file states another.
-        dt_s: sampling interval [s], for text files that hold accelerations only.
+            ``cm/s2`` or ``mm/s2``. Refused where the file states another, unless the file
+            contradicts itself and agrees with this.
+        dt_s: sampling interval [s], for text files that hold accelerations only; likewise.
         allow_partial: True to read a file whose header states another number of samples than
             follow, or that is cut off. Its motions have `is_partial` and a remark; a last line
             that is cut short is left out.
@@ -160,9 +158,11 @@ def _read(
     reader = _reader(file, text)
     record = RecordFile(file, text, units, dt_s, allow_partial)
     try:
+        traces = list(reader.parse(record))
+        traces = agreed(record, traces, getattr(reader, "COMPONENTS", None))
         return [
-            _motion(record, trace, file_format=reader.FORMAT, trace_index=index)
-            for index, trace in enumerate(reader.parse(record))
+            _motion(file, trace, file_format=reader.FORMAT, trace_index=index)
+            for index, trace in enumerate(traces)
         ]
     except MotionFileError:
         raise
@@ -171,13 +171,7 @@ def _read(
         raise MotionFileError(file, f"{error}; export the record again") from None
 
 
-def _motion(file: RecordFile, trace: ParsedTrace, **place: Any) -> GroundMotion:
-    factor = trace.scale * _unit_in_g(file, trace.unit)
-    missing = file.missing_samples(trace.count, trace.values.size) if trace.count else ""
-    is_partial = trace.is_partial or bool(missing)
-    if trace.times:
-        file.refuse_other_times(trace.times, trace.dt_s, trace.values.size)
-    further = (missing, trace.remark_if_partial if is_partial else "")
+def _motion(file: Path, trace: ParsedTrace, **place: Any) -> GroundMotion:
     name = trace.component if trace.axis is None else trace.axis
     recording = trace.recording
     if recording is None:
@@ -194,42 +188,15 @@ def _motion(file: RecordFile, trace: ParsedTrace, **place: Any) -> GroundMotion:
         **trace.labels,
     }
     return GroundMotion(
-        trace.values * factor,
+        trace.values * trace.scale,
         trace.dt_s,
-        source_file=file.path.name,
-        remarks=(*trace.remarks, *filter(None, further)),
-        is_partial=is_partial,
+        source_file=file.name,
+        remarks=trace.remarks,
+        is_partial=trace.is_partial,
         stated_unit=trace.unit.text if trace.unit else "",
         **labels,
         **place,
     )
-
-
-def _unit_in_g(file: RecordFile, field: HeaderField | None) -> float:
-    """How many g the header's unit is, or else the caller's; both may not differ."""
-    if field is None:
-        file.require_units()
-        field = HeaderField(file.units or "", 1)
-    try:
-        in_g = stated_in_g(field.text)
-    except InputError as error:
-        raise file.error(str(error), field.line) from None
-    if file.units is not None and unit_in_g(file.units) != in_g:
-        raise file.error(
-            f"the header says {field.text}, not {file.units}: leave units out",
-            field.line,
-            fields=("units",),
-        )
-    return in_g
-
-
-def stated_in_g(text: str) -> float:
-    """Return how many g one unit is that a header states, g/10 among them.
-
-    Raises:
-        InputError: no unit of acceleration.
-    """
-    return 0.1 if TENTH_OF_G.fullmatch(text) else unit_in_g(text)
 
 
 def _reader(file: Path, text: str) -> ModuleType:

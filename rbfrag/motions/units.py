@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from rbfrag.errors import InputError
 
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -40,6 +42,9 @@ _SPELLINGS = {
 _AS_TYPED = str.maketrans({"²": "2", "⁻": "-", **dict.fromkeys("^*·⋅ \u00a0")})
 """Powers and products in the form of the table above."""
 
+_TENTH_OF_G = re.compile(r"g\s*/\s*10", re.IGNORECASE)
+"""The unit of the uncorrected (volume 1) formats of the 1970s."""
+
 ACCELERATION_UNITS = tuple(_IN_G)
 """The unit names that options and metadata files use."""
 
@@ -70,3 +75,12 @@ def unit_in_g(unit: str) -> float:
         unit: any spelling that :func:`acceleration_unit` knows.
     """
     return _IN_G[acceleration_unit(unit)]
+
+
+def stated_in_g(text: str) -> float:
+    """Return how many g one unit is that a header states, g/10 among them.
+
+    Raises:
+        InputError: no unit of acceleration.
+    """
+    return 0.1 if _TENTH_OF_G.fullmatch(text) else unit_in_g(text)

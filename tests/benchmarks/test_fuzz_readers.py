@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from pathlib import Path
 from random import Random
 
 import pytest
 
 from benchmarks import fuzz_readers
 from benchmarks.damage import EDITS, Damage, damaged
+from benchmarks.silent_changes import change
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.text import header_check
+from tests.motions.test_header_check import MISTAKES, made
 
 
 def test_it_runs_and_repeats(capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,3 +59,21 @@ def test_a_failure_is_seen(
     monkeypatch.setattr(fuzz_readers, "read_motions", read)
     assert fuzz_readers.main(["--inputs", "3"]) == 1
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [name for name in MISTAKES if name != "CDMG V1 series"])
+def test_a_silent_change_is_seen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def became() -> Counter[str]:
+        content, path = made(name).encode(), tmp_path / "record"
+        found = (change(name, content, path, Random(seed), None, None) for seed in range(60))
+        return Counter(became for became, kind, _ in found if kind != "other")
+
+    assert became()["refused"] > 5
+    assert not became()["silent"]
+    monkeypatch.setattr(header_check, "DURATION_REFUSED", float("inf"))
+    monkeypatch.setattr(header_check, "DURATION_NOTED", float("inf"))
+    monkeypatch.setattr(header_check, "PEAK_REFUSED", float("inf"))
+    monkeypatch.setattr(header_check, "PEAK_NOTED", float("inf"))
+    assert became()["silent"] > 0

@@ -175,11 +175,11 @@ def test_other_settings_are_stored(tmp_path: Path, db: Path) -> None:
 
 
 def test_added_again_nothing_is_new(tmp_path: Path, db: Path) -> None:
-    path = volume_1(tmp_path / "a.V1", "L1", "V2")
+    path = volume_1(tmp_path / "a.V1", "L1", "V2", "T3")
     add_motions([path], db=db)
     before = rows(db)
     again = add_motions([path], db=db)
-    assert (again.added, again.known, again.warnings) == ((), (1, 2), ())
+    assert (again.added, again.known, again.warnings) == ((), (1, 2, 3), ())
     assert rows(db) == before
 
 
@@ -203,9 +203,10 @@ def test_raw_and_processed_are_two_and_said(tmp_path: Path, db: Path) -> None:
     add_motions([path], db=db, raw=True)
     report = add_motions([path], db=db)
     assert report.added == (2,)
-    (warning,) = report.warnings
+    warning, of_header = report.warnings
     assert "motion 2" in warning
     assert "other processing as motion 1" in warning
+    assert "1 of the 3 components" in of_header
 
 
 def test_two_files_of_the_same_samples(tmp_path: Path, db: Path) -> None:

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+
+def peak(tokens: Sequence[str], factor: float = 1.0, decimals: int = 3) -> str:
+    """The largest of printed numbers, of either sign, as headers state it."""
+    return f"{factor * max(map(float, tokens), key=abs):.{decimals}f}"
+
+
 AT2_SAMPLING = (
     "NPTS= {npts:6d}, DT= {dt:.5f} SEC",
     "NPTS=   {npts}, DT=   {dt:.4f} SEC,                                             ",
@@ -63,7 +69,7 @@ def _v2a_component(name: str, samples: Sequence[str], dt_s: float) -> str:
         f"Instrument corrected data at {dt_s:.3f} sec intervals",
         "Band-pass filter transition bands are .10-.25 Hz and 24.50-25.50 Hz",
         f"Component {name}  Longitudinal Accelerometer Axis",
-        "Acceleration:  peak  -9733.1 mm/s/s at  44.88 sec     rms    719.0 mm/s/s",
+        f"Acceleration:  peak  {peak(samples)} mm/s/s at  44.88 sec     rms    719.0 mm/s/s",
         "Velocity:      peak -1016.55 mm/s   at  46.58 sec     rms    96.10 mm/s",
         "Displacement:  peak  234.852 mm     at  46.36 sec     rms   38.013 mm",
     ]

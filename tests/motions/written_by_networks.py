@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
+
+from tests.motions.written import peak
 
 Channels = Sequence[tuple[str, Sequence[str]]]
 
@@ -40,8 +43,10 @@ def csmip_v2(channels: Channels, dt_s: float, *, old: bool = False) -> str:
             "SOMEWHERE EARTHQUAKE     MAY 2, 1983 16:42 PDT",
             "Hypocenter:  To be determined.               ML:  To be determined.             ",
             "Instr Period =  .0102 sec,  Damping =  .640,  Sensitivity =  .62 v/g            ",
+            f"                        Record length ={npts * dt_s:7.3f} sec.                 ",
+            "                                     Uncor Max  =   .028 g , at  32.570 sec.    ",
             f"  {npts} points of instrument- and baseline-corrected accel, veloc and displ data ",
-            "Peak acceleration =    27.114    cm/sec/sec  at   32.570   sec.                 ",
+            f"Peak acceleration = {peak(tokens)} cm/sec/sec  at   32.570   sec.           ",
             "",
             *_numeric_header(16, 5, "1"),
             *_numeric_header(8, 10, ".000"),
@@ -90,7 +95,7 @@ def cosmos(
             "Rcrd start time: 2020/05/15 11:03:14.418 UTC (Q=5) RcrdId: (see comment)",
             f"Sta Chan   ?:{direction} (Rcrdr Chan  ?) Location:",
             "Raw record length = 192.000 sec, Uncor max =     48576, at  54.570 sec.",
-            "Processed:2020-05-18 21:06:00 GMT, USGS, Max =   18.609 cm/sec2 at   54.570 sec",
+            f"Processed:2020-05-18 21:06:00 GMT, USGS, Max = {peak(tokens)} cm/sec2 at 54.570 sec",
             "Record filtered below       Hz (periods over       secs), and above      Hz",
             "Values used when parameter or data value is unknown/unspecified:   -999, -999.00",
             " 100 Integer-header values follow on  10 lines, Format= (10I8)",
@@ -125,7 +130,7 @@ def cdmg_v1(channels: Channels, dt_s: float) -> str:
             "HYPOCENTER:   0.000N    0.000E  H=   0.0KM   ML= 0.00",
             "INSTR PERIOD = 0.0391 SEC,  DAMPING =0.7000,  SENSITIVITY =1.250 VDC/G",
             f"NO. OF POINTS ={npts:7d}  RECORD LENGTH ={npts * dt_s:7.3f} SEC",
-            "UNITS OF UNCOR ACCEL ARE SEC AND G/10.     MAX  = -0.682 G, AT  30.160 SEC",
+            f"UNITS OF UNCOR ACCEL ARE SEC AND G/10.     MAX  = {peak(tokens, 0.1)} G, AT 3 SEC",
             "RMS ACCEL OF COMPLETE RECORD = 0.106 G",
             *_numeric_header(16, 5, "1"),
             *_numeric_header(8, 10, "0.000", 50),
@@ -141,8 +146,8 @@ SERIES_LINES = {
 }
 
 UNIT_LINES = {
-    "new": "Units of uncor data are sec and g.         Max  =  -.105 g, at   31.575 sec.",
-    "old": "UNITS OF UNCOR ACCEL IS G.                 MAX  =   .058 G, AT   9.425 SEC.",
+    "new": "Units of uncor data are sec and g.         Max  = {peak} g, at   31.575 sec.",
+    "old": "UNITS OF UNCOR ACCEL IS G.                 MAX  = {peak} G, AT   9.425 SEC.",
     "": "",
 }
 
@@ -167,7 +172,7 @@ def csmip_v1(
             "Hypocenter:  To be determined.               ML:  To be determined.             ",
             "Instr Period =  .0111 sec,  Damping =  .670,  Sensitivity =  .63 v/g            ",
             f"No. of Points = {npts:6d}  Record Length ={(npts - 1 + last) * dt_s:7.3f} sec",
-            UNIT_LINES[unit],
+            UNIT_LINES[unit].format(peak=peak(tokens)),
             "RMS calc for complete record =        .   Chn. metadata effective date: 11/05/02",
             *_numeric_header(16, 5, "1"),
             *_numeric_header(8, 10, "0.000", 50),
@@ -182,6 +187,8 @@ def bhrc_v1(channels: Channels, dt_s: float) -> str:
     lines: list[str] = []
     for name, tokens in channels:
         npts = len(tokens)
+        reals = [".000000E+00"] * 50
+        reals[2] = f"{npts * dt_s:.5E}"
         lines += [
             "* VOL1DS FILE:  1234/01",
             "Inst Type = SSA-2",
@@ -198,7 +205,7 @@ def bhrc_v1(channels: Channels, dt_s: float) -> str:
             "UNITS ARE SECONDS AND G/10",
             "                                                                      ",
             *_numeric_header(16, 5, "0"),
-            *(row[:70] for row in _numeric_header(8, 13, ".000000E+00", 50)),
+            *(row[:70] for row in rows(reals, 8, 13)),
             *rows(tokens, 10, 13),
             "/&",
         ]
@@ -228,12 +235,19 @@ def knet(
         "Duration Time(s)": duration or f"{len(counts) / frequency_hz:g}",
         "Dir.": direction,
         "Scale Factor": scale,
-        "Max. Acc. (gal)": "22.485",
+        "Max. Acc. (gal)": _largest_gal(counts, scale),
         "Last Correction": "2018/01/24 19:51:38",
         "Memo.": "",
     }
     header = [f"{name:<18}{value}" for name, value in fields.items()]
     return _file(header + [f"{row} " for row in rows([str(c) for c in counts], 8, 9)])
+
+
+def _largest_gal(counts: Sequence[int], scale: str) -> str:
+    """The largest acceleration after the mean was taken off."""
+    numbers = [float(part) for part in re.findall(r"[\d.]+", scale)]
+    offset = sum(counts) / len(counts)
+    return peak([repr(count - offset) for count in counts], numbers[0] / numbers[-1])
 
 
 def esm_asc(
@@ -250,8 +264,10 @@ def esm_asc(
             "VS30_M/S: None",
             f"SAMPLING_INTERVAL_S: {dt_s:g}",
             f"NDATA: {len(tokens)}",
+            f"DURATION_S: {(len(tokens) - 1) * dt_s:g}",
             f"STREAM: {stream}",
             f"UNITS: {unit}",
+            f"PGA_CM/S^2: {peak(tokens, 100.0 if unit.startswith('m') else 1.0)}",
             "HEADER_FORMAT: DYNA 1.2",
             "DATA_TYPE: Acceleration",
             "USER5: ",
@@ -274,7 +290,10 @@ def cwb(table: Sequence[Sequence[str]], frequency_hz: int, *, names: str = "UNE"
             f"#RecordLength(sec): {len(table) / frequency_hz:g}",
             f"#SampleRate(Hz): {frequency_hz}",
             "#AmplitudeUnit:  gal. DCoffset(corr)",
-            "#AmplitudeMAX. U:   10.287~  -11.410",
+            *(
+                f"#AmplitudeMAX. {name}: {peak(column)}~ 0.000"
+                for name, column in zip(names, zip(*table, strict=True), strict=True)
+            ),
             f"#DataSequence: Time {'; '.join(f'{name}(+)' for name in names)}",
             f"#Data: {1 + len(names)}F10.3 ",
             *(
@@ -313,6 +332,8 @@ def unam(table: Sequence[Sequence[str]], dt_s: float, *, names: Sequence[str]) -
             "HORA EPICENTRO (GMT)                   : 18:14:40",
             f"DURACION DEL REGISTRO (s), C1-C6       : {each(f'{npts * dt_s:.3f}')}",
             f"NUM. TOTAL DE MUESTRAS, C1-C6          : {each(npts)}",
+            "ACEL. MAX.(Gal), C1-C6                 : "
+            + "".join(f"/{peak(column, decimals=4)}" for column in zip(*table, strict=True)),
             "UNIDADES DE LOS DATOS                  : Gal (cm/s/s)",
             f"FORMATO DATOS (FORTRAN,10 campos/dato) : {count}F10.4",
             "",
@@ -336,7 +357,13 @@ def nsmn(table: Sequence[Sequence[str]], dt_s: float) -> str:
             "STATION ID              : 0921",
             f"NUMBER OF DATA          : {len(table)}",
             f"SAMPLING INTERVAL (sec) : {dt_s:g}",
-            "RAW PGA VALUES (gal)    : (N-S) 13.200332 (E-W) 12.163827 (U-D) 9.840572",
+            "RAW PGA VALUES (gal)    : "
+            + " ".join(
+                f"({name}) {peak(column, decimals=6)}"
+                for name, column in zip(
+                    ("N-S", "E-W", "U-D"), zip(*table, strict=True), strict=True
+                )
+            ),
             "Copyright EARTHQUAKE DEPARTMENT",
             "DISASTER AND EMERGENCY MANAGEMENT PRESIDENCY",
             "       N-S          E-W          U-D",
@@ -364,7 +391,7 @@ def usgs_smc(
             "     1989  10  18    0004 Somewhere, CA",
             "Moment Mag=      7.1 Ms=      7.1 Ml=      7.0",
             f"station = San Somewhere, 1295 Street, F component={component}      ",
-            "epicentral dist =     89.0       pk     =    104.4",
+            f"epicentral dist =     89.0       pk     = {peak(tokens, decimals=1)}",
             "inst type=SMA-1      data source = USGS",
             "*",
             "*",

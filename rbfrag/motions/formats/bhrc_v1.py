@@ -11,9 +11,11 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.text.record_file import ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, number_or_none
 
 FORMAT = "BHRC V1"
+
+COMPONENTS = 3
 
 LAYOUT = (10, 13)
 """Fields a line and characters a field."""
@@ -25,7 +27,7 @@ _STATION = re.compile(r"^(.*\S)\s+Station\s.*\bAltitude\b")
 _ORIGIN = re.compile(r"^\s*Origin Time\s*:\s*(\S.*)")
 _POINTS = re.compile(r"NO\.\s*OF POINTS\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"DURATION\s*=\s*(\S+)", re.IGNORECASE)
-_UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10|\S+)", re.IGNORECASE)
+_UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10\b|\S+)", re.IGNORECASE)
 
 recognises = _BLOCK.match
 
@@ -44,6 +46,8 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     dt = file.dt_of_duration(duration, count.number)
     first, rows = file.volume_1_data(span, unit.line)
     values = file.fixed_width(rows, first + 1, LAYOUT, "acceleration")
+    # the third of the real numbers, 13 wide, is the duration again, or zero
+    again = HeaderField(file.lines[first - 7][26:39].strip(), first - 6)
     component = file.find(span, _COMPONENT, "line 'COMP'").text
     # L1, V2, T3: the letter is the axis, the number counts the channels
     axis = component.rstrip("0123456789")
@@ -60,6 +64,7 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
         event=" ".join(file.label(span, _ORIGIN).split()),
         recording=file.find(span, _RECORD, "name of the record").text,
         is_corrected=False,
+        durations=(duration, again) if number_or_none(again.text) else (duration,),
         remark_if_partial=f"dt = {dt:g} s is the duration over the number of points of the header",
         labels={"orientation_deg": azimuth_deg(azimuth), "is_vertical": is_vertical_name(axis)},
     )

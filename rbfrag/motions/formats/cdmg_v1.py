@@ -21,6 +21,7 @@ from rbfrag.motions.text.record_file import (
     ParsedTrace,
     PrintedTimes,
     RecordFile,
+    peak_of,
 )
 
 FORMAT = "CDMG V1"
@@ -40,13 +41,16 @@ _STATION = re.compile(r"^(station\s+no\..*)", re.IGNORECASE)
 _POINTS = re.compile(r"no\.\s*of points\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"record length\s*=\s*(\S+)\s*sec", re.IGNORECASE)
 _TRIGGER = re.compile(r"trigger time\s*:\s*(\S.*)", re.IGNORECASE)
-_UNIT = re.compile(r"units of uncor \w+ (?:are sec and|is|are)\s+(g\s*/\s*10|\S*\w)", re.IGNORECASE)
+_UNIT = re.compile(
+    r"units of uncor \w+ (?:are sec and|is|are)\s+(g\s*/\s*10\b|\S*\w)", re.IGNORECASE
+)
 _SERIES = re.compile(
     r"^\s*(\d+)\s+(?:accelerogram points|points of accel\w*\s+data)\b", re.IGNORECASE
 )
-_SERIES_UNIT = re.compile(r"(?:\bin units of\s+|\bunits:\s*)(g\s*/\s*10|\S*\w)", re.IGNORECASE)
+_SERIES_UNIT = re.compile(r"(?:\bin units of\s+|\bunits:\s*)(g\s*/\s*10\b|\S*\w)", re.IGNORECASE)
 _RATE = re.compile(r"\bat\s+(\S+)\s*pts\s*/\s*sec", re.IGNORECASE)
 _INTERVAL = re.compile(r"equally spaced at\s*(\S+)\s*sec", re.IGNORECASE)
+_PEAK = re.compile(r"\bmax\s*=\s*(\S+\s+g)\b", re.IGNORECASE)
 _HEAD = re.compile(_BLOCK.pattern + r"(?s:.)*" + _POINTS.pattern, re.IGNORECASE)
 
 recognises = _HEAD.match
@@ -80,7 +84,7 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
     first, rows = file.volume_1_data(span, unit.line if unit else duration.line)
     times = None
     if _SERIES.match(file.lines[first]):
-        dt, unit = _series(file, first, count, duration, unit)
+        dt, unit = _series(file, first, count, unit)
         layout = field_layout(file.lines[first]) or SERIES_LAYOUT
         values = file.fixed_width(rows[1:], first + 2, layout, "acceleration")
     else:
@@ -103,15 +107,17 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
         event=file.lines[span.start + 1].strip() if len(span) > 1 else "",
         start=file.label(span, _TRIGGER),
         is_corrected=False,
+        durations=(duration,),
+        peak=peak_of(file.optional(span, _PEAK)),
     )
 
 
 def _series(
-    file: RecordFile, at: int, count: Count, duration: HeaderField, above: HeaderField | None
+    file: RecordFile, at: int, count: Count, above: HeaderField | None
 ) -> tuple[float, HeaderField]:
     """Return interval [s] and unit of accelerations alone, by the line of an index above them.
 
-    Both must agree with what the text lines say, where they say it.
+    The unit must agree with what the text lines say, where they say it.
     """
     here = range(at, at + 1)
     points = file.find(here, _SERIES, "number of points")
@@ -125,10 +131,7 @@ def _series(
     if rate is None:
         dt = file.dt(file.find(here, _INTERVAL, "sampling interval"))
     else:
-        dt = file.agreed_dt(1.0 / file.positive(rate, "number of points a second"), rate.line)
-    file.refuse_other_duration(
-        count, dt, duration, "export the record again", slack_s=dt + LAST_DIGIT_S, ratio=0.0
-    )
+        dt = file.possible_dt(1.0 / file.positive(rate, "number of points a second"), rate.line)
     unit = file.optional(here, _SERIES_UNIT) or above
     if unit is None:
         unit = file.find(here, _SERIES_UNIT, "unit of acceleration")

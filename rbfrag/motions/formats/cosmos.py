@@ -16,16 +16,12 @@ from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.text.file import field_layout, finite_number
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "COSMOS V1c/V2c"
 
 DT_MS_VALUE = 62
 """Place of the sampling interval in the real header, from 1."""
-
-DURATION_RATIO = 0.02
-DURATION_S = 2.0
-"""How far the "approx" seconds may be from npts * dt; a wrong unit of dt is far beyond."""
 
 _BLOCK = re.compile(r"[^\S\n]*[A-Za-z].*\(Format v\S* with[^\S\n]*\d+ text lines\)", re.IGNORECASE)
 _REALS = re.compile(r"^(\s*\d+\s+Real-header values follow on.*)", re.IGNORECASE)
@@ -39,6 +35,7 @@ _START = re.compile(r"^\s*Rcrd start time:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^\s*Statn No:.*\bCode:\s*(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*Sta Chan\s+[^:]*:\s*([^(]*)", re.IGNORECASE)
 _SCNL = re.compile(r"<SCNL>\s*[^.\s]+\.([^.\s]+)\.")
+_PEAK = re.compile(r"^Processed:.*\bMax\s*=\s*(\S+\s+[^\s,]+)", re.IGNORECASE)
 _RECORD = re.compile(r"^\|.*\bRcrdId:\s*(\S+)", re.IGNORECASE)
 
 recognises = _BLOCK.match
@@ -64,11 +61,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
     count = file.count(file.find(here, _POINTS, "number of points"), "number of points")
     unit = file.find(here, _UNIT, "unit of acceleration")
     header = range(span.start, series.line - 1)
-    dt = file.agreed_dt(*_interval(file, header))
-    if seconds := file.optional(here, _SECONDS):
-        file.refuse_other_duration(
-            count, dt, seconds, "correct the header", slack_s=DURATION_S, ratio=DURATION_RATIO
-        )
+    dt = file.possible_dt(*_interval(file, header))
     ends = (at for at in span if at >= series.line and _END.match(file.lines[at]))
     data = file.data(series.line, next(ends, span.stop))
     values = file.fixed_width(data, series.line + 1, _layout(file, series), "acceleration")
@@ -93,6 +86,8 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
         labels={"orientation_deg": azimuth, "is_vertical": vertical},
+        durations=(file.optional(here, _SECONDS),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )
 
 

@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "CSMIP/CDMG V2"
 
@@ -37,6 +37,8 @@ _START = re.compile(r"\b(?:start|trigger) time\s*:\s*(\S.*)", re.IGNORECASE)
 _POINTS = re.compile(r"^\s*(\S+)\s+points of accel\w*\s+data", re.IGNORECASE)
 _INTERVAL = re.compile(r"equally spaced at\s*(\S+)\s*sec", re.IGNORECASE)
 _UNIT = re.compile(r"sec[.,\s]+(?:in\s+|\(\s*units:\s*)([a-z/0-9^*]+)", re.IGNORECASE)
+_DURATION = re.compile(r"\brecord length\s*=\s*(\S+)\s*sec", re.IGNORECASE)
+_PEAK = re.compile(r"^peak acceleration\s*=\s*(\S+\s+\S+)", re.IGNORECASE)
 _SERIES_END = re.compile(r"\s*(?:/&|\S+\s+points of )", re.IGNORECASE)
 _WIDE_GAP = re.compile(r"\s{2,}")
 
@@ -84,6 +86,8 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
         start=file.label(header, _START),
         is_corrected=True,
         remarks=remarks,
+        durations=(file.optional(header, _DURATION),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )
 
 

@@ -15,11 +15,15 @@ from rbfrag.motions.text.record_file import (
     HeaderField,
     NamedFields,
     ParsedTrace,
+    PeakField,
     PrintedTimes,
     RecordFile,
+    number_or_none,
 )
 
 FORMAT = "CWB dat"
+
+COMPONENTS = 3
 
 COMMENT = "#"
 
@@ -42,26 +46,37 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 
     rate = fields["SampleRate(Hz)"]
     frequency_hz = file.positive(rate, "sample rate")
-    dt = file.agreed_dt(1.0 / frequency_hz, rate.line)
+    dt = file.possible_dt(1.0 / frequency_hz, rate.line)
     unit = fields["AmplitudeUnit"]
     word = _WORD.match(unit.text)
     components = _components(file, fields["DataSequence"])
     layout, last_digit_s = _layout(file, fields["Data"], 1 + len(components))
     table = file.fixed_table(file.data(first), first + 1, layout, "value")
     length = fields["RecordLength(sec)"]
-    stated = file.positive(length, "record length") * frequency_hz
+    seconds = file.positive(length, "record length")
     for component, values in zip(components, table.T[1:], strict=True):
         yield ParsedTrace(
             values,
             dt,
             HeaderField(word[0] if word else unit.text, unit.line),
-            Count(stated, length.line),
+            Count(seconds * frequency_hz, length.line, seconds=seconds),
             component,
             times=PrintedTimes(table[:, 0], 1.000001 * last_digit_s, first + 1),
             station=fields["StationCode"].text,
             event=fields.text("Origin Time"),
             is_corrected=False,
+            peak=_peak(fields.optional(f"AmplitudeMAX. {component}")),
         )
+
+
+def _peak(field: HeaderField | None) -> PeakField | None:
+    """The larger of two values such as ``10.287~  -11.410``."""
+    if field is None:
+        return None
+    values = ["", *field.text.replace("~", " ").split()]
+    return PeakField(
+        max(values, key=lambda text: abs(number_or_none(text) or 0.0)), "gal", field.line
+    )
 
 
 def _components(file: RecordFile, sequence: HeaderField) -> list[str]:

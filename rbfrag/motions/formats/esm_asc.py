@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "ESM ASC"
 
@@ -39,4 +39,6 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         event=fields.text("EVENT_NAME") or fields.text("EVENT_ID"),
         start=fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD"),
         is_corrected="NOT" not in baseline if "REMOVED" in baseline else None,
+        durations=(fields.optional("DURATION_S"),),
+        peak=peak_of(fields.optional("PGA_CM/S^2"), "cm/s2"),
     )

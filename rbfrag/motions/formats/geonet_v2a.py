@@ -12,9 +12,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "GeoNet V2A"
+
+COMPONENTS = 3
 
 TEXT_LINES = 16
 NUMERIC_LINES = 10
@@ -29,7 +31,8 @@ _NPTS = re.compile(r"^Number of points\s+(\S+)")
 _DURATION = re.compile(r"^Number of points\s.*\bDuration\s+(\S+)\s*sec", re.IGNORECASE)
 _DT = re.compile(r"data at\s+(\S+)\s+sec intervals")
 _COMPONENT = re.compile(r"^Component\s+(\S+)")
-_PEAK = re.compile(r"^Acceleration:\s+peak\s+\S+\s+(\S+)")
+_UNIT = re.compile(r"^Acceleration:\s+peak\s+\S+\s+(\S+)")
+_PEAK = re.compile(r"^Acceleration:\s+peak\s+(\S+\s+\S+)")
 
 _HEAD = re.compile(_BLOCK.pattern + r"(?s:.)*Number of points")
 
@@ -54,7 +57,7 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     points = field(_NPTS, "number of points")
     count = file.count(points, "number of points", name)
     dt = file.dt(field(_DT, "sampling interval"))
-    unit = field(_PEAK, "peak acceleration with its unit")
+    unit = field(_UNIT, "peak acceleration with its unit")
 
     first = span.start + TEXT_LINES + NUMERIC_LINES
     data = file.data(first, span.stop)
@@ -63,9 +66,10 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     is_cut = file.allow_partial and span.stop == len(file.lines) and len(data) < 2 * rows
     if is_cut:
         # where lines are missing, a wrong count would take velocities for accelerations
-        duration = file.find(header, _DURATION, "duration")
-        advice = "the number of points is wrong, and where the accelerations end is not known"
-        file.refuse_other_duration(count, dt, duration, advice, slack_s=2.0 * dt, ratio=0.0)
+        duration = field(_DURATION, "duration")
+        if abs(file.positive(duration, "duration") - count.number * dt) > 2.0 * dt:
+            trouble = "do not last the duration: where the accelerations end is not known"
+            raise file.error(f"{count.number:.12g} points at {dt:g} s {trouble}", count.line)
     elif len(data) != SERIES * rows:
         raise file.error(
             f"the header of {name} says {count.number} points, which are {SERIES} x {rows} "
@@ -88,4 +92,6 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
         is_corrected=True,
         is_partial=is_cut,
         remark_if_partial=f"the file ends before {name} does",
+        durations=(file.optional(header, _DURATION),),
+        peak=peak_of(file.optional(header, _PEAK)),
     )

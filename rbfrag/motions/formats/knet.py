@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rbfrag.motions.polarity import FloatArray
-from rbfrag.motions.text.record_file import Count, HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import Count, HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "K-NET/KiK-net ASCII"
 
@@ -51,11 +51,11 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     rate = field("Sampling Freq(Hz)")
     rate = HeaderField(rate.text.removesuffix("Hz").strip(), rate.line)
     frequency_hz = file.positive(rate, "sampling frequency")
-    dt = file.agreed_dt(1.0 / frequency_hz, rate.line)
+    dt = file.possible_dt(1.0 / frequency_hz, rate.line)
     scale, unit = _scale(file, field("Scale Factor"))
     counts = file.free_numbers(file.lines[first:], first + 1, "count")
     duration = field("Duration Time(s)")
-    stated = file.positive(duration, "duration") * frequency_hz
+    seconds = file.positive(duration, "duration")
     _refuse_large(file, counts, first)
     # a file without any is refused by its number of samples
     offset = float(counts.mean()) if counts.size else 0.0
@@ -74,7 +74,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         counts - offset,
         dt,
         unit,
-        Count(stated, duration.line),
+        Count(seconds * frequency_hz, duration.line, seconds=seconds),
         component,
         scale,
         station=station,
@@ -84,6 +84,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         start=recorded,
         is_corrected=False,
         remarks=tuple(remarks),
+        peak=peak_of(fields.get("Max. Acc. (gal)"), "gal"),
     )
 
 

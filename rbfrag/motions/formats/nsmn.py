@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, PeakField, RecordFile
 
 FORMAT = "AFAD NSMN text"
+
+COMPONENTS = 3
 
 HEADER_LINES = 60
 """How far down the line with the columns' names is looked for."""
@@ -17,6 +19,7 @@ _HEAD = re.compile(
 )
 _COLUMNS = re.compile(r"^\s*((?:(?:N-S|E-W|U-D)\s*)+)$")
 _UNIT = re.compile(r"PGA VALUES\s*\(([^)]*)\)", re.IGNORECASE)
+_PEAK = re.compile(r"\((N-S|E-W|U-D)\)\s*(\S+)")
 
 recognises = _HEAD.match
 
@@ -33,6 +36,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     dt = file.dt(fields["SAMPLING INTERVAL (sec)"])
     unit = file.find(header, _UNIT, "unit of the PGA values")
     count = file.count(fields["NUMBER OF DATA"], "number of data")
+    peaks = {name: PeakField(text, unit.text, unit.line) for name, text in
+             _PEAK.findall(file.lines[unit.line - 1])}  # fmt: skip
     rows = file.data(columns.line)
     table = file.table(rows, columns.line + 1, len(components), "acceleration")
     for component, values in zip(components, table.T, strict=True):
@@ -45,4 +50,5 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             station=fields["STATION ID"].text,
             event=fields.text("EARTHQUAKE DATE"),
             is_corrected=False,
+            peak=peaks.get(component),
         )

@@ -97,7 +97,7 @@ def _trace(
         raise file.error(
             f"{what} needs one dT, in the series or its event, not {str(intervals)[:60]}", line
         )
-    dt = file.agreed_dt(float(intervals[0]), line)
+    dt = file.possible_dt(float(intervals[0]), line)
     name = str(event.get("name", ""))
     dof = dof_of.get(component)
     vertical = _IS_VERTICAL.get(dof) if isinstance(dof, int) else None

@@ -11,7 +11,13 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import HeaderField, NamedFields, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import (
+    HeaderField,
+    NamedFields,
+    ParsedTrace,
+    PeakField,
+    RecordFile,
+)
 
 FORMAT = "UNAM standard file"
 
@@ -41,11 +47,11 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     dt = file.dt(_same(file, fields["INTERVALO DE MUESTREO, C1-C6"], "sampling interval"))
     stated = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
     count = file.count(stated, "number of samples")
-    if fields.text("DURACION DEL REGISTRO (s), C1-C6"):
-        # a decimated file may state the interval of the instrument, not its own
-        duration = _same(file, fields["DURACION DEL REGISTRO (s), C1-C6"], "duration")
-        advice = "check the sampling interval"
-        file.refuse_other_duration(count, dt, duration, advice, slack_s=dt, ratio=0.01)
+    # a decimated file may state the interval of the instrument, not its own
+    duration = fields.optional("DURACION DEL REGISTRO (s), C1-C6")
+    duration = _same(file, duration, "duration") if duration and duration.text else None
+    largest = fields.optional("ACEL. MAX.(Gal), C1-C6") or unit
+    peaks = _slashed(largest.text) + _slashed(fields.text("ACEL. MAX.(Gal), C7-C12"))
 
     layout = fields["FORMATO DATOS"]
     per_line, width = field_layout(layout.text) or (0, 0)
@@ -57,7 +63,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     table = file.fixed_table(rows, first + 1, (per_line, width), "acceleration")
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
-    for component, values in zip(components, table.T, strict=True):
+    for at, (component, values) in enumerate(zip(components, table.T, strict=True)):
         yield ParsedTrace(
             values,
             dt,
@@ -69,6 +75,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             # rumbo;orientacion: the azimuth, then the axis of the instrument
             axis=component.split(";")[0].strip(),
             is_corrected=False,
+            durations=(duration,),
+            peak=PeakField(peaks[at], "gal", largest.line) if len(peaks) == channels else None,
         )
 
 

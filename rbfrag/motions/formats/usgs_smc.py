@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.text.file import MOST_DIGITS, holds_integers
-from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
 FORMAT = "USGS SMC"
 
@@ -31,6 +31,7 @@ TEXT_LINES = 20
 _HEAD = re.compile(r"\s*\d\s+(?:\w+ )*(ACCELEROGRAM|VELOCITY|DISPLACEMENT|RESPONSE)\b[^\n]*\n\*")
 _STATION = re.compile(r"^\s*station\s*=\s*(.*?)\s*component\s*=", re.IGNORECASE)
 _COMPONENT = re.compile(r"component\s*=\s*(\S.*)", re.IGNORECASE)
+_PEAK = re.compile(r"\bpk\s*=\s*(\S+)")
 _EVENT = re.compile(r"^\s*(\d{4}\s+\d{1,2}\s+\d{1,2}\s+\d{4}\s.*)", re.ASCII)
 
 recognises = _HEAD.match
@@ -56,7 +57,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     stated = _value(file, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
     count = file.count(stated, "number of samples")
     rate = _value(file, top + INTEGER_LINES, RATE_VALUE, REALS, REAL_WIDTH)
-    dt = file.agreed_dt(1.0 / file.positive(rate, "samples per second"), rate.line)
+    dt = file.possible_dt(1.0 / file.positive(rate, "samples per second"), rate.line)
     above = top + INTEGER_LINES + REAL_LINES
     first = above + comments
     for at in range(above, min(first, len(lines))):
@@ -76,6 +77,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         station=" ".join(file.label(header, _STATION).split()),
         event=" ".join(file.label(header, _EVENT).split()),
         is_corrected="UNCORRECTED" not in lines[0] if "CORRECTED" in lines[0] else None,
+        peak=peak_of(file.optional(header, _PEAK), UNIT),
     )
 
 

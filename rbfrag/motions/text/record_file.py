@@ -53,13 +53,26 @@ class HeaderField(NamedTuple):
 class Count(NamedTuple):
     """The number of samples that a header states, and its line.
 
-    A product of duration and frequency may be rounded. `of` says whose samples, where a file
-    holds several traces.
+    A product of duration and frequency may be rounded; `seconds` is that duration. `of` says whose
+    samples, where a file holds several traces.
     """
 
     number: float
     line: int
     of: str = ""
+    seconds: float | None = None
+
+    def at(self, dt_s: float) -> Count:
+        """Return the count by another sampling interval [s]."""
+        return self if self.seconds is None else self._replace(number=self.seconds / dt_s)
+
+
+class PeakField(NamedTuple):
+    """The largest acceleration, of either sign, that a header states, its unit, and its line."""
+
+    text: str
+    unit: str
+    line: int
 
 
 class PrintedTimes(NamedTuple):
@@ -89,6 +102,8 @@ class ParsedTrace:
         is_partial: True where more is missing than `count` tells.
         remark_if_partial: what a user should see besides where samples are missing.
         labels: labels of a motion that the file holds as such, before all that is derived.
+        durations: what the header says the samples last [s], where it does.
+        peak: what it says of the largest sample of these, not of the record before correction.
     """
 
     values: FloatArray
@@ -108,6 +123,8 @@ class ParsedTrace:
     is_partial: bool = False
     remark_if_partial: str = ""
     labels: Mapping[str, object] = field(default_factory=dict)
+    durations: tuple[HeaderField | None, ...] = ()
+    peak: PeakField | None = None
 
 
 @dataclass(frozen=True)
@@ -210,18 +227,12 @@ class RecordFile:
 
     def dt(self, field: HeaderField, what: str = "dt") -> float:
         """Return the sampling interval [s] that a field states."""
-        return self.agreed_dt(self.positive(field, what), field.line)
+        return self.possible_dt(self.positive(field, what), field.line)
 
-    def agreed_dt(self, dt: float, line: int | None) -> float:
-        """Return the header's sampling interval [s]; refused where the caller states another."""
+    def possible_dt(self, dt: float, line: int | None) -> float:
+        """Return the header's sampling interval [s], which must be positive and finite."""
         if not 0.0 < dt < math.inf:
             raise self.error(f"the sampling interval of {dt:g} s must be positive and finite", line)
-        if self.dt_s is not None and not math.isclose(dt, self.dt_s, rel_tol=SAME_DT, abs_tol=0.0):
-            raise self.error(
-                f"the header says dt = {dt:g} s, not {self.dt_s:g}: leave dt_s out",
-                line,
-                fields=("dt_s",),
-            )
         return dt
 
     def dt_of_duration(self, duration: HeaderField, npts: float) -> float:
@@ -235,30 +246,7 @@ class RecordFile:
                 break
         else:
             dt = seconds / npts
-        return self.agreed_dt(dt, duration.line)
-
-    def refuse_other_duration(
-        self,
-        count: Count,
-        dt: float,
-        stated: HeaderField,
-        advice: str,
-        *,
-        slack_s: float,
-        ratio: float,
-    ) -> None:
-        """Refuse a file whose samples do not last as long as its header says.
-
-        The two may differ by `slack_s` and the `ratio` of what is stated: some headers round.
-        """
-        seconds = finite_number(self.path, stated.text, stated.line, "duration")
-        lasting = count.number * dt
-        if abs(seconds - lasting) > slack_s + ratio * seconds:
-            raise self.error(
-                f"{count.number:.12g} samples at dt = {dt:g} s last {lasting:g} s, but the header "
-                f"says {stated.text} s: {advice}",
-                stated.line,
-            )
+        return self.possible_dt(dt, duration.line)
 
     def missing_samples(self, count: Count, npts: int) -> str:
         """Return a remark if not as many samples follow as the header states, or refuse the file.
@@ -271,11 +259,12 @@ class RecordFile:
         says = f"{whose} says {count.number:.12g} samples, but {npts} follow:"
         if npts and self.allow_partial:
             return f"{says} the record is partial, and which samples are missing is not told"
+        interval = "" if count.seconds is None else "state the right interval with dt_s, "
         raise self.error(
-            f"{says} the file is truncated or its header is wrong; export the record again, or "
-            "read what there is with allow_partial",
+            f"{says} the file is truncated or its header is wrong; export the record again, "
+            f"{interval}or read what there is with allow_partial",
             count.line,
-            fields=("allow_partial",),
+            fields=("allow_partial", "dt_s"),
         )
 
     # samples
@@ -421,6 +410,22 @@ class RecordFile:
             )
 
 
+def peak_of(field: HeaderField | None, unit: str | None = None) -> PeakField | None:
+    """Return the peak acceleration of a field, in a unit that is its second word where none is."""
+    if field is None:
+        return None
+    text, _, word = field.text.partition(" ")
+    return PeakField(text, unit or word.strip(), field.line)
+
+
+def number_or_none(text: str) -> float | None:
+    """Return the finite number that a field of the header states, None where it states none."""
+    try:
+        return finite_number(Path(), text, 1, "")
+    except MotionFileError:
+        return None
+
+
 def positive_number(path: Path, field: HeaderField, what: str) -> float:
     """Return a field's number, which must be above zero."""
     value = finite_number(path, field.text, field.line, what)
@@ -442,7 +447,7 @@ class NamedFields:
 
     def __getitem__(self, name: str) -> HeaderField:
         """Return the field of this name, or else the first whose name begins so."""
-        field = self._find(name)
+        field = self.optional(name)
         if field is None:
             raise self._file.error(f"the header has no {name!r}: export the record again", line=1)
         if not field.text:
@@ -451,10 +456,11 @@ class NamedFields:
 
     def text(self, name: str) -> str:
         """Return a field's text; empty where the header has none."""
-        field = self._find(name)
+        field = self.optional(name)
         return field.text if field else ""
 
-    def _find(self, name: str) -> HeaderField | None:
+    def optional(self, name: str) -> HeaderField | None:
+        """Return the field of this name, or else the first whose name begins so, or None."""
         if name in self._fields:
             return self._fields[name]
         return next((field for key, field in self._fields.items() if key.startswith(name)), None)

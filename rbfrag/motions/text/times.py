@@ -198,7 +198,7 @@ class _Column:
 
 
 def _tolerance(tokens: Sequence[str], times_s: FloatArray) -> FloatArray:
-    unit = np.array([_last_digit(token) for token in tokens])
+    unit = np.array([last_digit(token) for token in tokens])
     if times_s[0] >= 0.0:
         # a later, larger time is not printed finer than an earlier one: "0.01" between 0.005
         # and 0.015 is 0.010
@@ -207,7 +207,8 @@ def _tolerance(tokens: Sequence[str], times_s: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(0.5 * unit * (1.0 + 1e-6), ROUNDING * largest))
 
 
-def _last_digit(token: str) -> float:
+def last_digit(token: str) -> float:
+    """Return the unit of the last digit of a printed number."""
     mantissa, *exponent = _EXPONENT.split(token)
     _, _, decimals = mantissa.partition(".")
     # float, as int() refuses exponents of thousands of digits
