@@ -18,6 +18,7 @@ try:
     from typer.core import TyperGroup
 
     from rbfrag.cli.parameters.stack import read_plainly
+    from rbfrag.cli.streams import end_unwritten, write_plainly
     from rbfrag.errors import InputError, RbfragError, one_paragraph
     from rbfrag.question.fields import option_of
     from rbfrag.version import __version__
@@ -150,8 +151,14 @@ def _options(
 def run() -> None:
     """Entry point of the console script."""
     os.environ.setdefault(ONE_THREAD, "1")
+    write_plainly()
     try:
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
+    except OSError as error:
+        end_unwritten(error)
     except KeyboardInterrupt:  # once more while the command ends
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         raise SystemExit(130) from None

@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from rbfrag.service.problem import problem
+from rbfrag.service.protocol import HEADERS_BYTES
 from rbfrag.service.request_records import Metrics, log_request
 from rbfrag.service.settings import ServiceSettings
 
@@ -73,6 +74,11 @@ class Guard:
 
     def _refusal(self, scope: Message) -> Any:
         given = dict(scope["headers"])
+        # those that came in one piece, which the connection has read before it could count them
+        if sum(len(name) + len(value) + 4 for name, value in scope["headers"]) > HEADERS_BYTES:
+            return problem(431, "headers", f"the headers are longer than {HEADERS_BYTES} bytes")
+        if sum(name == b"host" for name, _ in scope["headers"]) > 1:
+            return problem(400, "host", "the header Host is there twice: send one")
         if not self._is_own(scope["method"], given):
             return problem(
                 403,

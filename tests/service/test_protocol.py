@@ -84,3 +84,21 @@ def test_processes_are_counted_together(tmp_path):
         with urllib.request.urlopen(f"{running.address}/v1/metrics") as answer:
             text = answer.read().decode()
     assert 'rbfrag_requests_total{method="GET",operation="/v1/models",status="200"} 30.0' in text
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        (b"x: " + b"y" * 70_000 + b"\r\n", b"431"),
+        (b"host: other\r\n", b"400"),
+        (b"x: y\r\n", b"200"),
+    ],
+)
+def test_headers_in_one_piece(tmp_path, headers, status):
+    with running_service(tmp_path) as running:
+        port = int(running.address.rpartition(":")[2])
+        with socket.create_connection(("127.0.0.1", port), 20) as wire:
+            ask = b"GET /v1/healthz HTTP/1.1\r\nhost: 127.0.0.1\r\nconnection: close\r\n"
+            wire.sendall(ask + headers + b"\r\n")
+            answer = wire.makefile("rb").read()
+    assert answer.startswith(b"HTTP/1.1 " + status)

@@ -1,0 +1,39 @@
+"""Output on any terminal and any disk."""
+
+from __future__ import annotations
+
+import codecs
+import os
+import sys
+
+_PLAIN = {
+    "²": "2", "³": "3", "⁻": "-", "·": "*", "±": "+-", "–": "-", "−": "-", "…": "...", "≥": ">=",
+    "≤": "<=", "°": " deg", "π": "pi", "φ": "phi", "β": "beta", "θ": "theta", "σ": "sigma",
+    "Å": "A", "ø": "o", "é": "e",
+}  # fmt: skip
+"""What stands for a character that a stream cannot write; "?" for any other."""
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return "".join(_PLAIN.get(each, "?") for each in text), error.end
+
+
+def write_plainly() -> None:
+    """Let output replace what a stream cannot write, where it would end with an error."""
+    codecs.register_error("plainly", _plainly)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="plainly")
+
+
+def end_unwritten(error: OSError) -> None:
+    """End with status 1 where what was printed cannot be written, with a sentence why."""
+    if not isinstance(error, BrokenPipeError):  # nobody reads on, which is no error
+        print(f"rbfrag: the answer cannot be written: {error.strerror}", file=sys.stderr)
+    # what is left unwritten would be tried again, and complained of, when the program ends
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    raise SystemExit(1)

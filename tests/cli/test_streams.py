@@ -1,0 +1,43 @@
+"""What is printed comes out on any terminal, and a full disk ends with a sentence."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+COMMAND = (sys.executable, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "written"),
+    [
+        ("ascii", "The block has p2 = 3 1/s2 and"),
+        ("cp1252", "The block has p² = 3 1/s² and"),
+        ("utf-8", "The block has p² = 3 1/s² and"),
+    ],
+)
+def test_a_character_that_a_stream_cannot_write_is_replaced(encoding: str, written: str) -> None:
+    done = subprocess.run(
+        [*COMMAND, "0.6"], capture_output=True, check=True, env={"PYTHONIOENCODING": encoding}
+    )
+    assert written in done.stdout.decode(encoding)
+    assert done.stderr == b""
+    refused = subprocess.run(
+        [*COMMAND, "0.6", "--p2", "-1"], capture_output=True, check=False,
+        env={"PYTHONIOENCODING": encoding},
+    )  # fmt: skip
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(b"rbfrag: ")
+
+
+@pytest.mark.parametrize("more", [(), ("--json",)])
+def test_a_full_disk_ends_with_a_sentence(more: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*COMMAND, "0.6", *more], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == "rbfrag: the answer cannot be written: No space left on device\n"
