@@ -6,7 +6,7 @@ import codecs
 import os
 import sys
 
-_PLAIN = {
+_IN_ASCII = {
     "²": "2", "³": "3", "⁻": "-", "·": "*", "±": "+-", "–": "-", "−": "-", "…": "...", "≥": ">=",
     "≤": "<=", "°": " deg", "π": "pi", "φ": "phi", "β": "beta", "θ": "theta", "σ": "sigma",
     "Å": "A", "ø": "o", "é": "e",
@@ -18,7 +18,7 @@ def _plainly(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]
-    return "".join(_PLAIN.get(each, "?") for each in text), error.end
+    return "".join(_IN_ASCII.get(each, "?") for each in text), error.end
 
 
 def write_plainly() -> None:
