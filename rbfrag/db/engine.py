@@ -10,7 +10,7 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine, inspect, text
 
 from rbfrag.db.connect import database_label, raw_sqlite, unchecked_engine
-from rbfrag.db.location import VERSION_TABLE, check_revision, locate
+from rbfrag.db.location import VERSION_TABLE, check_revision, locate, sole_revision
 from rbfrag.db.sqlite_file import check_sqlite_database
 from rbfrag.errors import NotADatabaseError
 
@@ -76,13 +76,14 @@ def opened_database(
 
 
 def _check_server_database(connection: Connection, label: str) -> None:
-    revision = (
-        connection.scalar(text(f"SELECT version_num FROM {VERSION_TABLE}"))
+    revisions = (
+        connection.scalars(text(f"SELECT version_num FROM {VERSION_TABLE}")).all()
         if inspect(connection).has_table(VERSION_TABLE)
-        else None
+        else ()
     )
+    revision = sole_revision([*map(str, revisions)], label)
     if revision is None:
         raise NotADatabaseError(
             f"{label} holds no rbfrag tables yet: add motions to it, by rbfrag motions add"
         )
-    check_revision(str(revision), label)
+    check_revision(revision, label)

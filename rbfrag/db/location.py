@@ -7,6 +7,7 @@ without loading Alembic; a test proves that both agree.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -80,6 +81,20 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
 def reference_file() -> Path | None:
     """Return the shipped reference database, or None where none is shipped."""
     return REFERENCE if REFERENCE.is_file() else None
+
+
+def sole_revision(revisions: Sequence[str], where: str) -> str | None:
+    """Return the revision that a database states, None where it states none.
+
+    Raises:
+        SchemaVersionError: it states several, as after a copy of tables into tables.
+    """
+    if len(revisions) > 1:
+        raise SchemaVersionError(
+            f"{where}: the database states several schemas, {', '.join(sorted(revisions)[:4])}: it "
+            "was put together by hand or restored into another; restore it from a copy"
+        )
+    return revisions[0] if revisions else None
 
 
 def check_revision(revision: str, where: str) -> None:

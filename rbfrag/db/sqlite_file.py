@@ -10,7 +10,7 @@ import stat
 from contextvars import ContextVar
 from pathlib import Path
 
-from rbfrag.db.location import APPLICATION_ID, VERSION_TABLE, check_revision
+from rbfrag.db.location import APPLICATION_ID, VERSION_TABLE, check_revision, sole_revision
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,
@@ -142,18 +142,19 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
         (tables,) = connection.execute(
             "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (VERSION_TABLE,)
         ).fetchone()
-        row = (
-            connection.execute(f"SELECT version_num FROM {VERSION_TABLE}").fetchone()
+        rows = (
+            connection.execute(f"SELECT version_num FROM {VERSION_TABLE}").fetchall()
             if tables
-            else None
+            else ()
         )
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
-    if row is None:
+    revision = sole_revision([row[0] for row in rows], str(path))
+    if revision is None:
         raise NotADatabaseError(
             f"{path} is marked as rbfrag's but holds no schema: restore it from a copy"
         )
-    check_revision(row[0], str(path))
+    check_revision(revision, str(path))
 
 
 def explained_sqlite_error(

@@ -25,6 +25,7 @@ from rbfrag.db.location import (
     VERSION_TABLE,
     check_revision,
     locate,
+    sole_revision,
 )
 from rbfrag.db.schema import metadata
 from rbfrag.db.sqlite_file import explained_sqlite_error
@@ -96,7 +97,7 @@ def _revision_of_ours(connection: Connection) -> str | None:
     if not inspect(connection).has_table(VERSION_TABLE):
         return None
     context = MigrationContext.configure(connection, opts={"version_table": VERSION_TABLE})
-    return context.get_current_revision()
+    return sole_revision(context.get_current_heads(), database_label(connection.engine.url))
 
 
 def _require_sound_references(connection: Connection) -> None:

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import Engine, func, select
+from sqlalchemy import Engine, func, select, text
 
 import rbfrag.db.location
 import rbfrag.db.upgrade
 from rbfrag.db.connect import database_label, sqlalchemy_url
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_row
-from rbfrag.db.location import locate
+from rbfrag.db.location import VERSION_TABLE, locate
 from rbfrag.db.schema import suite
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.db.upgrade import upgrade_database
@@ -384,3 +384,17 @@ def test_settings_of_a_writing_connection(sqlite_file: Path) -> None:
             for name in ("journal_mode", "foreign_keys", "synchronous")
         }
     assert pragma == {"journal_mode": "wal", "foreign_keys": 1, "synchronous": 2}
+
+
+def test_a_database_of_two_schemas_is_refused(place: str) -> None:
+    with opened_database(place, create=True) as engine, engine.begin() as connection:
+        connection.execute(text(f"ALTER TABLE {VERSION_TABLE} RENAME TO once"))
+        connection.execute(text(f"CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32))"))
+        connection.execute(text(f"INSERT INTO {VERSION_TABLE} VALUES ('0007'), ('0008')"))
+    for use in (
+        lambda: open_database(place),
+        lambda: open_database(place, create=True),
+        lambda: upgrade_database(place),
+    ):
+        with pytest.raises(SchemaVersionError, match=r"states several schemas, 0007, 0008"):
+            use()

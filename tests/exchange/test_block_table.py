@@ -166,3 +166,13 @@ def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
     assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
     assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
     assert read_blocks(path, "rocking").whole()["kr"][0] == pytest.approx(free)
+
+
+def test_text_of_another_encoding_is_refused_with_its_row(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    texts = pa.array([b"A7", "Gr\u00fcn".encode("latin-1")]).view(pa.string())
+    pq.write_table(pa.table({"block_id": texts, "kr": [0.1, 0.2]}), tmp_path / "a.parquet")
+    with pytest.raises(InputError, match="column block_id, row 2: the text is not UTF-8"):
+        read_columns(tmp_path / "a.parquet", ("block_id", "kr"))

@@ -37,6 +37,9 @@ def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
         for group in batches():
             lines: Sequence[int] = range(first, first + group.num_rows)
             first += group.num_rows
+            for name, column in zip(names, group.columns, strict=True):
+                if _is_text(arrow, column):
+                    _refuse_other_text(arrow, column, f"{origin}: column {name}", lines[0])
             blank = blank_rows(arrow, group)
             if blank.any():
                 lines = [line for line, nothing in zip(lines, blank, strict=True) if not nothing]
@@ -60,6 +63,18 @@ def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
 
 def _is_text(arrow: Any, column: Any) -> bool:
     return bool(arrow.types.is_string(column.type) or arrow.types.is_large_string(column.type))
+
+
+def _refuse_other_text(arrow: Any, column: Any, where: str, first: int) -> None:
+    """Refuse text that is not UTF-8, which Parquet does not check."""
+    try:
+        column.validate(full=True)
+    except arrow.ArrowInvalid:
+        for row, cell in enumerate(column.cast(arrow.binary()).to_pylist(), first):
+            try:
+                (cell or b"").decode()
+            except UnicodeDecodeError:
+                raise InputError(f"{where}, row {row}: the text is not UTF-8") from None
 
 
 def blank_rows(arrow: Any, batch: Any) -> NDArray[np.bool_]:
