@@ -105,7 +105,11 @@ def say_when_compiling() -> None:
 
 
 def _say_compiling() -> None:
-    print("compiling the kernels for this machine; this happens once", file=sys.stderr, flush=True)
+    from rbfrag.solver.integrator.compiled import where_kept
+
+    often = where_kept() or "once"
+    text = f"compiling the kernels for this machine; this happens {often}"
+    print(text, file=sys.stderr, flush=True)
 
 
 def check_files(

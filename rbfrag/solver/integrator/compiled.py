@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import stat
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
-from numba import njit
+from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
@@ -28,7 +31,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     The machine code is kept beside the package, or in the user's cache folder when the
     package is installed read-only. numba writes cache files under a temporary name and
     renames them, so several workers may start at once. Where neither folder can be
-    written the kernel is compiled anew in each process.
+    written, a folder of the user's own below the temporary one is taken (:func:`last_resort`).
 
     Floating-point operations keep their written order (no fastmath): the same input gives
     the same bits.
@@ -112,11 +115,42 @@ def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
     options: dict[str, Any] = {**_OPTIONS, **extra}
     try:
         compiled = njit(cache=True, **options)(function)
-    except RuntimeError:  # numba's "cannot cache function": no folder is writable
-        compiled = njit(**options)(function)
+    except RuntimeError:  # numba's "cannot cache function": neither install nor home is writable
+        folder = last_resort()
+        if folder is not None:
+            config.CACHE_DIR = folder  # type: ignore[attr-defined]
+        compiled = njit(cache=folder is not None, **options)(function)
     _stamped_with_all_sources(compiled)
     _once_for_literals(compiled)
     return cast("Callable[P, R]", compiled)
+
+
+@cache
+def last_resort() -> str | None:
+    """Return a folder for machine code where neither install nor home is writable; None for none.
+
+    It lies in the temporary folder and is this user's alone: what lies in it is run.
+    """
+    if not hasattr(os, "getuid"):
+        return None
+    folder = Path(tempfile.gettempdir()) / f"rbfrag-kernels-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        state = folder.lstat()
+    except OSError:
+        return None
+    own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid()
+    return str(folder) if own and not state.st_mode & 0o077 else None
+
+
+def where_kept() -> str:
+    """Return in words where machine code is kept, if that is no usual place."""
+    if not last_resort.cache_info().currsize:
+        return ""
+    folder = last_resort()
+    if folder is None:
+        return "at each start: no folder can be written to keep them; name one in NUMBA_CACHE_DIR"
+    return f"once; they are kept in {folder}"
 
 
 class _CacheFile(IndexDataCacheFile):

@@ -67,6 +67,39 @@ def test_a_change_in_any_file_of_the_solver_outdates_machine_code(tmp_path: Path
     assert said() == "compiles\n"
 
 
+@pytest.mark.parametrize("safe", [True, False])
+def test_where_nothing_can_be_written_machine_code_is_kept_in_a_folder_of_the_users_own(
+    tmp_path: Path, safe: bool
+) -> None:
+    own = tmp_path / f"rbfrag-kernels-{os.getuid()}"
+    if not safe:  # others may write there, and what lies in it would be run
+        own.mkdir()
+        own.chmod(0o777)
+    environment = {
+        **os.environ, "TMPDIR": str(tmp_path), "NUMBA_CACHE_DIR": "",
+        # neither beside the package nor in a home
+        "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator",
+    }  # fmt: skip
+    script = (
+        SCRIPT + "from rbfrag.solver.integrator.compiled import where_kept\nprint(where_kept())"
+    )
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", script], env=environment, capture_output=True, text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    )  # fmt: skip
+    if safe:
+        assert first == f"compiles\nonce; they are kept in {own}\n"
+        assert second == first.removeprefix("compiles\n")
+        assert own.stat().st_mode & 0o077 == 0
+    else:
+        assert first == second
+        assert first.startswith("compiles\nat each start: no folder")
+        assert not list(own.iterdir())
+
+
 @inner_kernel
 def doubled(x: float) -> float:
     return 2.0 * x
