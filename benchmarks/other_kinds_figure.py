@@ -70,7 +70,7 @@ def _slides(axes: Any, model: FragilityModel, data: FitData) -> None:
     axes.set_xlabel(r"$k_y/\mathrm{PGA}$")
     axes.set_ylabel(r"displacement over $\mathrm{PGV}^2/(k_y g)$")
     axes.set_title("sliding", fontsize=10)
-    axes.legend(loc="lower left", fontsize=8, frameon=False)
+    _legend(axes)
 
 
 def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
@@ -96,4 +96,10 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
     axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
     axes.set_ylabel(rf"$(1-r)/r\cdot k_s^{{{b3 / b1:.2f}}}$, $r=k_s/\mathrm{{PGA}}$")
     axes.set_title("slumping past recovery", fontsize=10)
-    axes.legend(loc="upper right", fontsize=8, frameon=False)
+    _legend(axes)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8.5, frameon=False
+    )

@@ -53,11 +53,11 @@ def plot_calibration(
         below.plot(bins.predicted, bins.blocks, MARKERS[number] + "-", ms=3.5, lw=0.9, color=colour)
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
     axes.set_ylabel("share of blocks that toppled, 95 % interval")
-    axes.legend(loc="upper left", fontsize=8.5, frameon=False)
     below.set_yscale("log")
     below.set_ylabel("blocks per bin")
     below.set_xlabel("probability predicted for an earthquake that was left out")
     canvas.light_grid(axes, below)
+    canvas.legend_below(figure, 1)
     first = next(iter(models.values()))
     axes.set_title(
         f"{int(first.blocks.sum())} blocks under motions of {first.events} earthquakes"
@@ -70,7 +70,7 @@ def plot_calibration(
 def _scores(scores: Mapping[str, float]) -> str:
     known = (
         ("log loss", "log_loss_held_out"),
-        ("from $k_r$ = 0.05", "log_loss_held_out_kr05"),
+        (r"for $k_r \geq 0.05$:", "log_loss_held_out_kr05"),
         ("Brier", "brier_held_out"),
     )
     texts = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]

@@ -32,13 +32,13 @@ def test_calibration_shows_shares_and_counts(tmp_path, caught, overlapping) -> N
     plot_calibration({"a": BINS, "b": BINS}, tmp_path / "c.png", scores=scores, data="made up")
     axes, below = figures[0].axes
     assert "2050 blocks under motions of 47 earthquakes" in axes.get_title()
-    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    words = [text.get_text() for text in figures[0].legends[0].get_texts()]
     assert words == ["a (log loss 0.155, Brier 0.047)", "b"]
     curves = [line for line in axes.lines if len(line.get_ydata()) == P.size]
     np.testing.assert_array_equal(curves[0].get_ydata(), BINS.observed)
     np.testing.assert_array_equal(below.lines[0].get_ydata(), BINS.blocks)
     texts = [axes.title, axes.yaxis.label, below.yaxis.label, below.xaxis.label]
-    assert overlapping(figures[0], [*texts, *axes.get_legend().get_texts()]) == []
+    assert overlapping(figures[0], [*texts, *figures[0].legends[0].get_texts()]) == []
 
 
 def test_calibration_of_too_many_is_refused(tmp_path) -> None:
