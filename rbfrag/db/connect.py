@@ -34,6 +34,12 @@ from rbfrag.errors import (
 CONNECT_TIMEOUT_S = 30.0
 """How long a server may take to answer [s], unless the URL has another ``connect_timeout``."""
 
+_KEEPALIVES = {
+    "keepalives_idle": 30, "keepalives_interval": 10, "keepalives_count": 3,
+    "tcp_user_timeout": 60_000,
+}  # fmt: skip
+"""A host that is gone without a word is noticed within a minute."""
+
 
 def database_label(url: URL) -> str:
     """Return the database as messages name it: the file, or the URL without its password."""
@@ -95,13 +101,20 @@ def _server_engine(url: URL, read_only: bool) -> Engine:
     waits_s = CONNECT_TIMEOUT_S if longest_s is None else min(CONNECT_TIMEOUT_S, longest_s)
     patience = {} if "connect_timeout" in url.query else {"connect_timeout": max(int(waits_s), 2)}
     # A connection that the server closed between two transactions is replaced without a word.
-    engine = create_engine(url, pool_pre_ping=True, connect_args=patience)
+    engine = create_engine(url, pool_pre_ping=True, connect_args={**_KEEPALIVES, **patience})
+    event.listen(engine, "do_connect", _connected)
     if longest_s is not None:
         event.listen(engine, "connect", partial(_wait_at_most, longest_s))
     if read_only:
         # All queries of one transaction see the same moment, as SQLite's do.
         return engine.execution_options(postgresql_readonly=True, isolation_level="REPEATABLE READ")
     return engine
+
+
+def _connected(_dialect: object, _record: object, cargs: Any, cparams: Any) -> Any:
+    from rbfrag.db.patience import PatientConnection
+
+    return PatientConnection.connect(*cargs, **cparams)
 
 
 def _wait_at_most(seconds: float, connection: Any, _record: object) -> None:
@@ -134,8 +147,12 @@ def _raise_explained(context: ExceptionContext) -> None:
         if not isinstance(error, sqlite3.IntegrityError | sqlite3.ProgrammingError):
             raise explained_sqlite_error(error, label) from error
         return
+    silent = type(error).__name__ == "SilentServerError"
+    if context.is_pre_ping and not silent:
+        return  # the server closed it meanwhile: another one takes its place
     # without a connection it was one that could not be made
-    explained = _explained_server_error(error, label, connected=context.connection is not None)
+    connected = silent or context.connection is not None
+    explained = _explained_server_error(error, label, connected=connected)
     if explained is not None:
         raise explained from error
 
@@ -145,10 +162,11 @@ def _explained_server_error(
 ) -> DatabaseError | None:
     # psycopg is an extra: its classes are told by what they carry, not by import.
     state: Any = getattr(error, "sqlstate", None)
-    if type(error).__module__.partition(".")[0] != "psycopg":
+    if all(each.__module__.partition(".")[0] != "psycopg" for each in type(error).__mro__):
         return None
     reason = " ".join(str(error).split())
-    unnamed = state is None and type(error).__name__ in ("OperationalError", "ConnectionTimeout")
+    lost = ("OperationalError", "ConnectionTimeout", "SilentServerError")
+    unnamed = state is None and type(error).__name__ in lost
     if unnamed and not connected:
         return DatabaseNotFoundError(
             f"cannot reach {label}: {reason}; check host, port, user and database name"

@@ -7,15 +7,19 @@ import socket
 import sqlite3
 import stat
 import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import make_url, text
 
 from benchmarks.database_content import content_digest
 from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.db import patience
 from rbfrag.db.engine import opened_database
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
@@ -121,6 +125,16 @@ def test_a_connection_that_breaks_without_a_word(on_server: str) -> None:
             wire.shutdown(socket.SHUT_RDWR)
         with pytest.raises(DatabaseFailedError, match="what was finished is kept"):
             connection.execute(text("SELECT 1"))
+
+
+def test_a_connection_that_the_server_closed_meanwhile_is_replaced(on_server: str) -> None:
+    with opened_database(on_server) as engine:
+        with engine.connect() as connection:
+            first = connection.scalar(text("SELECT pg_backend_pid()"))
+        with opened_database(on_server) as other, other.begin() as connection:
+            connection.execute(text("SELECT pg_terminate_backend(:pid)"), {"pid": first})
+        with engine.connect() as connection:
+            assert connection.scalar(text("SELECT pg_backend_pid()")) != first
 
 
 def test_two_campaigns_at_once(
@@ -233,3 +247,63 @@ class TestUnusable:
                 os.seteuid(0)
             for folder, mode in zip(folders, rights, strict=True):
                 folder.chmod(mode)
+
+
+@contextmanager
+def stalling_proxy(port: int) -> Iterator[tuple[int, threading.Event]]:
+    """A port that forwards to another one until an event is set, and then stays open, silent."""
+    stalls = threading.Event()
+    server = socket.create_server(("127.0.0.1", 0))
+    wires = []
+
+    def forward(one: socket.socket, other: socket.socket) -> None:
+        with suppress(OSError):
+            while data := one.recv(1 << 16):
+                if not stalls.is_set():
+                    other.sendall(data)
+
+    def accept() -> None:
+        with suppress(OSError):
+            while True:
+                near, _ = server.accept()
+                far = socket.create_connection(("127.0.0.1", port))
+                wires.extend((near, far))
+                for pair in ((near, far), (far, near)):
+                    threading.Thread(target=forward, args=pair, daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    try:
+        yield server.getsockname()[1], stalls
+    finally:
+        for wire in (server, *wires):
+            wire.close()
+
+
+def test_a_server_that_falls_silent_is_given_up(
+    on_server: str, undisturbed: str, monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(patience, "WARNED_S", 0.5)
+    monkeypatch.setattr(patience, "ENDED_S", 1.5)
+    monkeypatch.setattr(patience, "PROBE_S", 2)
+    url = make_url(on_server)
+    with stalling_proxy(url.port or 5432) as (port, stalls):
+        by_proxy = url.set(host="127.0.0.1", port=port).render_as_string(hide_password=False)
+
+        def stall(progress: CampaignProgress) -> None:
+            if progress.done >= 8:
+                stalls.set()
+
+        with pytest.raises(DatabaseFailedError, match=r"no answer for .* run the same command"):
+            simulate(by_proxy, p2=P2, jobs=1, on_progress=stall)
+    assert "takes no other connection" in caplog.text
+    assert stored(on_server) >= 8
+    simulate(on_server, p2=P2, jobs=1)
+    assert digest(on_server) == undisturbed
+
+
+def test_a_statement_may_take_its_time(on_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patience, "WARNED_S", 0.3)
+    monkeypatch.setattr(patience, "ENDED_S", 0.6)
+    with opened_database(on_server) as engine, engine.connect() as connection:
+        assert connection.scalar(text("SELECT 1 FROM pg_sleep(2)")) == 1
