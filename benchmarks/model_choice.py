@@ -4,15 +4,16 @@ Every model is fitted to 15 of 16 parts of the earthquakes and judged on the oth
 k_r >= 0.02 and of k_r >= 0.05. --aims prints what is aimed at beside what is reached, and the exit
 status is then 1 where an aim is missed; --kind and --model choose. The database has to hold what
 the models read: the reference has that of toppling and sliding. --write keeps the tables, in
-docs/evidence/model-choice.md or benchmarks/results. Models of a kind that the
-database has no outcomes of are passed over: of rocking the reference has none.
+the page of their kind or benchmarks/results. Models of a kind that the database has no outcomes of
+are passed over: of rocking the reference has none. Those of sliding have aims alone here, and
+their tables by benchmarks.sliding_models.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -29,19 +30,27 @@ from rbfrag.fragility.fit.data import REAL_KR, Y0_OVER_PGV, FitSource, fit_data,
 from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.fit.likelihood import Binomial, maximise, most_likely
 from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
-from rbfrag.fragility.fit.scores import CLIP
+from rbfrag.fragility.fit.scores import CLIP, calibration
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.methods import method_named
+from rbfrag.question.fields import word_of
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
+PAGES = {
+    "toppling": ROOT / "docs" / "evidence" / "model-choice.md",
+    "rocking": ROOT / "docs" / "theory" / "rocking.md",
+    "sliding": ROOT / "docs" / "evidence" / "other-kinds.md",
+}
 
 KR_CLASSES = (0.02, 0.05, 0.1, 0.2, 0.4, 1.0)
 """Edges of the classes of k_r that slopes are told by."""
+
+MAGNITUDES = (0.0, 5.6, 6.0, 6.5, 7.5, math.inf)
+"""Edges of the classes of magnitude that intercepts are told by."""
 
 STRONG_KR = 0.2
 """From here on predicted failures are compared with observed ones."""
@@ -64,6 +73,7 @@ class Aims:
         strong: least and greatest ratio of predicted to observed failures of strong blocks.
         kr_slopes: slopes by class of `KR_CLASSES`, as many as were measured.
         size_slopes: least and greatest slope of a size p².
+        intercept: how far the calibration intercept of a class of `MAGNITUDES` may be off.
     """
 
     method: str
@@ -75,6 +85,7 @@ class Aims:
     strong: tuple[float, float] | None = None
     kr_slopes: tuple[float, ...] = ()
     size_slopes: tuple[float, float] | None = None
+    intercept: float | None = None
 
 
 _STRONG = (0.8, 1.35)
@@ -110,9 +121,10 @@ MODELS: dict[str, Aims] = {
         )
     },
     **{
-        f"sliding-{term}": Aims("displacement", term, "sliding", loss)
-        for term, loss in (
-            ("pgv_pga_m", 0.0934), ("pgv_pga", 0.1040), ("pgv_pga_ia", 0.0801), ("pgv", None)
+        f"sliding-{term}": Aims("displacement", term, "sliding", loss, intercept=intercept)
+        for term, loss, intercept in (
+            ("pgv_pga_m", 0.0934, 0.9), ("pgv_pga", 0.1040, None), ("pgv_pga_ia", 0.0801, None),
+            ("pgv", None, None),
         )
     },
 }  # fmt: skip
@@ -130,6 +142,7 @@ class Predicted:
         kr: strength; None of blocks that are not known by it.
         p2: size [1/s²], likewise.
         shares: share of the blocks of the same y/PGV and size that failed in other earthquakes.
+        magnitude: of the earthquake, NaN where it is not known; None of blocks known by k_r.
     """
 
     p: FloatArray
@@ -138,11 +151,12 @@ class Predicted:
     kr: FloatArray | None = None
     p2: FloatArray | None = None
     shares: FloatArray | None = None
+    magnitude: FloatArray | None = None
 
     def only(self, chosen: Mask) -> Predicted:
         """Return some of the blocks."""
-        columns = (self.p, self.failed, self.event, self.kr, self.p2, self.shares)
-        return Predicted(*(None if c is None else c[chosen] for c in columns))  # type: ignore[arg-type]
+        columns = (getattr(self, field.name) for field in fields(self))
+        return Predicted(*(None if c is None else c[chosen] for c in columns))
 
     def kr_from(self, least: float, below: float = math.inf) -> Predicted:
         """Return the blocks of some strengths."""
@@ -161,6 +175,17 @@ class Predicted:
         if not failed.any() or failed.all() or self.p[failed].min() > self.p[~failed].max():
             return math.nan, math.nan
         return calibration_slope(self.p, self.failed, self.event)
+
+    @property
+    def intercepts(self) -> list[float]:
+        """Calibration intercept of each class of magnitude, above 0 where P is too low."""
+        assert self.magnitude is not None
+        return [
+            calibration(
+                self.p, self.failed, (self.magnitude >= low) & (self.magnitude < high)
+            ).intercept
+            for low, high in pairwise(MAGNITUDES)
+        ]
 
     @property
     def ratio(self) -> float:
@@ -232,7 +257,9 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
     event = np.broadcast_to(data.event[:, None], known.shape)[known]
     failed = judged.failed[known]
     if not {"kr", "p2"} <= set(data.blocks):
-        return Predicted(grid[known], failed, event)
+        magnitude = source.table.magnitude[data.combination]
+        of_blocks = np.broadcast_to(magnitude[:, None], known.shape)[known]
+        return Predicted(grid[known], failed, event, magnitude=of_blocks)
     kr, p2 = (data.grid(name)[known] for name in ("kr", "p2"))
     ratio = (data.grid("y_m_s") / data.grid("pgv_m_s"))[known]
     strength = np.rint(np.log(ratio / Y0_OVER_PGV[0]) / STEP).astype(np.intp)
@@ -242,52 +269,48 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
 
 
 def score_table(found: Mapping[str, Predicted]) -> str:
-    """Return the scores of models, best first."""
+    """Return the scores of models whose blocks are known by k_r, best first."""
     cells = []
-    for name, all_blocks in sorted(found.items(), key=lambda item: item[1].loss):
-        term = TERMS[MODELS[name].term]
-        cell = [f"`{name}`", ", ".join(term.inputs)]
-        cell.append(_with_error(*clustered_mean(_losses(all_blocks), all_blocks.event)))
-        if all_blocks.kr is not None and all_blocks.shares is not None:
-            real = all_blocks.kr_from(REAL_KR)
-            assert real.shares is not None
-            skill = 1.0 - real.loss / log_losses(real.shares, real.failed).mean()
-            strong = all_blocks.kr_from(STRONG_KR)
-            cell += [
-                _with_error(*clustered_mean(_losses(real), real.event)), f"{skill:+.2f}",
-                _slope(real), f"{strong.ratio:.2f}",
-            ]  # fmt: skip
-        cells.append(cell)
+    for name, one in sorted(found.items(), key=lambda item: item[1].loss):
+        real, strong = one.kr_from(REAL_KR), one.kr_from(STRONG_KR)
+        assert real.shares is not None
+        skill = 1.0 - real.loss / log_losses(real.shares, real.failed).mean()
+        cells.append([
+            f"`{name}`", measures_cell(name),
+            loss_cell(one), loss_cell(real), f"{skill:+.2f}", _slope(real), f"{strong.ratio:.2f}",
+        ])  # fmt: skip
     head = [
         "model", "reads", "log loss, $k_r$ ≥ .02", "log loss, $k_r$ ≥ .05", "skill", "slope",
         "predicted/observed, $k_r$ ≥ .2",
     ]  # fmt: skip
-    return markdown((head, [cell + [""] * (len(head) - len(cell)) for cell in cells]))
+    return markdown((head, cells))
 
 
-def _losses(blocks: Predicted) -> FloatArray:
-    return log_losses(blocks.p, blocks.failed)
+def measures_cell(name: str) -> str:
+    """Return what a model reads of the shaking, in the words of the command line."""
+    return ", ".join(map(word_of, TERMS[MODELS[name].term].inputs))
 
 
-def _with_error(value: float, error: float) -> str:
-    return f"{value:.4f} ± {error:.4f}"
+def loss_cell(blocks: Predicted) -> str:
+    """Return the log loss with its error by earthquakes."""
+    mean, error = clustered_mean(log_losses(blocks.p, blocks.failed), blocks.event)
+    return f"{mean:.4f} ± {error:.4f}"
 
 
 def class_table(found: Mapping[str, Predicted], *, by_size: bool = False) -> str:
     """Return the slope of each class of k_r, or of each size."""
     classes: list[tuple[str, list[Predicted]]] = []
-    known = {name: one for name, one in found.items() if one.kr is not None}
     if by_size:
-        sizes = np.unique(np.concatenate([one.p2 for one in known.values() if one.p2 is not None]))
+        sizes = np.unique(np.concatenate([one.p2 for one in found.values() if one.p2 is not None]))
         for p2 in sizes[::-1]:
-            chosen = [one.only(np.isclose(one.p2, p2)) for one in known.values()]  # type: ignore[arg-type]
+            chosen = [one.only(np.isclose(one.p2, p2)) for one in found.values()]  # type: ignore[arg-type]
             classes.append((f"$p^2$ = {p2:g} 1/s²", chosen))
     else:
         for low, high in pairwise(KR_CLASSES):
-            chosen = [one.kr_from(low, high) for one in known.values()]
+            chosen = [one.kr_from(low, high) for one in found.values()]
             classes.append((f"$k_r$ {low:g} to {high:g}", chosen))
     cells = [[words, *(_slope(one) for one in some)] for words, some in classes]
-    return markdown((["slope", *(f"`{name}`" for name in known)], cells))
+    return markdown((["slope", *(f"`{name}`" for name in found)], cells))
 
 
 def _slope(blocks: Predicted) -> str:
@@ -322,6 +345,10 @@ def marks(name: str, aims: Aims, found: Predicted) -> Iterator[Mark]:
         low, high = aims.size_slopes[0] - SLOPE_WITHIN, aims.size_slopes[1] + SLOPE_WITHIN
         for words, value in (("least", min(of_sizes)), ("greatest", max(of_sizes))):
             yield Mark(name, f"{words} slope of a size", low, high, round(value, 2))
+    if aims.intercept is not None:
+        worst = max((one for one in found.intercepts if math.isfinite(one)), key=abs)
+        words = "farthest intercept of a class of magnitude"
+        yield Mark(name, words, -aims.intercept, aims.intercept, round(worst, 2))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -332,35 +359,45 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.add_argument("--kind", help="only models of one kind")
     options.add_argument("--model", action="append", help="only the named models")
     chosen = options.parse_args(arguments)
-    models = {
-        name: aims
-        for name, aims in MODELS.items()
-        if chosen.kind in (None, aims.kind) and name in (chosen.model or MODELS)
-        if not chosen.aims or aims.loss is not None
-    }
-    found, sources = {}, {}
+    missed = False
     with opened_database(chosen.db, read_only=True) as engine, engine.connect() as connection:
-        for name, aims in models.items():
-            if aims.kind not in sources:
-                block = method_named(aims.method).block
-                sources[aims.kind] = read_source(connection, block, kind=aims.kind)
-            if sources[aims.kind].table.p2.size:
-                found[name] = predicted(sources[aims.kind], aims)
-    reached = [mark for name, one in found.items() for mark in marks(name, models[name], one)]
-    tables = {"aims": acceptance_table(reached)}
-    if not chosen.aims:
-        shown = {name: one for name, one in found.items() if models[name].loss is not None}
-        tables |= {
-            "scores": score_table(found),
-            "strengths": class_table(shown),
-            "sizes": class_table(shown, by_size=True),
-        }
-    for name, table in tables.items():
-        print(f"## {name}\n\n{table}\n", flush=True)
-        if chosen.write:
-            write_table(PAGE, name, table)
-    if chosen.aims and not all(mark.reached for mark in reached):
+        for kind in PAGES if chosen.kind is None else [chosen.kind]:
+            models = {
+                name: aims
+                for name, aims in MODELS.items()
+                if aims.kind == kind and name in (chosen.model or MODELS)
+                if not chosen.aims or aims.loss is not None
+            }
+            block = method_named(next(iter(models.values())).method).block
+            source = read_source(connection, block, kind=kind)
+            if not source.table.p2.size:
+                continue
+            found = {name: predicted(source, aims) for name, aims in models.items()}
+            reached = [
+                mark for name, one in found.items() for mark in marks(name, models[name], one)
+            ]
+            missed = missed or not all(mark.reached for mark in reached)
+            tables = {"aims": acceptance_table(reached)}
+            if not chosen.aims:
+                tables |= tables_of(found)
+            for name, table in tables.items():
+                print(f"## {kind}: {name}\n\n{table}\n", flush=True)
+                if chosen.write:
+                    write_table(PAGES[kind], name, table)
+    if chosen.aims and missed:
         raise SystemExit(1)
+
+
+def tables_of(found: Mapping[str, Predicted]) -> dict[str, str]:
+    """Return the tables of models of one kind, if its blocks are known by k_r."""
+    if any(one.kr is None for one in found.values()):
+        return {}
+    shown = {name: one for name, one in found.items() if MODELS[name].loss is not None}
+    return {
+        "scores": score_table(found),
+        "strengths": class_table(shown),
+        "sizes": class_table(shown, by_size=True),
+    }
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from benchmarks.model_choice import (
     predicted,
     score_table,
     table_of_shares,
+    tables_of,
 )
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.fit.data import FitSource
@@ -158,7 +159,24 @@ def test_an_aim_that_is_missed_is_told() -> None:
 def test_every_model_has_a_line(pgv_pga: Predicted) -> None:
     found = {"bounded-pgv_pga": pgv_pga}
     (line,) = score_table(found).splitlines()[2:]
-    assert "pgv_m_s, pga_g" in line
+    assert "pgv, pga" in line
     assert f"{pgv_pga.loss:.4f} ±" in line
     assert len(class_table(found).splitlines()) == 2 + 5
     assert len(class_table(found, by_size=True).splitlines()) == 2 + 3
+
+
+def test_an_intercept_of_a_class_of_magnitude_is_told() -> None:
+    of_kr = drawn(1.0)
+    magnitude = np.where(of_kr.event < 20, 5.0, 7.0)
+    # small earthquakes are told too little
+    p = np.where(magnitude < 6.0, expit(logit(of_kr.p) - 1.0), of_kr.p)
+    found = Predicted(p, of_kr.failed, of_kr.event, magnitude=magnitude)
+    small, *_, great, greatest = found.intercepts
+    assert small == pytest.approx(1.0, abs=0.1)
+    assert great == pytest.approx(0.0, abs=0.1)
+    assert np.isnan(greatest)
+    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=0.9), found)
+    assert not mark.reached
+    (mark,) = marks("m", Aims("displacement", "pgv_pga_m", "sliding", intercept=1.2), found)
+    assert mark.reached
+    assert tables_of({"sliding-pgv_pga_m": found}) == {}
