@@ -43,7 +43,6 @@ def test_what_portfolios_are_judged_by() -> None:
         count=np.array([3.0, 1.0, 0.0]),
         mean=np.array([1.0, 1.0, 2.0]),
         variance=np.array([2.0, 2.0, 4.0]),
-        alone=np.ones(3),
         any_by=(np.array([0.9, 0.5, 0.5]), np.full(3, 0.5)),
     )
     assert line.ratio() == (1.0, 1.0, 1.0)
