@@ -12,7 +12,7 @@ their tables by benchmarks.sliding_models.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 
@@ -142,7 +142,7 @@ class Predicted:
         kr: strength; None of blocks that are not known by it.
         p2: size [1/s²], likewise.
         shares: share of the blocks of the same y/PGV and size that failed in other earthquakes.
-        magnitude: of the earthquake, NaN where it is not known; None of blocks known by k_r.
+        magnitude: of the earthquake, NaN where it is not known.
     """
 
     p: FloatArray
@@ -163,6 +163,11 @@ class Predicted:
         assert self.kr is not None
         return self.only((self.kr >= least) & (self.kr < below))
 
+    def of_magnitude(self, least: float, below: float) -> Predicted:
+        """Return the blocks of some earthquakes."""
+        assert self.magnitude is not None
+        return self.only((self.magnitude >= least) & (self.magnitude < below))
+
     @property
     def loss(self) -> float:
         """Mean log loss."""
@@ -179,12 +184,10 @@ class Predicted:
     @property
     def intercepts(self) -> list[float]:
         """Calibration intercept of each class of magnitude, above 0 where P is too low."""
-        assert self.magnitude is not None
+        parts = [self.of_magnitude(low, high) for low, high in pairwise(MAGNITUDES)]
         return [
-            calibration(
-                self.p, self.failed, (self.magnitude >= low) & (self.magnitude < high)
-            ).intercept
-            for low, high in pairwise(MAGNITUDES)
+            calibration(one.p, one.failed, np.ones(one.p.size, dtype=np.bool_)).intercept
+            for one in parts
         ]
 
     @property
@@ -256,16 +259,17 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
     known = judged.known
     event = np.broadcast_to(data.event[:, None], known.shape)[known]
     failed = judged.failed[known]
+    magnitude = np.broadcast_to(source.table.magnitude[data.combination][:, None], known.shape)[
+        known
+    ]
     if not {"kr", "p2"} <= set(data.blocks):
-        magnitude = source.table.magnitude[data.combination]
-        of_blocks = np.broadcast_to(magnitude[:, None], known.shape)[known]
-        return Predicted(grid[known], failed, event, magnitude=of_blocks)
+        return Predicted(grid[known], failed, event, magnitude=magnitude)
     kr, p2 = (data.grid(name)[known] for name in ("kr", "p2"))
     ratio = (data.grid("y_m_s") / data.grid("pgv_m_s"))[known]
     strength = np.rint(np.log(ratio / Y0_OVER_PGV[0]) / STEP).astype(np.intp)
     size = np.unique(p2, return_inverse=True)[1].astype(np.intp)
     shares = table_of_shares(failed, event, size * (int(strength.max()) + 1) + strength)
-    return Predicted(grid[known], failed, event, kr, p2, shares)
+    return Predicted(grid[known], failed, event, kr, p2, shares, magnitude)
 
 
 def score_table(found: Mapping[str, Predicted]) -> str:
@@ -297,20 +301,41 @@ def loss_cell(blocks: Predicted) -> str:
     return f"{mean:.4f} ± {error:.4f}"
 
 
-def class_table(found: Mapping[str, Predicted], *, by_size: bool = False) -> str:
-    """Return the slope of each class of k_r, or of each size."""
-    classes: list[tuple[str, list[Predicted]]] = []
-    if by_size:
+def class_table(found: Mapping[str, Predicted], by: str = "kr") -> str:
+    """Return the slope of each class of k_r or of `magnitude`, or of each size `p2`.
+
+    By magnitude it is that of blocks of `REAL_KR` and more, with predicted over observed failures.
+    """
+    classes: dict[str, Callable[[Predicted], Predicted]] = {}
+    if by == "p2":
         sizes = np.unique(np.concatenate([one.p2 for one in found.values() if one.p2 is not None]))
         for p2 in sizes[::-1]:
-            chosen = [one.only(np.isclose(one.p2, p2)) for one in found.values()]  # type: ignore[arg-type]
-            classes.append((f"$p^2$ = {p2:g} 1/s²", chosen))
+            classes[f"$p^2$ = {p2:g} 1/s²"] = lambda one, p2=p2: one.only(np.isclose(one.p2, p2))  # type: ignore[misc]
+    elif by == "magnitude":
+        for words, low, high in magnitude_classes():
+            classes[words] = lambda one, low=low, high=high: one.of_magnitude(low, high)  # type: ignore[misc]
     else:
         for low, high in pairwise(KR_CLASSES):
-            chosen = [one.kr_from(low, high) for one in found.values()]
-            classes.append((f"$k_r$ {low:g} to {high:g}", chosen))
-    cells = [[words, *(_slope(one) for one in some)] for words, some in classes]
+            words = f"$k_r$ {low:g} to {high:g}"
+            classes[words] = lambda one, low=low, high=high: one.kr_from(low, high)  # type: ignore[misc]
+    cells = []
+    for words, chosen in classes.items():
+        some = [chosen(one) for one in found.values()]
+        if by == "magnitude":
+            real = [one.kr_from(REAL_KR) for one in some]
+            cells.append([words, *(f"{_slope(one)}; {one.ratio:.2f}" for one in real)])
+        else:
+            cells.append([words, *map(_slope, some)])
     return markdown((["slope", *(f"`{name}`" for name in found)], cells))
+
+
+def magnitude_classes() -> Iterator[tuple[str, float, float]]:
+    """Yield the classes of magnitude in words, with their ends."""
+    for low, high in pairwise(MAGNITUDES):
+        if math.isinf(high):
+            yield f"M ≥ {low:g}", low, high
+        else:
+            yield (f"M {low:g} to {high:g}" if low > 0.0 else f"M < {high:g}"), low, high
 
 
 def _slope(blocks: Predicted) -> str:
@@ -396,7 +421,8 @@ def tables_of(found: Mapping[str, Predicted]) -> dict[str, str]:
     return {
         "scores": score_table(found),
         "strengths": class_table(shown),
-        "sizes": class_table(shown, by_size=True),
+        "sizes": class_table(shown, "p2"),
+        "magnitudes": class_table(shown, "magnitude"),
     }
 
 

@@ -8,16 +8,14 @@ keeps the tables, in docs/evidence/other-kinds.md or benchmarks/results.
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Mapping
-from itertools import pairwise
 
 from benchmarks.model_choice import (
-    MAGNITUDES,
     MODELS,
     PAGES,
     Predicted,
     loss_cell,
+    magnitude_classes,
     measures_cell,
     predicted,
 )
@@ -36,11 +34,7 @@ def score_table(found: Mapping[str, Predicted]) -> str:
          *(f"{value:+.2f}" for value in one.intercepts)]
         for name, one in sorted(found.items(), key=lambda item: item[1].loss)
     ]  # fmt: skip
-    classes = [
-        f"M {low:g} to {high:g}" if low > 0.0 and high < math.inf
-        else f"M < {high:g}" if high < math.inf else f"M ≥ {low:g}"
-        for low, high in pairwise(MAGNITUDES)
-    ]  # fmt: skip
+    classes = [words for words, *_ in magnitude_classes()]
     return markdown((["model", "reads", "log loss", "slope", *classes], cells))
 
 

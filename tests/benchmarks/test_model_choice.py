@@ -162,7 +162,11 @@ def test_every_model_has_a_line(pgv_pga: Predicted) -> None:
     assert "pgv, pga" in line
     assert f"{pgv_pga.loss:.4f} ±" in line
     assert len(class_table(found).splitlines()) == 2 + 5
-    assert len(class_table(found, by_size=True).splitlines()) == 2 + 3
+    assert len(class_table(found, "p2").splitlines()) == 2 + 3
+    by_magnitude = class_table(found, "magnitude").splitlines()
+    assert [line.split(" | ")[0] for line in by_magnitude[2:]] == [
+        "| M < 5.6", "| M 5.6 to 6", "| M 6 to 6.5", "| M 6.5 to 7.5", "| M ≥ 7.5",
+    ]  # fmt: skip
 
 
 def test_an_intercept_of_a_class_of_magnitude_is_told() -> None:
