@@ -3,7 +3,7 @@
     python -m benchmarks.shakemap GRID.xml DATABASE [--blocks 20] [--std 0.55] [--times 1]
 
 Prints the processor time of reading the grid, of answering it, and of drawing how many blocks fail
-together. With --std the logarithms of PGV and PGA have this standard deviation everywhere; 0 takes
+together. With --std the logarithms of all measures have this standard deviation everywhere; 0 takes
 the map's values as certain.
 """
 
@@ -46,7 +46,7 @@ def main() -> None:
     p2 = 10.0 ** random.uniform(-0.5, 1.0, given.blocks)
     kr = random.uniform(0.05, 0.3, given.blocks)
     grid, read = timed(lambda: read_shakemap(given.grid))
-    names = ("pgv_m_s", "pga_g") if given.std > 0.0 else ()
+    names = tuple(grid.measures) if given.std > 0.0 else ()
 
     def answer(rows: slice) -> SiteProbability:
         return site_probability(

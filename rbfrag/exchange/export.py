@@ -89,7 +89,7 @@ def nrml(
     - the fields of blocks, each a number or of shape (m,), with ``kind``, as
       :func:`rbfrag.predict` has them; all blocks are of one kind.
     - ``blocks``: instead of these a table of blocks: a file, or columns by name.
-    - ``imt``: measure of the functions: PGV (the default), PGA, or SA(T) at 0.3, 1, 2 or 3 s.
+    - ``imt``: measure of the functions: PGV (the default), PGA, or SA at 1 s.
     - ``one_class``: one function, the mean over the blocks.
     - ``name``: identifier of a single block, or of the class; ``block`` if not given.
     - ``levels``: number of levels of a function that is not lognormal; 80 if not given.

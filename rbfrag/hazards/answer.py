@@ -201,7 +201,7 @@ def hazard(
     - ``model``, ``level``, ``db``: as in :func:`rbfrag.predict`.
 
     Args:
-        curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
+        curve: hazard curve of PGV, PGA or the spectral acceleration at 1 s, or of one
             that `convert` is for, or its file (OpenQuake CSV, USGS NSHM JSON, two columns); or
             several of one site and measure.
         numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.

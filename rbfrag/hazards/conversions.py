@@ -70,7 +70,7 @@ class VelocityConversion:
         period_s: oscillator period [s].
         factor: PGV over spectral acceleration [m/s per g].
         scatter: standard deviation of ln(PGV/converted) that is taken where none is given: that
-            of the 265 horizontal motions of the shipped reference. The publications give a
+            of the 749 horizontal motions of the shipped reference. The publications give a
             factor for the median, and no scatter that goes with these motions.
         source: where it is published.
     """
@@ -89,14 +89,14 @@ CONVERSIONS: Mapping[str, VelocityConversion] = {
             "newmark_hall_1982",
             1.0,
             STANDARD_GRAVITY_M_S2 / (2.0 * math.pi * 1.65),
-            0.46,
+            0.48,
             "Newmark and Hall (1982), SA(1 s)/PGV = 2π·1.65/g at 5 % damping",
         ),
         VelocityConversion(
             "bommer_alarcon_2006",
             0.5,
             STANDARD_GRAVITY_M_S2 / 20.0,
-            0.49,
+            0.47,
             "Bommer and Alarcón (2006), PGV [cm/s] = SA(0.5 s) [cm/s²]/20",
         ),
     )

@@ -89,7 +89,7 @@ class Scenario:
         probability: by realisation; NaN without an answer; shape (n,).
         ci_low: lower ends of the confidence intervals, shape (n,).
         ci_high: upper ends, shape (n,).
-        event_low: lower ends of the shares of such blocks that fail in one single earthquake; NaN
+        event_low: lower ends of the shares of such blocks that fail in one earthquake; NaN
             where that is not known, shape (n,).
         event_high: upper ends, shape (n,).
         in_domain: True where a model answered in the range that was fitted, shape (n,).

@@ -31,7 +31,7 @@ class FunctionOptions(BlocksOptions):
     """The blocks, one function each, and what a function is of."""
 
     name: str = option("Identifier of the one block or of the rock mass.", "block")
-    imt: str = option("Measure of the function: PGV, PGA, or SA at 0.3, 1, 2 or 3 s.", "PGV")
+    imt: str = option("Measure of the function: PGV, PGA, or SA at 1 s.", "PGV")
     levels: int = option("Number of levels of a function that is not lognormal.", 80)
 
     def keywords(self, given: Given, answering: Given) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -97,8 +97,8 @@ def hazard(
     The fragility is integrated over the hazard curve, and the probability in a period of years
     follows. Blocks of --blocks stand at the curves' sites by site_id, else all at one: beside their
     rates it gives how often an earthquake fails at least one of them, or more, by what the model
-    knows of blocks that share the shaking. Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are
-    answered, each by a model of that very measure; another needs --convert. With --weights curves
+    knows of blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are answered,
+    each by a model of that very measure; another needs --convert. With --weights curves
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """

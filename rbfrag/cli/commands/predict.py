@@ -77,9 +77,10 @@ def predict(
     interval how well the data tell that share. One block falls or stands; with --sites a range says
     what share of such blocks fails at so many sites of one earthquake.
 
-    What is known of the motion decides which model answers: PGV, alone or with PGA and Tm; a
-    spectral acceleration; PGA; PGA with spectral accelerations; or the motion itself. Where the
-    measures suffice for several models, each is answered.
+    What is known of the motion decides which model answers: PGV, alone or with PGA, best with the
+    spectral accelerations at 1 and 3 s or Tm, too; PGA with spectral accelerations; SA at 1 s or
+    PGA alone; of slides and slumps also Arias intensity or magnitude; or the motion itself. Where
+    the measures suffice for several models, each is answered.
 
     Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
     shaking: ask for --kind rocking.
