@@ -1,7 +1,7 @@
 """Whether fits find the truth and say how sure they are:  python -m benchmarks.recovery
 
 Outcomes and critical values are drawn from known models, with scatter that earthquakes share,
-for as many earthquakes as the reference set has (47). Each method is fitted to each draw. The
+for as many earthquakes as the reference set has (100). Each method is fitted to each draw. The
 table counts how often the 95 % intervals (the standard error by leaving earthquakes out times
 Student's t for the degrees of freedom of that parameter) hold the truth.
 """
@@ -27,7 +27,7 @@ from rbfrag.fragility.methods import method_named
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
-EVENTS = 47
+EVENTS = 100
 LEVEL = quantiles_of(0.95)
 SHARED = 0.1
 
