@@ -29,6 +29,7 @@ OPENING = frozenset({
 
 NO_READERS = {
     "__init__.py:_home_of_names": "the package's own stub",
+    "cli/streams.py:end_unwritten": "opens what swallows output that cannot be written",
     "campaign/machine.py:_processor": "the computer's own description",
     "plots/coast.py:world": "the package's own coastline",
     "service/app.py:lifespan": "opens the pool of processes",
