@@ -1,12 +1,12 @@
-"""How well models of blocks that slide or slump do:
+"""How well models of blocks that slide, slump or topple confined do:
 
     python -m benchmarks.other_kinds DATABASE [--slumping DATABASE] [--suite NAME] [--write]
 
-reads the campaigns of a database (sliding, slumping by 2 degrees and past recovery), fits the
-models and prints the tables (`benchmarks.sliding_models` compares those of sliding); --write keeps
-them and draws the figure of docs/evidence/other-kinds.md. Slumping may be in another database,
-there run under the motions of a suite alone. What the blocks of one earthquake share is that of the
-shipped models.
+reads the campaigns of a database (sliding, slumping by 2 degrees and past recovery, confined
+toppling), fits the models and prints the tables (`benchmarks.sliding_models` compares those of
+sliding); --write keeps them and draws the figure of docs/evidence/other-kinds.md. All but sliding
+may be in another database, there run under the motions of a suite alone. What the blocks of one
+earthquake share is that of the shipped models.
 """
 
 from __future__ import annotations
@@ -142,6 +142,9 @@ def tables(
             for rotation in (None, 2.0)
             for term in ("pgv_pga_m", "pgv_pga")
         ]
+        confined = [
+            fitted(c, "confined_toppling", term, suite=suite) for term in ("pgv_pga_m", "pgv_pga")
+        ]
     sliding, turned = slides["pgv_pga"], slumps[-1].data
     rows = []
     for fit in slides.values():
@@ -153,6 +156,9 @@ def tables(
     heads = ["held out", "log loss", "Brier", "slope", "outcomes", "undecided"]
     found["slumping-scores"] = markdown((heads, rows))
     found["slumping-coefficients"] = coefficient_lines(slumps)
+    rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in confined]
+    found["confined-scores"] = markdown((heads, rows))
+    found["confined-coefficients"] = coefficient_lines(confined)
     rows = []
     for fit in slumps:
         classes = (*_ratio_classes(fit), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS))
@@ -190,12 +196,14 @@ def dependence_table(models: Sequence[ModelRow]) -> str:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
-    options.add_argument("--slumping", help="database of the slumping campaign, if it is another")
-    options.add_argument("--suite", help="of the motions of the slumping campaign")
+    options.add_argument(
+        "--slumping", help="database of slumping and confined toppling, if it is another"
+    )
+    options.add_argument("--suite", help="of the motions of these campaigns")
     options.add_argument("--write", action="store_true", help="keep tables, draw the figure")
     chosen = options.parse_args()
     found, (sliding, slumping) = tables(chosen.database, chosen.slumping, chosen.suite)
-    kinds = ("sliding", "slumping")
+    kinds = ("sliding", "slumping", "confined_toppling")
     found["dependence"] = dependence_table([m for m in read_models(REFERENCE) if m.kind in kinds])
     for name, table in found.items():
         print(name, table, sep="\n")

@@ -52,15 +52,16 @@ SPARED_INDEX = "ix_combination_campaign_id"
 """Left out: of the few campaigns in the file nobody asks for one alone."""
 
 MOST_BYTES = 24_000_000
-"""Greatest size of the file that is shipped: everyone downloads it. What models of slumping and
-rocking blocks are fitted to is left out."""
+"""Greatest size of the file that is shipped: everyone downloads it. What models of slumping,
+confined and rocking blocks are fitted to is left out."""
 
 PAGE = ROOT / "docs" / "evidence" / "reference-data.md"
 
 SUITE = "reference"
 
 FEW = "two-recordings"
-"""Suite of the campaign of slumping blocks, whose runs take a hundred times as long."""
+"""Suite of the campaigns of slumping and confined toppling, whose runs take a hundred times as
+long."""
 
 RECORDINGS = 2
 """Recordings of each earthquake in it, drawn at random."""
@@ -96,11 +97,15 @@ MODELS_OF_ALL: tuple[dict[str, Any], ...] = (
         for rotation in (None, 2.0)
         for term in ("pgv_pga_m", "pgv_pga")
     ),
+    *(
+        {"kind": "confined_toppling", "term": term, "suite": FEW}
+        for term in ("pgv_pga_m", "pgv_pga")
+    ),
 )  # fmt: skip
 """The models that are fitted to the full database: what they read is too much to be shipped."""
 
-MODELS_ALONE = tuple(dict.fromkeys(model["kind"] for model in MODELS_OF_ALL))
-"""The kinds of which models are shipped without what they are fitted to."""
+MODELS_ALONE = {model["kind"]: model.get("suite", SUITE) for model in MODELS_OF_ALL}
+"""The kinds of which models are shipped without what they are fitted to, and their suites."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -125,8 +130,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     simulate(kind="sliding", **run)
     if not chosen.without_models:
         draw_recordings(full)
-        for kind in MODELS_ALONE:
-            simulate(kind=kind, **{**run, "suite": FEW if kind == "slumping" else SUITE})
+        for kind, suite in MODELS_ALONE.items():
+            simulate(kind=kind, **{**run, "suite": suite})
     made = chosen.work / "reference.db"
     reduce(full, made)
     reports = []
@@ -187,7 +192,7 @@ def reduce(full: Path, made: Path) -> None:
     raw.close()
     table, point = schema.combination, schema.simulation
     settings = func.json_extract(table.c.settings, "$.displacement_m")
-    spare = table.c.kind.in_(MODELS_ALONE) | ((table.c.kind == "sliding") & (settings != 0.0))
+    spare = table.c.kind.in_(list(MODELS_ALONE)) | ((table.c.kind == "sliding") & (settings != 0.0))
     vertical = select(table.c.id).where(table.c.vertical_motion_id.is_not(None))
     with opened_database(made) as engine, engine.begin() as connection:
         motion = schema.motion
@@ -422,10 +427,10 @@ def model_section(models: Sequence[FitReport]) -> str:
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how well](model-choice.md), [blocks
-that slide or slump](other-kinds.md), [free-standing blocks](../theory/rocking.md)) to what is
-shipped, of {models[0].events} earthquakes; those of slumping and of rocking to grids of blocks
-whose results are too many to be shipped. One of each kind is the default. `rbfrag models
-show` prints coefficients, errors and domain.
+that slide, slump or topple confined](other-kinds.md), [free-standing
+blocks](../theory/rocking.md)) to what is shipped, of {models[0].events} earthquakes; those of
+slumping, confined toppling and rocking to grids of blocks whose results are too many to be shipped.
+One of each kind is the default. `rbfrag models show` prints coefficients, errors and domain.
 
 {names}
 

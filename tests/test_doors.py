@@ -86,7 +86,10 @@ SHAPES: list[dict[str, Any]] = [
     {"height_m": 2.0, "width_m": 0.4, "kind": "sliding", "displacement_m": 0.1},
     # other shapes
     {"alpha1_deg": -10.0, "alpha3_deg": 20.0, "r3_m": 1.0, "beta_deg": 5.0, "phi_deg": 35.0},
-    {"alpha1_deg": -30.0, "alpha3_deg": 10.0, "r3_m": 1.0, "beta_deg": 2.0, "phi_deg": 45.0},
+    {
+        "alpha1_deg": -30.0, "alpha3_deg": 10.0, "r3_m": 1.0, "beta_deg": 2.0, "phi_deg": 45.0,
+        "pga_g": 0.6,
+    },
     {
         "alpha1_deg": 56.0, "alpha3_deg": 76.0, "r3_m": 0.7, "beta_deg": 22.0, "phi_deg": 30.0,
         "pga_g": 0.6,
@@ -102,6 +105,17 @@ SHAPES: list[dict[str, Any]] = [
         "displacement_m": 0.05,
     },
     {"s1_m": 1.0, "s2_m": 0.6, "gamma_deg": 70.0, "beta_deg": 10.0, "phi_deg": 40.0},
+    # topples under its back plane; without a motion of its own
+    {"s1_m": 0.5, "s2_m": 0.15, "gamma_deg": 95.0, "beta_deg": 5.0, "phi_deg": 25.0, "pga_g": 0.6},
+    {
+        "alpha1_deg": -40.0, "alpha3_deg": 20.0, "r3_m": 1.0, "beta_deg": 5.0, "phi_deg": 30.0,
+        "phi_back_deg": 26.0, "pga_g": 1.2, "magnitude": 7.0,
+    },
+    {
+        "s1_m": 0.5, "s2_m": 0.15, "gamma_deg": 95.0, "beta_deg": 5.0, "phi_deg": 25.0,
+        "pga_g": 0.6, "kind": "slumping",
+    },
+    {"s1_m": 0.5, "s2_m": 0.1, "gamma_deg": 115.0, "beta_deg": 0.0, "phi_deg": 40.0, "pga_g": 0.6},
     # uncertain, and suspicious
     {"height_m": 2.0, "width_m": 0.4, "phi_deg": 35.0, "kr_sigma": 0.2},
     {"height_m": 2.0, "width_m": 0.4, "phi_deg": 0.61, "displacement_m": 0.1},
@@ -124,6 +138,10 @@ BY_NUMBERS: list[dict[str, Any]] = [
     {"ks": 0.2, "ps2": 3.0, "pga_g": 0.6},
     {"ks": 0.1, "ps2": 8.0, "pga_g": 0.6, "magnitude": 7.0, "kind": "slumping"},
     {"ks": 0.2, "ps2": 3.0, "pga_g": 0.6, "ks_sigma": 0.2},
+    {"kct": 0.3, "pct2": 8.0, "pga_g": 0.6},
+    {"kct": 0.2, "pct2": 30.0, "pga_g": 0.6, "magnitude": 7.0, "kind": "confined_toppling"},
+    {"kct": 0.3, "pct2": 8.0, "pga_g": 0.6, "kct_sigma": 0.2},
+    {"kct": 0.3, "pct2": 8.0, "pga_g": 0.2},
     {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.0},
     {"p2": 3.0, "kr": 0.1, "pgv_m_s": 60.0},
     {"p2": 3.0, "kr": 6.0},
@@ -131,7 +149,7 @@ BY_NUMBERS: list[dict[str, Any]] = [
     {"p2": 0.0, "kr": 0.1},
     {"p2": 3.0, "kr": 0.1, "pgv_m_s": -1.0},
     {"ky": 0.2, "displacement_m": 0.1, "beta_deg": 89.0},
-    {"p2": 3.0, "kr": 0.1, "kind": "confined_toppling"},
+    {"p2": 3.0, "kr": 0.1, "kind": "confined_toppling", "pga_g": 0.6},
     {"ky": 0.1, "displacement_m": 0.1, "pgv_m_s": 0.7, "pga_g": 0.5, "magnitude": 7.0},
     {"ky": 0.1, "displacement_m": 0.1, "pgv_m_s": 0.7, "pga_g": 0.5, "arias_m_s": 3.0},
 ]
@@ -211,7 +229,7 @@ def test_there_are_sixty_questions_of_every_sort() -> None:
     assert len(QUESTIONS) >= 60
     answers = [expected_of(i) for i in range(len(QUESTIONS))]
     assert {told.kind for told in answers if told.numbers} == {
-        "toppling", "rocking", "sliding", "slumping",
+        "toppling", "rocking", "sliding", "slumping", "confined_toppling",
     }  # fmt: skip
     assert sum(not told.numbers for told in answers) > 10
 

@@ -10,7 +10,7 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,18 +53,19 @@ class BlockClass:
         return asdict(self)
 
 
-ROTATIONS_DEG: tuple[float | None, ...] = (2.0, None)
-"""Rotations that count as failure [deg]; None for failure past recovery."""
-
-RATIOS = np.geomspace(0.02, 0.95, 13)
-"""k/PGA of the outcome grid: the record is scaled to them."""
-
-
 class ScaledRecords(Sequences):
-    """The outcome grid of every block of a family and rotation that counts as failure."""
+    """The outcome grid of every block of a family and rotation that counts as failure.
 
-    options = ("rotations_deg", "family")
+    Attributes:
+        rotations_deg: the rotations where none are asked for [deg]; None for failure past
+            recovery, and alone where there is no other criterion.
+        ratios: k/PGA of the outcome grid: the record is scaled to them.
+    """
+
+    options: ClassVar[tuple[str, ...]] = ("family",)
     measure = "peak_rad"
+    rotations_deg: tuple[float | None, ...] = (None,)
+    ratios = np.geomspace(0.02, 0.95, 13)
 
     def __init__(self, kind: str, family: Sequence[BlockClass]) -> None:
         super().__init__(kind)
@@ -73,7 +74,7 @@ class ScaledRecords(Sequences):
     def cases(
         self,
         *,
-        rotations_deg: Sequence[float | None] = ROTATIONS_DEG,
+        rotations_deg: Sequence[float | None] | None = None,
         family: Sequence[BlockClass] | None = None,
     ) -> tuple[Case, ...]:
         """Return every block of the family with every rotation that counts as failure [deg].
@@ -83,7 +84,7 @@ class ScaledRecords(Sequences):
         """
         rotations = [
             None if value is None else positive(value, "rotation_deg", "degrees")
-            for value in rotations_deg
+            for value in (self.rotations_deg if rotations_deg is None else rotations_deg)
         ]
         each_once(rotations, "rotation_deg", for_none="recovery")
         blocks = self.family if family is None else family
@@ -96,7 +97,7 @@ class ScaledRecords(Sequences):
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
         """Return k/PGA to which the record is scaled."""
-        return RATIOS if measures.pga_g > 0.0 else np.empty(0)
+        return self.ratios if measures.pga_g > 0.0 else np.empty(0)
 
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest

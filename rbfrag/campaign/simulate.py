@@ -101,7 +101,8 @@ def simulate(
             failure past recovery; None for 2 and past recovery.
         displacements_m: sliding: displacements on a level plane [m]; None for 0.01, 0.05, 0.15
             and 0.3.
-        family: slumping: the blocks, as `rbfrag.campaign.kinds.slumping.FAMILY` has them.
+        family: slumping and confined_toppling: the blocks, as
+            `rbfrag.campaign.kinds.slumping.FAMILY` has them.
         restitution_factors: rocking: factors on the restitution of the rectangle, 1 - 1.5 sin² α
             (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
         vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
@@ -113,9 +114,9 @@ def simulate(
         full_map: map the intervals of k_r/PGA that fail and that do not, down to the limit.
         map_depth: width of k_r/PGA that the maps may leave undecided at a border; a map that is
             stored stays as it is.
-        sequence: sliding and slumping: run blocks under two motions, one after the other, and
-            return the conditional fragility; two shocks of one station where metadata state them,
-            and each other motion after a drawn one of another earthquake.
+        sequence: sliding, slumping and confined_toppling: run blocks under two motions, one after
+            the other, and return the conditional fragility; two shocks of one station where
+            metadata state them, and each other motion after a drawn one of another earthquake.
         seed: of the draws of a sequence.
         draws: how many first motions are drawn for each second one.
         jobs: worker processes; None for one per processor, 1 for none (in this process).

@@ -20,7 +20,7 @@ from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
-FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped"}
+FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_topple": "toppled"}
 """The limit state of a block by its mode."""
 
 """What becomes of such models."""

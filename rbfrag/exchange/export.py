@@ -159,7 +159,10 @@ def pelicun(
     return _answer(str(target), str(beside), result, (*request.remarks, *renamed))
 
 
-_FAILING = {"topple": "Toppling of", "slide": "Sliding of", "slump": "Slumping of"}
+_FAILING = {
+    "topple": "Toppling of", "slide": "Sliding of", "slump": "Slumping of",
+    "confined_topple": "Toppling under their back plane of",
+}  # fmt: skip
 
 
 class _Request(NamedTuple):

@@ -25,6 +25,7 @@ _STRENGTH = (
 _DESCRIPTIONS = {
     "p2": ("1/s²", _SIZE),
     "ps2": ("1/s²", "p_s², the squared frequency parameter of slumping at rest"),
+    "pct2": ("1/s²", "p_ct², the squared frequency parameter of confined toppling at rest"),
     "kr": ("", _STRENGTH),
     "ky": (
         "",
@@ -36,11 +37,16 @@ _DESCRIPTIONS = {
         "the block's yield acceleration coefficient of slumping (a block with k_s <= 0 slumps "
         "without an earthquake)",
     ),
+    "kct": (
+        "",
+        "the block's yield acceleration coefficient of confined toppling (a block with k_ct <= 0 "
+        "topples without an earthquake)",
+    ),
     "displacement_m": ("m", "the displacement that is too far in m, above 0"),
     "restitution": ("", "the speed after an impact over that before it, above 0 and up to 1"),
     **{
         f"{name}_sigma": ("", f"the standard deviation of ln {name}, 0 or more")
-        for name in ("p2", "ps2", "kr", "ky", "ks")
+        for name in ("p2", "ps2", "pct2", "kr", "ky", "ks", "kct")
     },
     "restitution_sigma": ("", "the standard deviation of the restitution, 0 or more"),
     "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
@@ -68,7 +74,7 @@ def _described(name: str) -> tuple[str, str]:
 
 
 _ABOVE_ZERO = {
-    **dict.fromkeys(("p2", "ps2", "displacement_m"), "block"),
+    **dict.fromkeys(("p2", "ps2", "pct2", "displacement_m"), "block"),
     **dict.fromkeys(("tm_s", "magnitude"), "earthquake"),
 }
 

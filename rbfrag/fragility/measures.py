@@ -286,6 +286,6 @@ CREDIBLE = {
     "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
     "kr": (0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
     "ky": (0.0, 5.0, _STEEP),
-    "ks": (0.0, 5.0, _STEEP),
+    **dict.fromkeys(("ks", "kct"), (0.0, 5.0, _STEEP)),
 }
 """Least and greatest credible value of a question, and what is said of others."""

@@ -99,4 +99,7 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     return (f"The block has {numbers}.", *limit, *stands)
 
 
-SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}
+SYMBOLS = {
+    "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",
+    "kct": "k_ct",
+}  # fmt: skip

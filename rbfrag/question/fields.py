@@ -188,6 +188,17 @@ class NumberFields(TypedDict, Generic[V], total=False):
     ps2: Annotated[
         V, Field("Slumping: frequency parameter p_s² at rest", "1/s²", (), "ps2_1_s2", above=0.0)
     ]
+    kct: Annotated[
+        V,
+        Field("Confined toppling: yield acceleration coefficient k_ct, with {pct2}", "", ("k_ct",)),
+    ]
+    pct2: Annotated[
+        V,
+        Field(
+            "Confined toppling: frequency parameter p_ct² at rest", "1/s²", (), "pct2_1_s2",
+            above=0.0,
+        ),
+    ]  # fmt: skip
 
 
 class FailureFields(TypedDict, Generic[V], total=False):
@@ -266,6 +277,8 @@ class ScatterFields(TypedDict, Generic[V], total=False):
     ky_sigma: Annotated[V, _scatter("ln k_y")]
     ks_sigma: Annotated[V, _scatter("ln k_s")]
     ps2_sigma: Annotated[V, _scatter("ln p_s²")]
+    kct_sigma: Annotated[V, _scatter("ln k_ct")]
+    pct2_sigma: Annotated[V, _scatter("ln p_ct²")]
     restitution_sigma: Annotated[V, _scatter("the restitution")]
 
 
@@ -313,8 +326,8 @@ class ShakingFields(TypedDict, Generic[V], total=False):
 
 
 _KIND = Field(
-    "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping "
-    "or sliding; default: what they are given by",
+    "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping, "
+    "confined_toppling or sliding; default: what they are given by",
     is_text=True,
 )
 

@@ -64,10 +64,11 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     (k >= PGA, say), P is 0 whatever the model says.
 
     A block is given by p2 and kr (it topples, or rocks if `kind` says so), by ky and displacement_m
-    (it slides further than that), by ks and ps2 (it slumps), or by its shape, dip and friction,
-    which tell how it fails; each is a number or an array. What is given with a standard deviation
-    is the median of what the block may be: P is then the mean over all that, with its interval,
-    and ``block_sd`` how much P differs among them. Strength and size are lognormal, a restitution
+    (it slides further than that), by ks and ps2 (it slumps), by kct and
+    pct2 (it topples confined), or by its shape, dip and friction, which tell how it fails; each is
+    a number or an array. What is given with a standard deviation is the median of what the block
+    may be: P is then the mean over all that, with its interval, and ``block_sd`` how much P differs
+    among them. Strength and size are lognormal, a restitution
     is normal, cut off at 0 and 1, and all are independent.
 
     The keywords:

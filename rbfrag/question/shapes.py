@@ -15,7 +15,7 @@ from rbfrag.question.fields import PlaneFields, column_of, declared, names_of
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
-from rbfrag.solver.stability.at_rest import rocking_at_rest, slump_at_rest
+from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 
 if TYPE_CHECKING:
@@ -75,6 +75,11 @@ COHESIVE = (
     "describe"
 )
 
+NO_UNIQUE_MOTION = (
+    "rigid bodies of this shape and friction have no unique motion: when the block starts is "
+    "known, and not how it moves"
+)
+
 STEEP = (
     "a block rocks about a corner whose critical angle is below 90 degrees: alpha3 - beta and "
     "beta - alpha1 are to be less"
@@ -97,6 +102,7 @@ _WEAKER = (
 _INSTEAD = {
     "slide": "; with displacement_m, kind sliding tells how likely it slides so many metres",
     "slump": "; kind slumping tells how likely it slumps",
+    "confined_topple": "; kind confined_toppling tells how likely it falls",
 }
 
 _RADIANS = "{name} is less than a rock's: angles are in degrees, is it in radians?"
@@ -262,8 +268,10 @@ def numbers_of_shape(
         return {"ky": k, "beta_deg": judged.beta_deg, "displacement_m": displacement_m, **stated}
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
-    if "ps2" in facts.parameters:
-        return {"ks": k, **numbers_of_slumps(judged, functions), **stated}
+    if facts.search_needs == "block":  # shape, friction and dip decide how it moves
+        p2 = p2_at_rest(judged, functions)
+        listener.refuse(p2 != p2, NO_UNIQUE_MOTION)
+        return {**dict(zip(facts.parameters, (k, p2), strict=True)), **stated}
     listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
     if stands_free_of(facts, judged.backed):
         listener.remark(True, NOT_BACKED)
@@ -288,15 +296,16 @@ def numbers_of_shape(
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
 
 
-def numbers_of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[str, Any]:
-    """Return what the model of slumping reads of shapes beside their yields, by field."""
+def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:
+    """Return p_s² of slumps, or p_ct² of confined topples [1/s²]; NaN where none is unique."""
     body = judged.body
+    slumps = judged.mode == "slump"
     trigonometry: Any = math
     if not isinstance(body, Block):
         import numpy as np
 
         trigonometry = np
-    elif body.lowest_on_back != body.heel:
+    elif slumps and body.lowest_on_back != body.heel:
         raise InputError(
             "slumping in time is known for blocks whose heel lies on the back plane: the corner at "
             "the heel of this outline is missing"
@@ -305,14 +314,14 @@ def numbers_of_slumps(judged: ModeShapes, functions: Elementwise[Any]) -> dict[s
         from rbfrag.solver.mechanism import shaken_mechanism
         from rbfrag.solver.models import model_of_mode
 
-        shaken = shaken_mechanism(
+        p2 = shaken_mechanism(
             model_of_mode(judged.mode), body, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
             phi_back_deg=judged.phi_back_deg,
-        )  # fmt: skip
-        return {"ps2": shaken.p2}
-    ps2 = slump_at_rest(
-        alpha1_deg=body.alpha1_deg, alpha3_deg=body.alpha3_deg, gamma_deg=body.gamma_deg,
-        r1_m=body.r1_m, r3_m=body.r3_m, beta_deg=judged.beta_deg, phi_deg=judged.phi_deg,
-        phi_back_deg=judged.phi_back_deg, functions=functions, trigonometry=trigonometry,
+        ).p2  # fmt: skip
+        return p2 if p2 > 0.0 else math.nan
+    return two_contacts_at_rest(
+        confined=not slumps, alpha1_deg=body.alpha1_deg, alpha3_deg=body.alpha3_deg,
+        gamma_deg=body.gamma_deg, r1_m=body.r1_m, r3_m=body.r3_m, beta_deg=judged.beta_deg,
+        phis_deg=(judged.phi_deg, judged.phi_back_deg), functions=functions,
+        trigonometry=trigonometry,
     )  # fmt: skip
-    return {"ps2": ps2}

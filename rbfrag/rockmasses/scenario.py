@@ -19,9 +19,10 @@ from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.question import predict
-from rbfrag.question.shapes import ModeShapes, numbers_of_slumps
+from rbfrag.question.shapes import ModeShapes, p2_at_rest
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
+from rbfrag.solver.kinds import kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
@@ -132,9 +133,9 @@ def scenario(
 
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
     fragility model. With `displacement_m` a stable block that slides has the probability of
-    sliding further than that, and one that slumps that of slumping past recovery, unless its base
-    has cohesion: that bond breaks at the first slip. All others have no answer and are left out of
-    every average; the answer says how many they are.
+    sliding further than that, and one that slumps or topples confined that of failing past
+    recovery, unless its base has cohesion: that bond breaks at the first slip. All others have no
+    answer and are left out of every average; the answer says how many they are.
 
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
@@ -199,9 +200,7 @@ def scenario(
             others[mode] = answers.model
             fill(blocks, answers)
         # their models exist, but not for a bond
-        modelled |= {
-            m for m in ("slide", "slump") if np.any(realisations.of_mode(m) & (reason == BONDED))
-        }
+        modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & (reason == BONDED))}
 
     covered = np.isfinite(probability)
     modes = []
@@ -255,11 +254,11 @@ def _other_modes(
     level: float,
     db: str | PathLike[str] | None,
 ) -> Iterator[tuple[ModeName, NDArray[np.bool_], PredictionArray]]:
-    """Yield, for sliding and for slumping, which blocks a model answers for, and its answers."""
+    """Yield, for all modes but toppling, which blocks a model answers for, and its answers."""
     distance = positive(displacement_m, "displacement_m", "m")
     if "pgv_m_s" not in measures:
         raise InputError(
-            "models of sliding and slumping read PGV: give pgv_m_s too", fields=("pgv_m_s",)
+            "models of other modes than toppling read PGV: give pgv_m_s too", fields=("pgv_m_s",)
         )
     motion: dict[str, Any] = {
         name: measures[name]
@@ -267,22 +266,24 @@ def _other_modes(
         if name in measures
     }
     k, beta_deg = realisations.stability.yield_acceleration, realisations.beta_deg
-    with np.errstate(all="ignore"):
-        own = numbers_of_slumps(
-            ModeShapes(
-                realisations.blocks, "slump", k, beta_deg, realisations.phi_deg,
-                realisations.phi_back_deg, False, backed=True,
-            ),
-            array_elementwise(),
-        )["ps2"]  # fmt: skip
     described = (k > 0.0) & ~realisations.bonded
     slides = realisations.of_mode("slide", "stable") & described
-    slumps = realisations.of_mode("slump", "stable") & described & np.isfinite(own)
     slide = {"ky": k[slides], "beta_deg": beta_deg[slides], "displacement_m": distance}
-    slump = {"ks": k[slumps], "ps2": own[slumps], "rotation_deg": rotation_deg}
-    questions: tuple[tuple[ModeName, NDArray[np.bool_], dict[str, Any]], ...] = (
-        ("slide", slides, slide), ("slump", slumps, slump),
-    )  # fmt: skip
+    questions: list[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]] = [("slide", slides, slide)]
+    criteria: dict[ModeName, dict[str, Any]] = {"slump": {"rotation_deg": rotation_deg}}
+    if rotation_deg is None:
+        criteria["confined_topple"] = {}
+    for mode, criterion in criteria.items():
+        shapes = ModeShapes(
+            realisations.blocks, mode, k, beta_deg, realisations.phi_deg,
+            realisations.phi_back_deg, False, backed=True,
+        )  # fmt: skip
+        with np.errstate(all="ignore"):
+            p2 = p2_at_rest(shapes, array_elementwise())
+        moves = realisations.of_mode(mode, "stable") & described & np.isfinite(p2)
+        names = kind_of_mode(mode).parameters
+        numbers = zip(names, (k[moves], p2[moves]), strict=True)
+        questions.append((mode, moves, {**dict(numbers), **criterion}))
     for mode, chosen, block in questions:
         if chosen.any():
             answers = predict(**block, **motion, level=level, db=db)
@@ -307,11 +308,12 @@ def _average(
     )
 
 
-NO_MODEL = ", because there is no fragility model for this mode"
+_FOR_SLIDES = ": displacement_m, how far is too far for slides [m], gives them one"
 
-UNANSWERED = {
+UNANSWERED: Mapping[ModeName, str] = {
     "slide": ": displacement_m, how far is too far [m], gives them one",
-    "slump": ": displacement_m, how far is too far for slides [m], gives them one",
+    "slump": _FOR_SLIDES,
+    "confined_topple": f"{_FOR_SLIDES}, of failure past recovery alone",
 }
 """What gives an answer to blocks of a mode that has none."""
 
@@ -321,7 +323,7 @@ def _warnings(
 ) -> list[str]:
     warnings = [
         f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
-        + ("" if mode in modelled else UNANSWERED.get(mode, NO_MODEL))
+        + ("" if mode in modelled else UNANSWERED[mode])
         for mode, share in missing.items()
     ]
     texts, counts = np.unique(reason.astype(str), return_counts=True)

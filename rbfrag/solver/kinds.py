@@ -54,7 +54,9 @@ _SCALED = ("block", *PLANES, "rotation_deg", "scan_ratio", "bracket")
 KINDS = {
     facts.kind: facts
     for facts in (
-        KindFacts("confined_toppling", "confined_topple", (), False, (), "block", _SCALED),
+        KindFacts(
+            "confined_toppling", "confined_topple", ("kct", "pct2"), False, (), "block", _SCALED,
+        ),
         KindFacts(
             "rocking", "topple", ("p2", "kr"), True, ("restitution",),
             no_search="what overturns a free-standing block is no interval of k_r (up to 122 "

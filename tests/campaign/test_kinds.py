@@ -16,7 +16,7 @@ from benchmarks.database_content import table_rows_by_natural_key
 from rbfrag.campaign.kind import CaseRequest
 from rbfrag.campaign.kinds.slumping import CAMPAIGN, FAMILY
 from rbfrag.campaign.resimulate import resimulate
-from rbfrag.campaign.scaled_records import RATIOS, BlockClass
+from rbfrag.campaign.scaled_records import BlockClass, ScaledRecords
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
@@ -101,7 +101,7 @@ def test_slumps_are_stored_as_respond_follows_them(place: str) -> None:
                     .where(schema.simulation.c.combination_id == row["id"])
                     .order_by(schema.simulation.c.grid)
                 ).all()
-            assert [point.kr_over_pga for point in points] == list(RATIOS)
+            assert [point.kr_over_pga for point in points] == list(ScaledRecords.ratios)
             block = BlockClass(**json.loads(row["block"]))
             rotation = json.loads(row["settings"])["rotation_deg"]
             for point in points[::3]:
@@ -270,7 +270,10 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"kind": "slumping", "rotations_deg": ()}, "the list is empty"),
         ({"kind": "slumping", "rotations_deg": (2.0, 2.0)}, "2 is in the list twice"),
         ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
-        ({"kind": "confined_toppling"}, "campaigns are of rocking, sliding, slumping, toppling"),
+        (
+            {"kind": "confined_toppling", "rotations_deg": (2.0,)},
+            "rotations_deg goes with kind slumping, not with confined_toppling",
+        ),
         ({"kind": "sliding", "jobs": 0}, "at least 1"),
         ({"kind": "sliding", "full_map": True}, "full_map goes with kind toppling"),
         ({"kind": "slumping", "p2": (1.0,)}, "p2 goes with kind rocking or topp"),

@@ -211,7 +211,6 @@ def test_damage_is_found(database: Path, values: dict[str, str], problem: str) -
     [
         ({"kind": "toppling"}, f"sequence does not go with kind toppling: {STARTS_ANEW}"),
         ({"kind": "rocking"}, f"sequence does not go with kind rocking: {STARTS_ANEW}"),
-        ({"kind": "confined_toppling"}, "campaigns are of"),
         ({"vertical": "both"}, "vertical does not go with sequence"),
         ({"p2": (3.0,)}, "p2 goes with kind rocking or toppling"),
         ({"draws": 0}, "draws must be at least 1, not 0"),

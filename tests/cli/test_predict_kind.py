@@ -76,7 +76,21 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "ky does not go with kind toppling"),
         (
             ("--kind", "confined_toppling", "--p2", "3", "--kr", "1", *MOTION),
-            "no confined_toppling model",
+            "kind confined_toppling reads --kct and --pct2",
+        ),
+        (
+            (
+                "--kind",
+                "confined_toppling",
+                "--kct",
+                "0.3",
+                "--pct2",
+                "8",
+                "--rotation",
+                "2",
+                *MOTION,
+            ),
+            "rotation",
         ),
         (
             ("--kind", "slumping", "--ks", "0.1", "--ps2", "3", "--rotation", "7", *MOTION),

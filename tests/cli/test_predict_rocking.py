@@ -126,9 +126,3 @@ def test_block_names_the_command_for_a_block_that_stands_free(
     assert "predict and respond answer with --kind rocking" in refuses(*shape)
     warned = shell.json(*shape, "--phi", "40")["warnings"]
     assert any("rbfrag predict --kind rocking" in text for text in warned)
-
-
-def test_where_no_campaign_makes_a_model_none_is_suggested(refuses: Refuses) -> None:
-    message = refuses("predict", "--kind", "confined_toppling", "--p2", "3", "--kr", "1", *MOTION)
-    assert "rbfrag simulate" not in message
-    assert "there are models of" in message

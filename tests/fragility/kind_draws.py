@@ -1,4 +1,4 @@
-"""Blocks that slide or slump exactly as a formula says; slides of less than 1 mm are censored."""
+"""Blocks that fail exactly as a formula says; slides of less than 1 mm are censored."""
 
 from __future__ import annotations
 
@@ -21,8 +21,14 @@ TRUE = {
     ("sliding", "pgv_pga_ia"): (-0.9, 1.1, 2.9, 0.7, -0.9, 1.4),
     ("slumping", "pgv_pga_m"): (1.2, 3.0, 2.5, 1.2, 0.5),
     ("slumping", "pgv_pga"): (1.2, 3.0, 2.5, 1.2),
+    ("confined_toppling", "pgv_pga_m"): (1.1, 2.6, 2.2, 0.4, 0.2),
+    ("confined_toppling", "pgv_pga"): (1.2, 2.6, 2.3, 0.4),
 }
-METHOD_OF = {"sliding": method_named("displacement"), "slumping": method_named("capacity")}
+METHOD_OF = {
+    "sliding": method_named("displacement"),
+    "slumping": method_named("capacity"),
+    "confined_toppling": method_named("confined"),
+}
 
 
 def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
@@ -58,7 +64,7 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
     ratio = np.tile(np.geomspace(0.02, 0.95, 6), (n, 1))
     scaled = ks[:, None] / ratio
     values = {
-        "ks": ks[:, None],
+        METHOD_OF[kind].block.strength: ks[:, None],
         "p": np.sqrt(ps2)[:, None],
         "pga_g": scaled,
         "pgv_m_s": scaled * (pulse * STANDARD_GRAVITY_M_S2)[:, None],

@@ -41,8 +41,9 @@ def questions(model: FragilityModel, seed: int = 5) -> dict[str, FloatArray]:
     period = between(0.1, 2.0)
     pgv = pga * G * period / (2.0 * np.pi) * between(0.6, 1.6)
     values = {
-        "p2": between(0.1, 30.0), "ps2": between(0.1, 30.0), "displacement_m": between(0.01, 1.0),
-        **dict.fromkeys(("kr", "ky", "ks"), between(*KR)),
+        "p2": between(0.1, 30.0), "ps2": between(0.1, 30.0), "pct2": between(0.1, 60.0),
+        "displacement_m": between(0.01, 1.0),
+        **dict.fromkeys(("kr", "ky", "ks", "kct"), between(*KR)),
         "pga_g": pga, "pgv_m_s": pgv, "tm_s": period, "magnitude": random.uniform(5.0, 8.0, (N, 1)),
         "pgd_m": pgv * period / 6.0 * between(1.2, 6.0), "xp_m_s": pgv * between(0.4, 1.6),
         "arias_m_s": pgv * pgv * between(2.0, 60.0),

@@ -1,4 +1,4 @@
-"""Rock masses in which blocks that slide or slump are answered for too."""
+"""Rock masses in which blocks that do not topple freely are answered for too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbfrag.rockmasses.scenario import Scenario, scenario
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
-from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE
+from rbfrag.solver.stability.modes import CONFINED_TOPPLE, SLIDE, SLUMP, STABLE
 
 TABLE_3_4 = {
     "base.dip_deg": {"distribution": "normal", "mean": 20.0, "sd": 5.0},
@@ -70,6 +70,29 @@ def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
         slump = predict(ks=shaken.yield_g, ps2=shaken.p2, pgv_m_s=0.6, pga_g=0.7)
         assert answer.probability[i] == pytest.approx(slump.probability, rel=1e-9, abs=1e-12)
         assert answer.in_domain[i] == slump.in_domain
+
+
+def test_confined_topples_are_answered_as_one_by_one() -> None:
+    made = RockMass.of({
+        "base.dip_deg": 5.0, "back.dip_deg": {"distribution": "normal", "mean": 104.0, "sd": 3.0},
+        "base.spacing_m": 0.5, "back.spacing_m": 0.15, "friction.phi_deg": 28.0,
+    }).realise(40, 3)  # fmt: skip
+    motion = {"pgv_m_s": 0.6, "pga_g": 0.7}
+    answer = scenario(made, motion, displacement_m=0.05)
+    found = made.stability
+    chosen = (found.mode_code == CONFINED_TOPPLE) & (found.state_code == STABLE)
+    assert chosen.sum() > 0
+    for i in np.flatnonzero(chosen)[:4].tolist():
+        one = predict(
+            s1_m=float(made.s1_m[i]), s2_m=float(made.s2_m[i]), gamma_deg=float(made.gamma_deg[i]),
+            beta_deg=float(made.beta_deg[i]), phi_deg=float(made.phi_deg[i]), **motion,
+        )  # fmt: skip
+        assert one.kind == "confined_toppling"
+        assert answer.probability[i] == pytest.approx(one.probability, rel=1e-9, abs=1e-12)
+    # of a rotation there is no model
+    turned = scenario(made, motion, displacement_m=0.05, rotation_deg=2.0)
+    assert np.isnan(turned.probability[chosen]).all()
+    assert any("of failure past recovery alone" in text for text in turned.warnings)
 
 
 def test_a_longer_distance_is_reached_by_fewer(answer: Scenario) -> None:

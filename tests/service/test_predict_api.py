@@ -62,6 +62,7 @@ def test_every_kind_is_answered_and_lists_of_it(client):
     for block, kind in (
         ({"ky": 0.1, "displacement": 0.05, "beta": 10}, "sliding"),
         ({"ks": 0.1, "ps2": 3.0, "rotation": 2}, "slumping"),
+        ({"kct": 0.2, "pct2": 8.0}, "confined_toppling"),
     ):
         one = client.get("/v1/predict", params={**block, "pgv": 0.4, "pga": 0.5}).json()
         assert one["kind"] == kind

@@ -25,4 +25,12 @@ FAMILY = tuple(
 )
 """Three shapes, three pairs of dip and friction, two sizes."""
 
-CAMPAIGN = ScaledRecords("slumping", FAMILY)
+
+class SlumpingCampaign(ScaledRecords):
+    """The outcome grid of every block of a family and rotation that counts as failure."""
+
+    options = ("rotations_deg", "family")
+    rotations_deg = (2.0, None)
+
+
+CAMPAIGN = SlumpingCampaign("slumping", FAMILY)

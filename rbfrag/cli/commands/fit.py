@@ -60,9 +60,10 @@ def fit(
     ),
     data: Data,
     kind: str = option(
-        "What the blocks do: toppling; slumping, on pgv_pga and pgv_pga_m (with magnitude); "
-        "sliding, on these, pgv and pgv_pga_ia; rocking (free-standing), on pgv, pgv_pga, sa10, "
-        "pga_sa10, pga_m and those of sa10_sa30; or another kind that campaigns store.",
+        "What the blocks do: toppling; slumping and confined_toppling, on pgv_pga and pgv_pga_m "
+        "(with magnitude); sliding, on these, pgv and pgv_pga_ia; rocking (free-standing), on pgv, "
+        "pgv_pga, sa10, pga_sa10, pga_m and those of sa10_sa30; or another kind that campaigns "
+        "store.",
         "toppling",
     ),
     rotation: float | None = option(
@@ -73,7 +74,7 @@ def fit(
         "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
         "dissertation's), lognormal (with censored motions). Of outcomes: logistic, "
         "bounded; of outcomes on xp: record. Default: wls. Sliding: displacement; "
-        "slumping: capacity; rocking: overturning.",
+        "slumping: capacity; confined_toppling: confined; rocking: overturning.",
         show_default=False,
     ),
     free_m: bool = option(

@@ -43,9 +43,10 @@ class BatchOptions:
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns p2_1_s2 and kr (or "
-        "height_m and width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, "
-        "p2_sigma, kr_sigma and the like, and any of pgv_m_s, sa03_g, sa10_g, sa30_g, "
-        "pga_g, tm_s, pgd_m, arias_m_s, magnitude; what is the same for all rows may be an option.",
+        "height_m and width_m; or ky and displacement_m; or ks and ps2_1_s2; or kct and "
+        "pct2_1_s2), restitution, p2_sigma, kr_sigma and the like, and any of pgv_m_s, sa03_g, "
+        "sa10_g, sa30_g, pga_g, tm_s, pgd_m, arias_m_s, magnitude; what is the same for all rows "
+        "may be an option.",
         word=("--blocks", "--batch"),
         metavar="FILE",
     )

@@ -139,7 +139,7 @@ def respond(
             PlaneFields,
             ScatterFields,
             WholeFields,
-            without=("kind", "ks_sigma", "ps2_sigma"),
+            without=("kind", "ks_sigma", "ps2_sigma", "kct_sigma", "pct2_sigma"),
         ),
     ],
     model: Model,

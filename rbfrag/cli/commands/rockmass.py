@@ -101,7 +101,7 @@ class LimitOptions:
 
     displacement: float | None = option(
         "A slide fails beyond this displacement [m]. Default with --motion: 0.05. With "
-        "--pgv, blocks that slide or slump are answered for where it is given."
+        "--pgv, blocks that do not topple freely are answered for where it is given."
     )
     rotation: float | None = option(
         "A slump, or a topple against the back plane, fails beyond this rotation [deg]. "

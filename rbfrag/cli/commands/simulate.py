@@ -71,8 +71,8 @@ class Sequence:
     """Two motions, one after the other."""
 
     sequence: bool = option(
-        "Sliding and slumping: run blocks under two motions, one after the other, and print the "
-        "conditional fragility.",
+        "Sliding, slumping, confined_toppling: run blocks under two motions, one after the other, "
+        "and print the conditional fragility.",
         False,
     )
     seed: int = option("With --sequence: seed of the pairs that are drawn.", 1)
@@ -117,7 +117,9 @@ def simulate(
     *,
     workers: WorkerOptions,
     suite: options.Suite = None,
-    kind: str = option("What the blocks do: toppling, rocking, slumping or sliding.", "toppling"),
+    kind: str = option(
+        "What the blocks do: toppling, rocking, slumping, confined_toppling or sliding.", "toppling"
+    ),
     blocks: BlockOptions,
     stored: StorageOptions,
     sequence: Sequence,
@@ -128,10 +130,10 @@ def simulate(
 
     A combination is a motion, without or with its vertical one, in one polarity, and a block. Of
     toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
-    slumping, the outcomes of a documented family of blocks under scaled records, each followed to
-    its end; with --kind sliding, the strengths that slide stated displacements; with --kind
-    rocking, the outcomes of a grid of free-standing blocks, which have no critical one, in one
-    polarity.
+    slumping or confined_toppling, the outcomes of a documented family of blocks under scaled
+    records, each followed to its end; with --kind sliding, the strengths that slide stated
+    displacements; with --kind rocking, the outcomes of a grid of free-standing blocks, which have
+    no critical one, in one polarity.
 
     With --sequence, sliding and slumping blocks under two motions, the second of which finds them
     where the first has left them: two shocks of one station where the metadata state them, and each

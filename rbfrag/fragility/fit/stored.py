@@ -32,9 +32,10 @@ def fit(
         method: method of fitting (docs/theory/fragility.md). Blocks known by p² and k_r: ``wls``
             and ``lognormal`` (of critical values, for a term that is one number), ``logistic`` (of
             outcomes, the same terms), ``bounded`` (of outcomes, the terms with PGV or PGA) and
-            ``record`` (``xp``). Sliding: ``displacement``; slumping: ``capacity`` (``pgv`` and
-            ``pgv_pga``); rocking: ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``,
-            or the only one that there is for the kind.
+            ``record`` (``xp``). Sliding: ``displacement``; slumping: ``capacity``;
+            confined_toppling: ``confined`` (both ``pgv_pga`` and ``pgv_pga_m``); rocking:
+            ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``, or the only one that
+            there is for the kind.
         suite: suite of motions to fit; None for all motions.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind

@@ -1,4 +1,4 @@
-"""The method ``capacity``: what slumping blocks did under scaled records, probit.
+"""The method ``capacity``: what slumping blocks did under scaled records, probit; and ``confined``.
 
     P = Φ(eta), 0 from r = 1 on
 
@@ -6,7 +6,8 @@
     pgv_pga     the same without M
 
 r = k_s/PGA, z = p_s PGV/(PGA g). P falls with k_s where b3 < b1: the slope of eta by ln k_s is
-b3 - b1/(1 - r). It rises where all measures rise together: z stays and r falls.
+b3 - b1/(1 - r). It rises where all measures rise together: z stays and r falls. Of confined
+toppling (:mod:`rbfrag.fragility.methods.confined`) k_ct and p_ct stand for k_s and p_s.
 """
 
 from __future__ import annotations
@@ -29,32 +30,6 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 MIDDLE_MAGNITUDE = 6.5
 
-BLOCK = BlockParameters(
-    ("ks", "ps2"),
-    "slumping",
-    "ks",
-    "ps2",
-    Bound(
-        lambda v: v["ks"] >= v["pga_g"],
-        "ks",
-        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
-    ),
-    criterion="rotation_deg",
-    points="scaled_records",
-)
-"""Blocks known by the yield acceleration coefficient k_s and p_s² at rest [1/s²]."""
-
-
-def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    r = v["ks"] / v["pga_g"]
-    z = v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
-    return linear(b, 1.0, ns.log((1.0 - r) / r), ns.log(z), ns.log(v["ks"]))
-
-
-def _pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    features = _pgv_pga(b, v, ns).slopes
-    return linear(b, *features, v["magnitude"] - MIDDLE_MAGNITUDE)
-
 
 def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
     if rotation is None:
@@ -64,16 +39,53 @@ def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
 
 _PARAMETERS = ("b0", "b_ln_excess", "b_ln_z", "b_ln_k")
 
-METHOD = Method(
-    name="capacity",
-    block=BLOCK,
-    link=NORMAL,
-    forms={
-        "pgv_pga_m": Form((*_PARAMETERS, "b_m"), _pgv_pga_m, 0, (BLOCK.at_rest,)),
-        "pgv_pga": Form(_PARAMETERS, _pgv_pga, 0, (BLOCK.at_rest,)),
-    },
-    reads="outcomes",
-    meaning="probability that the block slumps past recovery, or by the rotation asked for",
-    fit=fits.outcomes,
-    failure=_failure,
+
+def capacity_method(
+    name: str, kind: str, numbers: tuple[str, str], moves: str, *, criterion: str | None = None
+) -> Method:
+    """Return the method for blocks of a kind that are followed under scaled records.
+
+    Args:
+        numbers: names of the yield acceleration coefficient and of p² at rest [1/s²].
+        moves: what such a block does that fails.
+        criterion: name of the criterion of failure, if there are several.
+    """
+    strength, size = numbers
+    at_rest = Bound(
+        lambda v: v[strength] >= v["pga_g"],
+        strength,
+        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
+    )
+
+    def pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+        r = v[strength] / v["pga_g"]
+        z = v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
+        return linear(b, 1.0, ns.log((1.0 - r) / r), ns.log(z), ns.log(v[strength]))
+
+    def pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+        return linear(b, *pgv_pga(b, v, ns).slopes, v["magnitude"] - MIDDLE_MAGNITUDE)
+
+    return Method(
+        name=name,
+        block=BlockParameters(
+            numbers, kind, strength, size, at_rest, criterion=criterion, points="scaled_records"
+        ),
+        link=NORMAL,
+        forms={
+            "pgv_pga_m": Form((*_PARAMETERS, "b_m"), pgv_pga_m, 0, (at_rest,)),
+            "pgv_pga": Form(_PARAMETERS, pgv_pga, 0, (at_rest,)),
+        },
+        reads="outcomes",
+        meaning=f"probability that the block {moves}",
+        fit=fits.outcomes,
+        failure=_failure,
+    )
+
+
+METHOD = capacity_method(
+    "capacity",
+    "slumping",
+    ("ks", "ps2"),
+    "slumps past recovery, or by the rotation asked for",
+    criterion="rotation_deg",
 )

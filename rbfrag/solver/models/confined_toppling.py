@@ -180,7 +180,7 @@ def _fallen(exit: Exit) -> Ending:
 
 
 class ConfinedToppling(ScaledKind):
-    """Toppling between a back plane and the base; no fragility of it is fitted."""
+    """Toppling between a back plane and the base."""
 
     yield_name = "kct"
 

@@ -1,4 +1,4 @@
-"""What predictions read of blocks that slump, and of blocks that stand free, as they rest.
+"""What predictions read of blocks on two sliding contacts, and of free ones, as they rest.
 
 Formulas for single numbers and for arrays; no numpy is loaded for a single number.
 """
@@ -12,55 +12,75 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.formulas import Elementwise, N, corner_distance, moments_about_corners
 
 
-def slump_at_rest(
+def two_contacts_at_rest(
     *,
+    confined: bool,
     alpha1_deg: N,
     alpha3_deg: N,
     gamma_deg: N,
     r1_m: N,
     r3_m: N,
     beta_deg: N,
-    phi_deg: N,
-    phi_back_deg: N,
+    phis_deg: tuple[N, N],
     functions: Elementwise[N],
     trigonometry: Any,
 ) -> N:
     """Return p_s² of parallelograms at rest [1/s²].
 
-    p_s² = g (F_y cos β - F_x sin β)/D with the contact forces of a slump that starts
-    (docs/theory/slumping.md); NaN where there is none.
+    p_s² = g (F_y cos β - F_x sin β)/D with the contact forces of a slump, or a confined topple,
+    that starts (docs/theory/slumping.md, docs/theory/confined-toppling.md); NaN where there is
+    none.
 
     Args:
+        confined: whether they topple confined, instead of slumping.
         alpha1_deg: angle of the heel [deg].
         alpha3_deg: angle of the toe [deg].
         gamma_deg: dip of the back plane less dip of the base [deg].
         r1_m: distance from centroid to heel [m].
         r3_m: distance from centroid to toe [m].
         beta_deg: dip of the base [deg].
-        phi_deg: friction angle of the base [deg].
-        phi_back_deg: friction angle of the back plane [deg].
+        phis_deg: friction angles of the base and of the back plane [deg].
         functions: the functions for this kind of number.
         trigonometry: what has its ``sin``, ``cos`` and ``radians``: math, or numpy.
     """
     where, sin, cos = functions.where, trigonometry.sin, trigonometry.cos
     a1, a3, gamma, beta, phi1, phi2 = (
         trigonometry.radians(angle)
-        for angle in (alpha1_deg, alpha3_deg, gamma_deg, beta_deg, phi_deg, phi_back_deg)
+        for angle in (alpha1_deg, alpha3_deg, gamma_deg, beta_deg, *phis_deg)
     )
-    # L_h, A, B, F, C' and D of docs/theory/slumping.md at rest, in this order
-    back_edge = 2.0 * r1_m * cos(a1) / sin(gamma)
-    on_base = r3_m * sin(a3 + gamma - phi2)
-    on_back = r1_m * sin(a1 - phi1)
-    force_x = -on_base * sin(phi1) + on_back * sin(gamma - phi2)
-    force_y = on_base * cos(phi1) + on_back * cos(gamma - phi2)
-    path_x = back_edge / sin(gamma) - r1_m * cos(a1)
-    path_y = -r1_m * sin(a1)
+    pulls = gamma + phi2 if confined else gamma - phi2
+    arms = _confined_arms if confined else _slump_arms
+    on_base, on_back, path_x, path_y = arms(
+        (a1, r1_m), (a3, r3_m), gamma, phi1, pulls, sin=sin, cos=cos
+    )
+    force_x = -on_base * sin(phi1) + on_back * sin(pulls)
+    force_y = on_base * cos(phi1) + on_back * cos(pulls)
     inertia_m2 = (r1_m * r1_m + r3_m * r3_m) / 6.0
-    inertia = force_y * path_x - force_x * path_y + inertia_m2 * sin(gamma + phi1 - phi2)
+    inertia = force_y * path_x - force_x * path_y + inertia_m2 * sin(pulls + phi1)
     pull = STANDARD_GRAVITY_M_S2 * (force_y * cos(beta) - force_x * sin(beta))
     turns = (inertia > 0.0) & (pull > 0.0)
     p2: N = where(turns, pull / where(turns, inertia, 1.0), math.nan)
     return p2
+
+
+def _slump_arms(
+    heel: tuple[N, N], toe: tuple[N, N], gamma: N, phi1: N, pulls: N, *, sin: Any, cos: Any
+) -> tuple[N, N, N, N]:
+    """Return A, B and C' of docs/theory/slumping.md at rest."""
+    (a1, r1_m), (a3, r3_m) = heel, toe
+    back_edge = 2.0 * r1_m * cos(a1) / sin(gamma)
+    path_x = back_edge / sin(gamma) - r1_m * cos(a1)
+    return r3_m * sin(a3 + pulls), r1_m * sin(a1 - phi1), path_x, -r1_m * sin(a1)
+
+
+def _confined_arms(
+    heel: tuple[N, N], toe: tuple[N, N], gamma: N, phi1: N, pulls: N, *, sin: Any, cos: Any
+) -> tuple[N, N, N, N]:
+    """Return A, B and C' of docs/theory/confined-toppling.md at rest."""
+    (a1, r1_m), (a3, r3_m) = heel, toe
+    base_edge = r3_m * sin(a3) - r1_m * sin(a1)
+    path_x = r3_m * cos(a3) - base_edge * cos(gamma) / sin(gamma)
+    return r1_m * sin(a1 + pulls), r3_m * sin(phi1 - a3), path_x, r3_m * sin(a3)
 
 
 def rocking_at_rest(

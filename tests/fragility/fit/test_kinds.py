@@ -135,7 +135,7 @@ def test_what_does_not_go_together_is_refused() -> None:
     source = drawn("sliding", "pgv_pga", n=100)
     with pytest.raises(InputError, match="unknown kind 'falling'"):
         fit(source, kind="falling", term="pgv")
-    with pytest.raises(InputError, match="no fragility model of kind confined_toppling"):
+    with pytest.raises(InputError, match=r"method confined does not go with the term pgv:"):
         fit(source, kind="confined_toppling", term="pgv")
     with pytest.raises(InputError, match=r"wls fits blocks known by p2 and kr.*by displacement"):
         fit(source, kind="sliding", term="pgv", method="wls")

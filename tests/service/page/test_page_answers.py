@@ -274,8 +274,14 @@ def test_a_free_standing_rectangle_says_what_it_is_taken_as(open_page, ask):
             "Probability of failure past recovery",
             "ks = 0.202 g",
         ),
+        (
+            {"s1": 0.5, "s2": 0.15, "gamma": 95, "beta": 5, "phi": 25, "pga": 0.6},
+            {"kind": "confined_toppling"},
+            "Probability of failure past recovery",
+            "kct = 0.202 g",
+        ),
     ],
-    ids=["sliding", "slumping"],
+    ids=["sliding", "slumping", "confined_toppling"],
 )
 def test_blocks_that_slide_or_slump_have_answers(open_page, ask, shape, kind, title, numbers):
     query = "&".join(f"{name}={value}" for name, value in {**shape, "pgv": 0.8}.items())

@@ -85,13 +85,15 @@ export function showAnswer(answer) {
  * @param {any} found answer of /v1/drawing
  */
 export function sayOfBlock({ shape, values }, { numbers }) {
-  const { p2, kr, ky, ks, ps2 } = numbers;
+  const { p2, kr, ky, ks, ps2, kct, pct2 } = numbers;
   const strength =
     kr !== undefined
       ? `p²${IS}${quantity(p2, "1/s²")} and k_r${IS}${quantity(kr, "g")}`
       : ky !== undefined
         ? `k_y${IS}${quantity(ky, "g")}`
-        : `p_s²${IS}${quantity(ps2, "1/s²")} and k_s${IS}${quantity(ks, "g")}`;
+        : ks !== undefined
+          ? `p_s²${IS}${quantity(ps2, "1/s²")} and k_s${IS}${quantity(ks, "g")}`
+          : `p_ct²${IS}${quantity(pct2, "1/s²")} and k_ct${IS}${quantity(kct, "g")}`;
   const verb = ky === undefined ? "follow" : "follows";
   const rough = shape === "rectangle" && values.phi === "" ? ", and rough enough not to slide" : "";
   const stands = `The block is taken as ${values.kind ? "free-standing" : "backed by a slope"}${rough}`;

@@ -21,7 +21,13 @@ export function percent(p) {
 }
 
 /** What blocks do, by the kind of an answer. */
-const VERBS = { toppling: "topple", rocking: "overturn", sliding: "slide too far", slumping: "slump" };
+const VERBS = {
+  toppling: "topple",
+  rocking: "overturn",
+  sliding: "slide too far",
+  slumping: "slump",
+  confined_toppling: "topple",
+};
 
 /**
  * What a block does that fails as an answer says.

@@ -1,35 +1,42 @@
-"""The frequency parameter of many slumps at once, against the mechanism of each."""
+"""The frequency parameter of many blocks on two contacts at once, against each mechanism."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rbfrag.campaign.kinds.slumping import FAMILY
+from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
-from rbfrag.solver.stability.at_rest import slump_at_rest
+from rbfrag.solver.stability.at_rest import two_contacts_at_rest
 
 
-def test_it_is_that_of_the_mechanism() -> None:
-    blocks = [each.block for each in FAMILY]
-    p2 = slump_at_rest(
+@pytest.mark.parametrize("kind", ["slumping", "confined_toppling"])
+def test_it_is_that_of_the_mechanism(kind: str) -> None:
+    campaign: Any = campaign_of_kind(kind)
+    blocks = [each.block for each in campaign.family]
+    p2 = two_contacts_at_rest(
+        confined=kind == "confined_toppling",
         alpha1_deg=np.array([b.alpha1_deg for b in blocks]),
         alpha3_deg=np.array([b.alpha3_deg for b in blocks]),
         gamma_deg=np.array([b.gamma_deg for b in blocks]),
         r1_m=np.array([b.r1_m for b in blocks]),
         r3_m=np.array([b.r3_m for b in blocks]),
-        beta_deg=np.array([each.beta_deg for each in FAMILY]),
-        phi_deg=np.array([each.phi_deg for each in FAMILY]),
-        phi_back_deg=np.array([each.phi_deg - 4.0 for each in FAMILY]),
+        beta_deg=np.array([each.beta_deg for each in campaign.family]),
+        phis_deg=(
+            np.array([each.phi_deg for each in campaign.family]),
+            np.array([each.phi_deg - 4.0 for each in campaign.family]),
+        ),
         functions=array_elementwise(),
         trigonometry=np,
     )
-    for value, each in zip(p2, FAMILY, strict=True):
+    for value, each in zip(p2, campaign.family, strict=True):
         one = shaken_mechanism(
-            model_of_kind("slumping"),
+            model_of_kind(kind),
             each.block,
             beta_deg=each.beta_deg,
             phi_deg=each.phi_deg,
@@ -48,8 +55,13 @@ def test_printed_values(angles: tuple[float, float, float, float], p2: float) ->
     block = Block.from_angles(alpha1, alpha3, float(r3))
     one = {name: np.array([value]) for name, value in (
         ("alpha1_deg", alpha1), ("alpha3_deg", alpha3), ("gamma_deg", block.gamma_deg),
-        ("r1_m", block.r1_m), ("r3_m", block.r3_m), ("beta_deg", beta), ("phi_deg", phi),
-        ("phi_back_deg", phi),
+        ("r1_m", block.r1_m), ("r3_m", block.r3_m), ("beta_deg", beta),
     )}  # fmt: skip
-    rest = slump_at_rest(**one, functions=array_elementwise(), trigonometry=np)
+    rest = two_contacts_at_rest(
+        confined=False,
+        **one,
+        phis_deg=(np.array([phi]), np.array([phi])),
+        functions=array_elementwise(),
+        trigonometry=np,
+    )
     assert rest[0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)
