@@ -119,7 +119,8 @@ def _of_limit(
         if _fails(pair.first, measure, limit) is not False:
             continue
         state = (getattr(pair.first, left) or 0.0) / (limit or pair.critical_rad or math.inf)
-        cell = _class(STATES, state), _class(SHAKING, row.pga_g / pair.yield_g)
+        # one that leans on its back plane may rest beyond the rotation at which it would balance
+        cell = _class(STATES, min(state, STATES[-1])), _class(SHAKING, row.pga_g / pair.yield_g)
         after, intact = (_fails(end, measure, limit) for end in (pair.second, pair.intact))
         if after is None or intact is None:
             unknown[cell] += 1

@@ -90,7 +90,7 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
                 "2",
                 *MOTION,
             ),
-            "rotation",
+            "a rotation is no failure of a block of kind confined_toppling",
         ),
         (
             ("--kind", "slumping", "--ks", "0.1", "--ps2", "3", "--rotation", "7", *MOTION),

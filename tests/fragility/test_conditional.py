@@ -146,3 +146,8 @@ def test_the_interval_covers_the_share_behind_blocks_that_fail_together() -> Non
         share = share_of_events(fails.ravel(), np.repeat(np.arange(events), each))
         covered += share.ci_low <= 0.4 <= share.ci_high
     assert 0.92 < covered / sets < 0.985
+
+
+def test_one_that_rests_beyond_the_rotation_of_balance_is_of_the_last_class() -> None:
+    (share,) = conditional_shares([slump(1.2, 1.3, 0.1)], "peak_rad", (None,))
+    assert (share.state_from, share.state_to, share.blocks) == (0.5, 1.0, 1)
