@@ -151,7 +151,6 @@ def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> 
     ("change", "words"),
     [
         (("phi_deg = 35", "phi_deg = 20"), ["slides (yield 0.27 g)"]),
-        (("alpha1_deg = -10", "alpha1_deg = -40"), ["confined topple"]),
         (("beta_deg = 5", "beta_deg = 26"), ["unstable"]),
         (("beta_deg = 5", "beta_deg = 25"), ["unstable at rest"]),
         (("beta_deg = 5\n", ""), ["--beta is missing"]),
@@ -165,6 +164,12 @@ def test_only_the_model_that_the_mode_calls_for_is_run(
     message = refuses("predict", "--pgv", "0.6", "--block", "b.toml")
     for word in (*words, "b.toml"):
         assert word in message
+
+
+def test_a_confined_block_is_answered_for_by_its_own_model(shell: Shell, tmp_path: Path) -> None:
+    (tmp_path / "b.toml").write_text(FILE.replace("alpha1_deg = -10", "alpha1_deg = -40"))
+    answer = shell.json("predict", "--pgv", "0.6", "--pga", "0.9", "--block", "b.toml")
+    assert (answer["kind"], answer["mode"]) == ("confined_toppling", "confined_topple")
 
 
 @pytest.mark.parametrize(

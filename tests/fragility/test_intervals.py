@@ -74,9 +74,10 @@ def drawn_questions(model: FragilityModel, random: np.random.Generator, n: int) 
         "ps2": np.exp(random.uniform(-1.0, 3.0, n)),
         "displacement_m": np.exp(random.uniform(-6.0, 0.0, n)),
     }
+    every["pct2"] = every["ps2"]
     for period in ("03", "10", "20", "30"):
         every[f"sa{period}_g"] = every["pga_g"] * np.exp(random.normal(0.0, 0.5, n))
-    every["ky"] = every["ks"] = every["pga_g"] * random.uniform(0.05, 0.95, n)
+    every["ky"] = every["ks"] = every["kct"] = every["pga_g"] * random.uniform(0.05, 0.95, n)
     y = pgv * np.exp(random.uniform(-2.0, 0.6, n))
     every["kr"] = y * np.sqrt(every["p2"]) / 9.80665
     names = (*model.method.block.names, *model.term.inputs)

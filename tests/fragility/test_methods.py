@@ -13,6 +13,7 @@ from rbfrag.fragility.methods import method_named, method_names, methods
 
 GIVEN = {
     "p2": 3.0, "kr": 0.1, "ky": 0.1, "displacement_m": 0.05, "ks": 0.15, "ps2": 3.0,
+    "kct": 0.15, "pct2": 8.0,
     "pgv_m_s": 0.4, "pga_g": 0.5, "tm_s": 0.6, "pgd_m": 0.1, "xp_m_s": 0.7,
     "sa03_g": 1.1, "sa10_g": 0.5, "sa30_g": 0.1,
     "arias_m_s": 0.8, "magnitude": 6.1,
