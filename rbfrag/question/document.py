@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
+from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.prediction import Prediction, answer_given
 
 if TYPE_CHECKING:
@@ -72,11 +74,16 @@ def prediction_document(
         ]  # fmt: skip
     else:
         options: dict[str, Any] = {"kind": kind, "rotation_deg": rotation_deg}
-        models = (
-            suited_models(given, db, **options)
-            if model is None
-            else [find_model(model, given, db, **options)]
-        )
+        try:
+            models = (
+                suited_models(given, db, **options)
+                if model is None
+                else [find_model(model, given, db, **options)]
+            )
+        except InputError as error:
+            # here the measures are fields of the question, which each door spells
+            error.fields = error.fields or STATED
+            raise
         for each in models:
             answer = answer_given(each, given, level, weights=weights, sites=sites)
             assert isinstance(answer, Prediction)

@@ -155,3 +155,8 @@ def test_a_block_that_fails_at_rest_is_said_to(refuses: Refuses) -> None:
     steep = ("--height", "2", "--width", "0.5", "--dip", "40", "--phi", "35", "--pgv", "0.3")
     assert "it fails without an earthquake" in refuses("predict", *steep)
     assert "rocking is free-standing" in refuses("predict", *steep, "--kind", "free")
+
+
+def test_a_refusal_of_measures_names_options(refuses: Refuses) -> None:
+    told = refuses("predict", "--p2", "3", "--kr", "0.1", "--kind", "rocking", "--pga", "0.5")
+    assert "works with --pga: give --pga and --magnitude, or --pgv, or --sa10" in told
