@@ -12,7 +12,7 @@ their tables by benchmarks.sliding_models.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 
@@ -163,6 +163,11 @@ class Predicted:
         assert self.kr is not None
         return self.only((self.kr >= least) & (self.kr < below))
 
+    def of_size(self, p2: float) -> Predicted:
+        """Return the blocks of one size [1/s²]."""
+        assert self.p2 is not None
+        return self.only(np.isclose(self.p2, p2))
+
     def of_magnitude(self, least: float, below: float) -> Predicted:
         """Return the blocks of some earthquakes."""
         assert self.magnitude is not None
@@ -306,26 +311,25 @@ def class_table(found: Mapping[str, Predicted], by: str = "kr") -> str:
 
     By magnitude it is that of blocks of `REAL_KR` and more, with predicted over observed failures.
     """
-    classes: dict[str, Callable[[Predicted], Predicted]] = {}
+    models = found.values()
+    classes: dict[str, list[Predicted]] = {}
     if by == "p2":
-        sizes = np.unique(np.concatenate([one.p2 for one in found.values() if one.p2 is not None]))
-        for p2 in sizes[::-1]:
-            classes[f"$p^2$ = {p2:g} 1/s²"] = lambda one, p2=p2: one.only(np.isclose(one.p2, p2))  # type: ignore[misc]
+        for p2 in np.unique(np.concatenate([one.p2 for one in models if one.p2 is not None]))[::-1]:
+            classes[f"$p^2$ = {p2:g} 1/s²"] = [one.of_size(p2) for one in models]
     elif by == "magnitude":
         for words, low, high in magnitude_classes():
-            classes[words] = lambda one, low=low, high=high: one.of_magnitude(low, high)  # type: ignore[misc]
+            of_class = [one.of_magnitude(low, high) for one in models]
+            classes[words] = [one.kr_from(REAL_KR) for one in of_class]
     else:
         for low, high in pairwise(KR_CLASSES):
             words = f"$k_r$ {low:g} to {high:g}"
-            classes[words] = lambda one, low=low, high=high: one.kr_from(low, high)  # type: ignore[misc]
+            classes[words] = [one.kr_from(low, high) for one in models]
     cells = []
-    for words, chosen in classes.items():
-        some = [chosen(one) for one in found.values()]
-        if by == "magnitude":
-            real = [one.kr_from(REAL_KR) for one in some]
-            cells.append([words, *(f"{_slope(one)}; {one.ratio:.2f}" for one in real)])
-        else:
-            cells.append([words, *map(_slope, some)])
+    for words, some in classes.items():
+        ratios = [f"; {one.ratio:.2f}" if by == "magnitude" else "" for one in some]
+        cells.append(
+            [words, *(_slope(one) + ratio for one, ratio in zip(some, ratios, strict=True))]
+        )
     return markdown((["slope", *(f"`{name}`" for name in found)], cells))
 
 
@@ -393,6 +397,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 if aims.kind == kind and name in (chosen.model or MODELS)
                 if not chosen.aims or aims.loss is not None
             }
+            if not models:
+                continue
             block = method_named(next(iter(models.values())).method).block
             source = read_source(connection, block, kind=kind)
             if not source.table.p2.size:
