@@ -424,6 +424,8 @@ def tables_of(found: Mapping[str, Predicted]) -> dict[str, str]:
     if any(one.kr is None for one in found.values()):
         return {}
     shown = {name: one for name, one in found.items() if MODELS[name].loss is not None}
+    if not shown:
+        return {"scores": score_table(found)}
     return {
         "scores": score_table(found),
         "strengths": class_table(shown),
