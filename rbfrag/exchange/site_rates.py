@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,25 +15,32 @@ from rbfrag.exchange.block_rows import BlockRows
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.report import rate_columns as rates_in_columns
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import column_of
 from rbfrag.solver.kinds import KINDS
 
 
 @dataclass(frozen=True, eq=False)
-class SiteBlocks:
-    """The curves of one site and the blocks that stand there.
+class SitedBlocks:
+    """Blocks at the sites of some hazard curves.
 
     Args:
-        curves: curves of one measure, one from each file.
-        columns: ``block_id``, ``p2_1_s2`` and ``kr`` of the blocks.
+        sites: curves of each site at which a block stands, one from each file.
+        columns: ``block_id``, ``kind`` and numbers of the blocks.
+        site: index of the site of each block, shape (m,).
+        remarks: what is to be said.
+        missing: by index of the rows given, the reasons of those of sites that have no curve.
     """
 
-    curves: tuple[HazardCurve, ...]
+    sites: list[list[HazardCurve]]
     columns: Mapping[str, Any]
+    site: NDArray[np.intp]
+    remarks: tuple[str, ...] = ()
+    missing: Mapping[int, str] = field(default_factory=dict)
 
     @property
-    def numbers(self) -> dict[str, Any]:
+    def given(self) -> dict[str, Any]:
         """What answers read of the blocks, by field, and their kinds."""
         return {**numbers_in(self.columns), "kind": [str(kind) for kind in self.columns["kind"]]}
 
@@ -48,21 +55,19 @@ def blocks_at_sites(
     columns: Mapping[str, Any],
     *,
     site_chosen: bool = False,
-) -> tuple[list[SiteBlocks], tuple[str, ...], dict[int, str]]:
-    """Return the sites with their curves and blocks, what is to be said, and blocks without.
+) -> SitedBlocks:
+    """Return which blocks stand at which sites of hazard curves.
 
-    Blocks are joined by ``site_id`` where the table has it and the curves name their sites;
-    otherwise all blocks are taken at each site.
+    Blocks are joined by ``site_id`` where the table has it and the curves name their sites. One
+    block without is asked about at each site.
 
     Args:
         files: curves of each file, of one measure, one a site.
         site_chosen: one site of several was asked for: blocks of others are left out.
 
-    Returns:
-        The sites, remarks, and by index the reasons of blocks of sites that have no curve.
-
     Raises:
-        InputError: files of other sites, or no block at any of them.
+        InputError: files of other sites, no block at any of them, or several blocks of which it is
+            not known at which of several sites they stand.
     """
     by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
     for curves in files:
@@ -72,102 +77,98 @@ def blocks_at_sites(
                 # the last digits differ between files
                 key = round(curve.lon, 3), round(curve.lat, 3)
             by_site.setdefault(key, []).append(curve)
-    for curves in by_site.values():
+    sites = list(by_site.values())
+    for curves in sites:
         if len(curves) != len(files):
             raise InputError(
                 f"site {curves[0].place or 'without a name'} is in {len(curves)} of {len(files)} "
                 "files: give curves of the same sites"
             )
-    wanted = columns.get("site_id")
-    have = [curves[0].site for curves in by_site.values()]
+    wanted, size = columns.get("site_id"), len(columns["kind"])
+    have = [curves[0].site for curves in sites]
     has_ids = wanted is not None and any(wanted)
     if wanted is None or not has_ids or not all(have):
-        everywhere = [SiteBlocks(tuple(curves), columns) for curves in by_site.values()]
-        remark = ""
-        if has_ids:
-            remark = "the curves do not name their sites: site_id of the blocks is not used"
-        elif len(columns["block_id"]) > 1 and len(have) > 1:
-            remark = (
-                "the blocks have no site_id: all of them are taken at each of the sites of the "
-                "curves"
+        remark = ("the curves do not name their sites: site_id of the blocks is not used",)
+        if len(sites) == 1:
+            return SitedBlocks(
+                sites, columns, np.zeros(size, dtype=np.intp), remark if has_ids else ()
             )
-        return everywhere, (remark,) if remark else (), {}
-    known, shown = set(have), f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
+        if size > 1:
+            raise InputError(
+                f"there are {size} blocks and curves of {len(sites)} sites, and it is not known "
+                f"which block stands where: give the blocks a column site_id with the names of "
+                "the curves' sites, or choose one site",
+                fields=("site",),
+            )
+        everywhere = {name: np.repeat(np.asarray(v), len(sites)) for name, v in columns.items()}
+        return SitedBlocks(sites, everywhere, np.arange(len(sites)))
+    shown = f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
+    places = {name: i for i, name in enumerate(have)}
+    site = np.array([places.get(name, -1) for name in wanted], dtype=np.intp)
     missing = {
-        i: f"the block stands at site {str(name)!r}, of which there is no curve; there are {shown}"
-        for i, name in enumerate(wanted)
-        if name not in known
+        i: f"the block stands at site {str(wanted[i])!r}, of which there is no curve; there are "
+        f"{shown}"
+        for i in np.flatnonzero(site < 0).tolist()
     }
-    sites = []
-    for curves in by_site.values():
-        own = np.flatnonzero(wanted == curves[0].site)
-        if own.size:
-            here = {name: np.asarray(values)[own] for name, values in columns.items()}
-            sites.append(SiteBlocks(tuple(curves), here))
-    if not sites and not site_chosen and missing:
+    own = np.flatnonzero(site >= 0)
+    if not own.size and not site_chosen:
         raise InputError(f"no block can be used: {next(iter(missing.values()))}")
-    if not sites:
+    if not own.size:
         raise InputError(f"no block stands at site {', '.join(have)}")
     remarks = ["blocks stand at the sites of the curves by their site_id"]
     if missing and site_chosen:
         remarks.append(f"{len(missing)} blocks of other sites are left out")
-    if len(sites) > 1:
-        remarks.append(
-            "rates of several sites do not make a rate of all of them: curves do not tell which "
-            "earthquakes shake both; use  rbfrag losses  on an event set"
-        )
-    return sites, tuple(remarks), {} if site_chosen else missing
+    used, site = np.unique(site[own], return_inverse=True)
+    here = {name: np.asarray(values)[own] for name, values in columns.items()}
+    return SitedBlocks(
+        [sites[i] for i in used.tolist()], here, site, tuple(remarks),
+        {} if site_chosen else missing,
+    )  # fmt: skip
 
 
-def _numbers(site: SiteBlocks, *, alone: bool) -> dict[str, Any]:
+def _numbers(columns: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:
     """Return p² and k_r, and what else describes blocks of other kinds; NaN of a class."""
-    known = numbers_in(site.columns)
+    known = numbers_in(columns)
     others = (name for facts in KINDS.values() for name in facts.parameters if name in known)
     names = dict.fromkeys((*TOPPLING_BLOCK.names, *others))
     return {column_of(n): known.get(n, math.nan) if alone else math.nan for n in names}
 
 
 def rate_columns(
-    sites: Sequence[SiteBlocks], answers: Sequence[HazardAnswer], rows: BlockRows | None = None
+    answer: HazardAnswer, columns: Mapping[str, Any], rows: BlockRows | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Return the columns of the table of annual rates, one row a site and block.
+    """Return the columns of the table of annual rates, one row a block.
 
     Args:
-        rows: the table of blocks; what cannot be used of it has its ``reason``, at one site in the
-            order of the table, at several at the end.
+        columns: ``block_id`` and numbers of the blocks.
+        rows: the table of blocks; what cannot be used of it has its ``reason``.
     """
-    nothing = float("nan")
-    parts: dict[str, list[NDArray[Any]]] = {}
-    for site, answer in zip(sites, answers, strict=True):
-        size, curve = len(site.names), site.curves[0]
-        alone = len(site.columns["kind"]) == size  # a class of blocks has no single p² and k_r
-        names = ["" if name is None else str(name) for name in site.names]
-        own: dict[str, Any] = {
-            "site": np.array([curve.place] * size, dtype=object),
-            "lon": nothing if curve.lon is None else curve.lon,
-            "lat": nothing if curve.lat is None else curve.lat,
-            "block_id": np.array(names, dtype=object),
-            **_numbers(site, alone=alone),
-            "annual_rate": answer.annual_rate,
-            "ci_low": answer.ci_low,
-            "ci_high": answer.ci_high,
-            "numerical_error": answer.numerical_error,
-            "probability": answer.probability,
-            "years": answer.years,
-        }
-        for q, rates in answer.quantiles.items():
-            own[f"annual_rate_p{round(100.0 * q):02d}"] = rates["annual_rate"]
-        for name, values in own.items():
-            kind = object if name in ("site", "block_id") else np.float64
-            parts.setdefault(name, []).append(
-                np.broadcast_to(np.asarray(values, dtype=kind), (size,))
-            )
-    columns = {name: np.concatenate(values) for name, values in parts.items()}
-    size = columns["block_id"].size
-    columns["reason"] = np.full(size, "", dtype=object)
+    size, curves, nothing = answer.annual_rate.size, answer.curves, float("nan")
+    # a class of blocks has no single p² and k_r
+    numbers = _numbers(columns, alone=len(columns["kind"]) == size)
+    place = np.array([curve.place for curve in curves], dtype=object)[answer.site]
+    lon, lat = (
+        np.array([nothing if value is None else value for value in each])[answer.site]
+        for each in ([curve.lon for curve in curves], [curve.lat for curve in curves])
+    )
+    own: dict[str, Any] = {
+        "lon": lon,
+        "lat": lat,
+        **numbers,
+        **rates_in_columns(answer),
+        "years": answer.years,
+    }
+    result: dict[str, NDArray[Any]] = {
+        "site": place,
+        "block_id": np.array(
+            ["" if name is None else str(name) for name in columns["block_id"]][:size], dtype=object
+        ),
+    }
+    for name, values in own.items():
+        result[name] = np.broadcast_to(np.asarray(values, dtype=np.float64), (size,))
+    result["reason"] = np.full(size, "", dtype=object)
     if rows is None:
-        return columns
+        return result
     nowhere = np.full(rows.reasons.size, "", dtype=object)
     columns_of_rows = {**rows.columns, "site": rows.columns.get("site_id", nowhere)}
-    row = sites[0].columns["row"] if len(sites) == 1 else np.full(size, -1)
-    return replace(rows, columns=columns_of_rows).with_refused(columns, row)
+    return replace(rows, columns=columns_of_rows).with_refused(result, columns["row"])

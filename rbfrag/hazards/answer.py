@@ -1,15 +1,17 @@
-"""How often per year a block topples, with honest uncertainty: `hazard`."""
+"""How often per year blocks fail under hazard curves, with what is not known: `hazard`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
 
-from rbfrag.errors import InputError
+from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
     FROM_SUMS,
@@ -18,7 +20,7 @@ from rbfrag.fragility.unusable import (
     unusable_in_words,
 )
 from rbfrag.frames import Tabular
-from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
+from rbfrag.hazards.annual_rate import checked_years, probability_in
 from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
@@ -28,32 +30,25 @@ from rbfrag.hazards.branches import (
 )
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
-from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
-from rbfrag.hazards.joint_thresholds import JointThresholds
-from rbfrag.hazards.model_blocks import (
-    ModelBlocks,
-    ModelPart,
-    ProbabilityTable,
-    RateKeywords,
-    parts_by_model,
-)
+from rbfrag.hazards.joint_rate import JointRate
+from rbfrag.hazards.joint_sites import joint_rates
+from rbfrag.hazards.kernel import KernelBlocks, Rates, Run, curve_contributions, half_width, rates
+from rbfrag.hazards.mass import Indices, SiteMass, curve_mass
+from rbfrag.hazards.model_blocks import RateKeywords, parts_by_model
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
-from rbfrag.question.blocks import taken_as_medians
 from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
-QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
-"""Quantiles of the rates over the branches of a logic tree."""
+QUANTILES = (0.05, 0.5, 0.95)
+"""Quantiles of a rate over the branches of a logic tree and the model's own uncertainty."""
 
 NUMERICAL_AIM = 1e-3
 """Relative error of quadrature of a block's rate above which a warning tells of it."""
 
 NEVER = 1e-9
 """Annual rate below which no such warning is given: such rates come from the last level alone."""
-
-_CHUNK = MOST_JOINT
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,34 +59,32 @@ class BranchRate:
         name: the branch or statistic that the curve is of, or where it comes from.
         weight: its weight; None for a curve that is no branch.
         annual_rate: rates of the blocks [1/a], shape (m,).
-        annual_rate_any: rate of earthquakes with at least one failure [1/a]; None where only its
-            bounds are known.
     """
 
     name: str
     weight: float | None
     annual_rate: FloatArray
-    annual_rate_any: float | None
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""
+        expected = float(np.nansum(self.annual_rate))
         return {
-            "name": self.name,
-            "weight": self.weight,
-            "annual_rate_any": self.annual_rate_any,
-            "expected_failures_per_year": float(np.nansum(self.annual_rate)),
-        }
+            "name": self.name, "weight": self.weight, "expected_failures_per_year": expected,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HazardAnswer(Tabular):
-    """Annual rates of toppling of m blocks at one site.
+    """Annual rates of failure of m blocks at the sites of some hazard curves.
 
     Args:
         annual_rate: mean number of failures a year [1/a], shape (m,); NaN for a block that
             cannot be used.
         ci_low: lower end of the interval from the uncertain parameters of the model.
         ci_high: upper end of it.
+        branches_low: rate that 5 % of the branches of a logic tree do not exceed, by their
+            weights; NaN without weights.
+        branches_high: the same of 95 %.
         numerical_error: how far quadrature may be off, relative to the rates, shape (m,).
         probability: probability of at least one failure in `years`, shape (m,).
         years: the period [a].
@@ -99,17 +92,24 @@ class HazardAnswer(Tabular):
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
+        site: index of the site of each block among `curves`, shape (m,).
+        curves: the curve of each site that answers, or the first of its branches.
         edges: levels of the curve's measure between which contributions are given, (k + 1,).
-        contribution: part of each rate from each interval [1/a], shape (m, k).
+        contribution: part of the rate of the one block or class from each interval [1/a], shape
+            (1, k); without rows for several blocks.
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.
         measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
-        joint: earthquakes with at least one failure among several blocks; None for one block.
+        joints: of each site earthquakes with at least one failure among its blocks; None where
+            that is not asked for, or there is one block.
         curve_kind: what of a logic tree the curve is (mean, quantile-0.84, rlz-001), the weighted
             branches, or None where that is not stated.
         branches: what each of several curves says; empty for one.
-        quantiles: quantiles of the rates over branches with weights, by their probability,
-            `annual_rate` of shape (m,), and `annual_rate_any`; empty without weights.
+        quantiles: quantiles of the rates over branches with weights and the parameters of the
+            model together, by their probability, shape (m,) each; empty without weights.
+        total_low: lower end of the interval of the sum of all rates, from the model's parameters,
+            which all blocks have in common [1/a].
+        total_high: upper end of it.
         warnings: what to know about the answer.
         reason: why a block cannot be used, shape (m,); empty text elsewhere.
         kinds: how each block fails, shape (m,); empty text where it cannot be used.
@@ -118,6 +118,8 @@ class HazardAnswer(Tabular):
     annual_rate: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+    branches_low: FloatArray
+    branches_high: FloatArray
     numerical_error: FloatArray
     probability: FloatArray
     years: float
@@ -125,15 +127,19 @@ class HazardAnswer(Tabular):
     model: str
     term: str
     method: str
+    site: Indices
+    curves: tuple[HazardCurve, ...]
     edges: FloatArray
     contribution: FloatArray
     above: FloatArray
     above_at_most: FloatArray
     measure: str
-    joint: JointRate | None
+    joints: tuple[JointRate | None, ...]
     curve_kind: str | None
     branches: tuple[BranchRate, ...]
-    quantiles: Mapping[float, Mapping[str, Any]]
+    quantiles: Mapping[float, FloatArray]
+    total_low: float
+    total_high: float
     warnings: tuple[str, ...]
     reason: NDArray[np.object_]
     kinds: NDArray[np.object_]
@@ -144,14 +150,23 @@ class HazardAnswer(Tabular):
         return np.array([mode_of_kind(kind) for kind in self.kinds], dtype=object)
 
     @property
-    def annual_rate_any(self) -> float | None:
-        """Annual rate of earthquakes with at least one failure [1/a].
+    def joint(self) -> JointRate | None:
+        """What the blocks of the first site do together, where that is asked for."""
+        return self.joints[0]
 
-        None for several blocks whose dependence is not known: `joint` has its bounds.
+    @property
+    def annual_rate_any(self) -> float | None:
+        """Annual rate of earthquakes with at least one failure at the one site [1/a].
+
+        None for several blocks unless their joint answer is asked for, and where their dependence
+        is not known: `joint` has its bounds.
         """
+        if len(self.curves) > 1:
+            return None
         if self.joint is not None:
             return self.joint.annual_rate_any
-        return float(np.nansum(self.annual_rate))  # of the one that can be used
+        known = np.flatnonzero(~np.isnan(self.annual_rate))
+        return float(self.annual_rate[known[0]]) if known.size == 1 else None
 
     @property
     def expected_failures_per_year(self) -> float:
@@ -163,21 +178,23 @@ def hazard(
     curve: CurveLike | Sequence[CurveLike],
     *numbers: ArrayLike | None,
     weights: Weights | None = None,
+    joint: bool = False,
     at_least: Sequence[int] | None = None,
     years: float = 50.0,
     one_class: bool = False,
+    run: Run | None = None,
     **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> HazardAnswer:
     """Return how often per year blocks fail under a seismic hazard curve.
 
-    λ_f = ∫ P(fails | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
-    ends of the interval are the integrals of the ends of the fragility's own interval; since
-    these are taken at every level at once, the interval is at least as wide as one from the
-    joint distribution of the parameters. The model is one of the curve's own measure: what else
-    shaking of that level may be is scatter in its P.
+    λ_f = ∫ P(fails | x) (-dλ), by P on the nodes of a grid against the curve's mass there
+    (:mod:`rbfrag.hazards.kernel`). The interval is that of the model's parameters, by the delta
+    method on ln λ_f. The model is one of the curve's own measure: what else shaking of that level
+    may be is scatter in its P. What a block may be, by its standard deviations, is integrated.
 
     Several blocks stand at one site and share its earthquakes: their rates add up to the failures
-    expected a year, and `joint` has the rate of earthquakes in which any of them fails.
+    expected a year, and, where asked for, `joint` has the rate of earthquakes in which any of them
+    fails.
 
     A block that cannot be used, such as one of k_r <= 0 or NaN, has the rate NaN and its `reason`;
     it is left out of sums, which a warning says.
@@ -207,11 +224,13 @@ def hazard(
         numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.
         weights: weight of each curve as a branch of a logic tree, None for one that is no branch,
             or OpenQuake's file of realizations; they sum to 1.
+        joint: whether earthquakes in which any of several blocks fails are counted, too.
         at_least: numbers of failures in one earthquake whose rates are wanted, from 1 to m; None
-            for usual ones.
+            for usual ones; they ask for `joint`.
         years: period for the probability [a].
         one_class: the blocks stand for one class, and the answer is the rate of a block drawn
             from it: one rate, by the mean of their fragilities.
+        run: does the parts of the work, as worker processes may; None for here.
         question: the keywords above.
 
     Raises:
@@ -224,256 +243,250 @@ def hazard(
     given, meaning, answering = parts_of(
         numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
     )
-    level = answering.get("level", LEVEL)
     curves, weight = branch_curves(curve, weights, meaning)
+    return hazard_at_sites(
+        [curves], None, given, meaning, answering, weight=weight, joint=joint, at_least=at_least,
+        years=years, one_class=one_class, run=run,
+    )  # fmt: skip
+
+
+def hazard_at_sites(
+    sites: Sequence[Sequence[HazardCurve]],
+    site: Indices | None,
+    given: Mapping[str, Any],
+    meaning: CurveKeywords,
+    answering: AnsweringFields,
+    *,
+    weight: FloatArray | None = None,
+    joint: bool = False,
+    at_least: Sequence[int] | None = None,
+    years: float = 50.0,
+    one_class: bool = False,
+    run: Run | None = None,
+) -> HazardAnswer:
+    """Return how often per year blocks of some sites fail; see :func:`hazard`.
+
+    Args:
+        sites: curves of one measure of each site, as many of each.
+        site: index of each block's site, shape (m,); None for one site.
+        given: fields of the blocks, numbers or of shape (m,).
+        meaning: what the levels of the curves are.
+        answering: model, level and database.
+        weight: weights of the curves of a site, NaN for one that is no branch; None where none is.
+    """
+    level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
-    reading = LevelShaking.of(curves[0], **meaning)
-    given, medians = taken_as_medians(given)
-    own, remarks, reason = parts_by_model(given, reading.name, answering)
+    reading = LevelShaking.of(first[0], **meaning)
+    parts, remarks, reason = parts_by_model(given, reading.name, answering)
     refuse_elements(reason, fields=BlockFields.__optional_keys__)
     sound = np.asarray(reason == "", dtype=bool)
-    size = int(sound.sum())
-    counts = _checked_counts(at_least, size)
-    unusable = unusable_in_words(
-        sound.size - size, sound.size, elements(reason), reason[~sound].tolist(),
-        FROM_MEAN if one_class else FROM_SUMS,
-    )  # fmt: skip
-    warnings = [*remarks, *medians, *unusable, *reading.warnings]
-    for one in curves:
-        warnings.extend(one.warnings)
-        warnings.extend(quantile_warning(one, "a rate"))
-    models = [each.model for each in own]
-    kinds = np.full(sound.shape, "", dtype=object)
-    for of_model in own:
-        kinds[of_model.places] = of_model.model.row.kind
-    warnings.extend(one.form.advice for one in models if one.form.advice)
-    blocks = _SiteBlocks.of(own, reading, level, curves, counts, one_class=one_class)
-    each = [blocks.under(one, years) for one in curves]
-    parts = (
-        each[:1]
-        if weight is None
-        else [part for part, w in zip(each, weight, strict=True) if not np.isnan(w)]
-    )
-    shares = np.ones(1) if weight is None else weight[~np.isnan(weight)]
+    where = np.zeros(sound.size, dtype=np.intp) if site is None else site
+    branch_weight = np.zeros(len(sites[0]))
+    branch_weight[0] = 1.0
+    if weight is not None:
+        branch_weight = np.nan_to_num(weight)
+    mass = curve_mass(list(zip(*sites, strict=True)), branch_weight, reading)
+
+    blocks: list[tuple[Indices, KernelBlocks]] = []
     for part in parts:
-        warnings.extend(part.warnings)
-    mean = {name: _mean(parts, shares, name) for name in _RATES}
-    probability = sum(
-        w * probability_in(years, part.annual_rate) for w, part in zip(shares, parts, strict=True)
-    )
-    widest = max(parts, key=lambda part: part.edges.size)
-    contribution = _contribution(parts, shares, widest.edges)
-    warnings.extend(blocks.domain_warnings(widest.edges, contribution, mean["annual_rate"]))
-    joints = [part.joint for part in parts if part.joint is not None]
-    if joints:
-        warnings.append(
-            f"annual_rate_any: all {size} blocks are taken as those of one site, of unknown azimuth"
-        )
-    if joints and blocks.thresholds is None:
-        why = (
-            "what the blocks share in one earthquake is not known to this model"
-            if any(one.dependence is None for one in models)
-            else "what blocks of several models share in one earthquake is not known"
-            if len(models) > 1
-            else f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
-        )
-        warnings.append(
-            f"{why}: bounds has annual_rate_any under full dependence and if they fail "
-            "independently"
-        )
-    worst = float(mean["numerical_error"][mean["annual_rate"] > NEVER].max(initial=0.0))
-    if worst > NUMERICAL_AIM:
-        warnings.append(
-            f"quadrature of a rate may be off by {100.0 * worst:.2g} %: its P changes abruptly "
-            "between levels of the curve"
-        )
-
-    def among_all(values: FloatArray) -> FloatArray:
-        """Return values of the blocks that can be used among those of all."""
-        if one_class or sound.all():
-            return values
-        whole = np.full((sound.size, *values.shape[1:]), np.nan)
-        whole[sound] = values
-        return whole
-
+        places = where[part.places]
+        for own, some in KernelBlocks.of(part.model, reading.median, part.numbers, places):
+            blocks.append((part.places[own], some))
+    each = [(places, some, rates(some, mass, level, run)) for places, some in blocks]
+    result = _Rates.of(each, sound.size, len(mass.branches))
+    if one_class:
+        result, where = result.mean(each, level), np.zeros(1, dtype=np.intp)
+    wanted = joint or at_least is not None
+    joints: tuple[JointRate | None, ...] = (None,) * len(sites)
+    if wanted and not one_class:
+        joints = joint_rates(sites, where, parts, reading, level, branch_weight, at_least, years)
+    ends = _beyond(result, mass, where)
+    texts = [
+        *remarks, *_unusable(reason, sound, one_class=one_class), *reading.warnings,
+        *_of_curves(sites), *(part.model.form.advice for part in parts if part.model.form.advice),
+        *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
+        *_numbers_in_words(result),
+        *(text for one in joints if one is not None for text in one.warnings),
+    ]  # fmt: skip
+    edges, contribution = np.empty(0), np.empty((0, 0))
+    if result.rate.size == 1:
+        edges, contribution = curve_contributions(first[0], reading, [some for _, some in blocks])
+    total = _total_half(each, level)
+    whole = float(np.nansum(result.rate))
+    nothing = np.full(result.rate.shape, np.nan)
+    low, high = nothing, nothing
+    quantiles: dict[float, FloatArray] = {}
+    if weight is not None:
+        low, high, quantiles = _quantiles(result, weight, level)
+    kinds = np.full(sound.size, "", dtype=object)
+    for part in parts:
+        kinds[part.places] = part.model.row.kind
+    models = [part.model for part in parts]
     return HazardAnswer(
-        **{name: among_all(values) for name, values in mean.items()},
-        probability=among_all(np.asarray(probability)),
+        annual_rate=result.rate,
+        ci_low=interval_end(result.rate, result.half, -1.0),
+        ci_high=interval_end(result.rate, result.half, 1.0),
+        branches_low=low,
+        branches_high=high,
+        numerical_error=result.error,
+        probability=_probability(result, branch_weight, years),
         years=years,
         level=level,
         model=_listed(one.name for one in models),
         term=_listed(one.term.name for one in models),
         method=_listed(one.row.method for one in models),
-        edges=widest.edges,
-        contribution=among_all(contribution),
-        measure=curves[0].measure,
-        joint=JointRate.mean(joints, shares) if joints else None,
-        curve_kind="weighted branches" if weight is not None else curves[0].statistic or None,
-        branches=_branches(curves, each, weight, among_all),
-        quantiles=_quantiles(parts, shares, among_all) if weight is not None else {},
-        warnings=tuple(dict.fromkeys(warnings)),
+        site=where,
+        curves=tuple(first),
+        edges=edges,
+        contribution=contribution,
+        above=ends[0],
+        above_at_most=ends[1],
+        measure=first[0].measure,
+        joints=joints,
+        curve_kind="weighted branches" if weight is not None else first[0].statistic or None,
+        branches=_branches(sites[0], result, weight),
+        quantiles=quantiles,
+        total_low=float(interval_end(np.array(whole), total, -1.0)),
+        total_high=float(interval_end(np.array(whole), total, 1.0)),
+        warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
     )
 
 
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(dict.fromkeys(names))
-
-
-_RATES = ("annual_rate", "ci_low", "ci_high", "numerical_error", "above", "above_at_most")
-
-
 @dataclass(frozen=True, eq=False)
 class _Rates:
-    """What one curve says of the blocks of its site; attributes as those of `HazardAnswer`."""
-
-    annual_rate: FloatArray
-    ci_low: FloatArray
-    ci_high: FloatArray
-    numerical_error: FloatArray
-    above: FloatArray
-    above_at_most: FloatArray
-    edges: FloatArray
-    contribution: FloatArray
-    joint: JointRate | None
-    warnings: list[str]
-
-
-@dataclass(frozen=True, eq=False)
-class _SiteBlocks:
-    """The blocks of a site, tabled for the curves of it.
+    """What the kernel gives of all blocks, NaN of those that cannot be used.
 
     Args:
-        tables: P and both ends by bands x blocks of each part; of a class the mean of all blocks.
-        order: where the blocks stand in the parts one after the other.
-        any_of: P that any fails under full dependence and if independent, laws in rows; None for
-            one block or a class.
-        thresholds: levels at which blocks fail by the model's copula; None where it is not known.
+        rate: annual rates [1/a], shape (m,).
+        half: what the intervals reach to on either side [1/a], shape (m,).
+        error: relative error of quadrature, shape (m,).
+        outside: share of the rate from outside the fitted ranges, shape (m,).
+        branches: rates in each branch, branches x m.
+        ends: P at the first and the last level and at the end, 3 x m.
     """
 
-    blocks: list[ModelBlocks]
-    tables: list[ProbabilityTable]
-    order: NDArray[np.intp]
-    any_of: ProbabilityTable | None
-    thresholds: JointThresholds | None
+    rate: FloatArray
+    half: FloatArray
+    error: FloatArray
+    outside: FloatArray
+    branches: FloatArray
+    ends: FloatArray
 
     @classmethod
     def of(
-        cls,
-        parts: Sequence[ModelPart],
-        reading: LevelShaking,
-        level: float,
-        curves: list[HazardCurve],
-        counts: Sequence[int],
-        *,
-        one_class: bool,
-    ) -> _SiteBlocks:
-        """Return the blocks of some models; the arguments are those of `hazard`."""
-        blocks, places = [], []
-        for part in parts:
-            length = part.places.size if one_class else _CHUNK
-            for start in range(0, part.places.size, length):
-                some = slice(start, start + length)
-                numbers = {name: each[some] for name, each in part.numbers.items()}
-                places.append(part.places[some])
-                blocks.append(
-                    ModelBlocks.certain(numbers, shaking=reading, model=part.model, level=level)
-                )
-        order = np.argsort(np.concatenate(places))
-        tables = [some.tabled(curves, mean=one_class) for some in blocks]
-        if one_class and len(tables) > 1:
-            shares = np.array([some.count for some in blocks]) / order.size
-            mean = sum(share * one.values for share, one in zip(shares, tables, strict=True))
-            tables = [ProbabilityTable(tables[0].low, tables[0].step, np.asarray(mean))]
-        if one_class or order.size < 2:
-            return cls(blocks, tables, order, None, None)
-        size = tables[0].values.shape[-1]
-        greatest, none = np.zeros((1, 1, size)), np.ones((1, 1, size))
-        for table in tables:
-            p = table.values[:, :1]
-            greatest = np.maximum(greatest, p.max(axis=2))
-            none = none * (1.0 - p).prod(axis=2)
-        first = tables[0]
-        any_of = ProbabilityTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
-        thresholds, law = None, parts[0].model.dependence
-        placement = blocks[0].placement()
-        one_model = len(parts) == 1 and order.size <= MOST_JOINT
-        if one_model and law is not None and placement is not None:
-            thresholds = JointThresholds.of(first, placement, law, counts)
-        return cls(blocks, tables, order, any_of, thresholds)
+        cls, each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int
+    ) -> _Rates:
+        """Return the rates of all blocks from those of each model."""
+        rows = np.full((7 + branches, size), np.nan)
+        for places, _, one in each:
+            scale = np.maximum(one.rate, np.finfo(np.float64).tiny)
+            own = (one.rate, one.half, one.error / scale, one.outside / scale)
+            rows[:, places] = [*own, *one.ends, *one.branches]
+        return cls(rows[0], rows[1], rows[2], rows[3], rows[7:], rows[4:7])
 
-    def under(self, curve: HazardCurve, years: float) -> _Rates:
-        """Return the rates under a curve."""
-        failures = [failure_rate(curve, table.fine, table.coarse) for table in self.tables]
-
-        def joined(name: str, row: int = 0) -> FloatArray:
-            """Return one value of all blocks; of the rates, the rows are P and its two ends."""
-            parts = (getattr(one, name) for one in failures)
-            rows = np.concatenate([part.reshape(3, -1, *part.shape[1:])[row] for part in parts])
-            return rows[self.order] if rows.shape[0] == self.order.size else rows
-
-        rate, low, high = (joined("annual_rate", row) for row in range(3))
-        ends = joined("above"), joined("above_at_most")
-        warnings = [*ends_in_words(curve, rate, *ends, joined("below"))]
-        edges, contribution = failures[0].edges, joined("contribution")
-        joint = None
-        if self.any_of is not None:
-            any_bounds = failure_rate(curve, self.any_of.fine, self.any_of.coarse)
-            joint = JointRate.of(any_bounds, rate, self.thresholds, curve, years)
-            warnings.extend(joint.warnings)
+    def mean(self, each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: float) -> _Rates:
+        """Return the rates of a class: those of a block drawn from it."""
+        used = ~np.isnan(self.rate)
+        n, rate = used.sum(), self.rate[used]
+        share = rate / max(float(rate.sum()), np.finfo(np.float64).tiny)
         return _Rates(
-            rate, low, high, joined("numerical_error"), *ends, edges, contribution, joint, warnings
+            np.array([rate.mean()]),
+            np.array([_total_half(each, level) / n]),
+            np.array([share @ self.error[used]]),
+            np.array([share @ self.outside[used]]),
+            self.branches[:, used].mean(axis=1, keepdims=True),
+            self.ends[:, used].mean(axis=1, keepdims=True),
         )
 
-    def domain_warnings(
-        self, edges: FloatArray, contribution: FloatArray, rate: FloatArray
-    ) -> Iterator[str]:
-        """Yield what is to be said of rates that come from outside the model's domain."""
-        middle = np.sqrt(edges[1:] * edges[:-1])
-        outside = np.concatenate([some.outside(middle) for some in self.blocks])[self.order]
-        if contribution.shape[0] == 1:  # a class
-            outside = outside.mean(axis=0, keepdims=True)
-        part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
-        if (part > NOTABLE).any():
-            yield (
-                f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and "
-                "shaking outside the ranges that the model was fitted on"
-            )
+
+def _total_half(each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: float) -> float:
+    """Return what the interval of the sum of all rates reaches to on either side.
+
+    Blocks of one model have its parameters in common; those of several are independent.
+    """
+    gradients: dict[str, tuple[Any, FloatArray]] = {}
+    for _, blocks, one in each:
+        model = blocks.model
+        before = gradients.get(model.name, (model.errors, np.zeros(one.gradient.shape[0])))[1]
+        gradients[model.name] = model.errors, before + one.gradient.sum(axis=1)
+    halves = [
+        float(half_width(errors, gradient[:, None], level)[0])
+        for errors, gradient in gradients.values()
+    ]
+    return float(np.sqrt(np.square(halves).sum()))
 
 
-def _checked_counts(at_least: Sequence[int] | None, n: int) -> list[int]:
-    if at_least is None:
-        return [count for count in USUAL_COUNTS if count <= n]
-    for count in at_least:
-        if isinstance(count, bool) or not 1 <= count <= n:
-            raise InputError(f"at least {count} failures of {n} blocks: give numbers from 1 to {n}")
-    return [1, *at_least]
+def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> FloatArray:
+    """Return an end of the interval of rates, rate · exp(side · half/rate), by the delta method.
+
+    Args:
+        half: Student's quantile times the standard error of the rate.
+        side: -1 or 1.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rate > 0.0, rate * np.exp(side * np.divide(half, rate)), rate)
 
 
-def _mean(parts: Sequence[_Rates], shares: FloatArray, name: str) -> FloatArray:
-    values = (getattr(part, name) for part in parts)
-    return np.asarray(sum(w * value for w, value in zip(shares, values, strict=True)))
+def _beyond(result: _Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:
+    """Return the rates from beyond the last level of the curves, at least and at most [1/a]."""
+    ends = mass.ends
+    assert ends is not None
+    last = ends.rate[site]
+    return last * result.ends[1], last * np.where(ends.open[ends.group[site]], 1.0, result.ends[2])
 
 
-def _contribution(parts: Sequence[_Rates], shares: FloatArray, edges: FloatArray) -> FloatArray:
-    """Return the mean contribution between the edges of one of the branches."""
-    total = np.zeros((parts[0].contribution.shape[0], edges.size - 1))
-    for w, part in zip(shares, parts, strict=True):
-        if part.edges.size == edges.size:
-            total += w * part.contribution
-            continue
-        below = np.concatenate([np.zeros((total.shape[0], 1)), part.contribution.cumsum(axis=1)], 1)
-        for row, one in enumerate(below):
-            total[row] += w * np.diff(np.interp(np.log(edges), np.log(part.edges), one))
-    return total
+def _probability(result: _Rates, weight: FloatArray, years: float) -> FloatArray:
+    if not result.branches.size:
+        return probability_in(years, result.rate)
+    return np.asarray(weight @ probability_in(years, result.branches))
+
+
+def mixture_quantiles(
+    rates_of: FloatArray, weight: FloatArray, log_sd: FloatArray, q: Sequence[float]
+) -> FloatArray:
+    """Return quantiles of rates over branches, each lognormal about its rate, (len(q), m).
+
+    Args:
+        rates_of: rate in each branch, branches x m.
+        weight: weights of the branches, which sum to 1.
+        log_sd: standard deviation of the logarithm, common to all branches, shape (m,).
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(rates_of)
+    sd = np.maximum(log_sd, 1e-9)
+    finite = np.where(np.isfinite(logs), logs, -700.0)
+    result = []
+    for level in q:
+        low, high = (finite.min(axis=0) - 10.0 * sd, finite.max(axis=0) + 10.0 * sd)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            below = weight @ ndtr((middle - logs) / sd) < level
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        result.append(np.exp(high))
+    return np.stack(result)
+
+
+def _quantiles(
+    result: _Rates, weight: FloatArray, level: float
+) -> tuple[FloatArray, FloatArray, dict[float, FloatArray]]:
+    """Return the 5 and 95 % quantiles over the branches alone, and those of the mixture."""
+    used = ~np.isnan(weight)
+    own, shares = result.branches[used], weight[used]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_sd = np.divide(result.half, result.rate) / quantiles_of(level).normal
+    low, high = weighted_quantiles(own, shares, (QUANTILES[0], QUANTILES[-1]))
+    mixed = mixture_quantiles(own, shares, np.nan_to_num(log_sd), QUANTILES)
+    return low, high, dict(zip(QUANTILES, mixed, strict=True))
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(filter(None, dict.fromkeys(names)))
 
 
 def _branches(
-    curves: Sequence[HazardCurve],
-    each: Sequence[_Rates],
-    weight: FloatArray | None,
-    among_all: Callable[[FloatArray], FloatArray],
+    curves: Sequence[HazardCurve], result: _Rates, weight: FloatArray | None
 ) -> tuple[BranchRate, ...]:
     if len(curves) == 1:
         return ()
@@ -481,23 +494,55 @@ def _branches(
         BranchRate(
             curve_name(curve),
             None if weight is None or np.isnan(weight[i]) else float(weight[i]),
-            among_all(rates.annual_rate),
-            float(rates.annual_rate[0]) if rates.joint is None else rates.joint.annual_rate_any,
+            result.branches[i],
         )
-        for i, (curve, rates) in enumerate(zip(curves, each, strict=True))
+        for i, curve in enumerate(curves)
     )
 
 
-def _quantiles(
-    parts: Sequence[_Rates], shares: FloatArray, among_all: Callable[[FloatArray], FloatArray]
-) -> dict[float, dict[str, Any]]:
-    rates = weighted_quantiles(np.stack([part.annual_rate for part in parts]), shares, QUANTILES)
-    result: dict[float, dict[str, Any]] = {
-        q: {"annual_rate": among_all(row)} for q, row in zip(QUANTILES, rates, strict=True)
-    }
-    any_rates = [None if part.joint is None else part.joint.annual_rate_any for part in parts]
-    if all(one is not None for one in any_rates):
-        of_any = weighted_quantiles(np.array(any_rates, dtype=np.float64), shares, QUANTILES)
-        for q, value in zip(QUANTILES, of_any.tolist(), strict=True):
-            result[q]["annual_rate_any"] = value
-    return result
+def _unusable(
+    reason: NDArray[np.object_], sound: NDArray[np.bool_], *, one_class: bool
+) -> tuple[str, ...]:
+    return unusable_in_words(
+        int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
+        FROM_MEAN if one_class else FROM_SUMS,
+    )  # fmt: skip
+
+
+def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
+    for curves in sites:
+        for curve in curves:
+            yield from curve.warnings
+            yield from quantile_warning(curve, "a rate")
+
+
+def _numbers_in_words(result: _Rates) -> Iterator[str]:
+    worst = np.nan_to_num(result.error[result.rate > NEVER]).max(initial=0.0)
+    if worst > NUMERICAL_AIM:
+        yield (
+            f"quadrature of a rate may be off by {100.0 * worst:.2g} %: its P changes abruptly "
+            "between levels of the curve"
+        )
+    outside = np.nan_to_num(result.outside).max(initial=0.0)
+    if outside > NOTABLE:
+        yield (
+            f"up to {100.0 * outside:.3g} % of the rate comes from blocks and shaking outside the "
+            "ranges that the model was fitted on"
+        )
+
+
+_NUMBER = re.compile(r"[+-]?\d[\d.,]*(?:e[+-]?\d+)?")
+
+
+def counted(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return warnings by kind: one that differs from another in numbers alone is counted with it.
+
+    What is said of each of thousands of sites is said once, with the first as an example.
+    """
+    kinds: dict[str, dict[str, None]] = {}
+    for text in texts:
+        kinds.setdefault(_NUMBER.sub("#", text), {})[text] = None
+    return tuple(
+        next(iter(each)) + (f" (and {len(each) - 1:,} more of the kind)" if len(each) > 1 else "")
+        for each in kinds.values()
+    )

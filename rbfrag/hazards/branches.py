@@ -51,7 +51,12 @@ def branch_curves(
     """
     curves = as_curves(given, **meaning)
     refuse_unlike(curves)
-    return curves, checked_weights(_stated_weights(weights, curves), len(curves))
+    return curves, branch_weights(weights, curves)
+
+
+def branch_weights(given: Weights | None, curves: Sequence[HazardCurve]) -> FloatArray | None:
+    """Return the weights of the curves of a site, NaN for one that is no branch, or None."""
+    return checked_weights(_stated_weights(given, curves), len(curves))
 
 
 def refuse_unlike(curves: Sequence[HazardCurve]) -> None:

@@ -94,7 +94,9 @@ class JointRate:
                 known.
         """
         names = ("annual_rate", "above", "above_at_most", "below")
-        ends = ends_in_words(curve, *(getattr(any_bounds, name)[1:] for name in names))
+        ends = ends_in_words(
+            [curve], np.zeros(1, dtype=np.intp), *(getattr(any_bounds, name)[1:] for name in names)
+        )
         rates = any_bounds.annual_rate
         bounds = {
             name.replace(" ", "_"): {

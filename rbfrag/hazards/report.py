@@ -2,71 +2,64 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility.words import percent
 from rbfrag.hazards.answer import HazardAnswer
-from rbfrag.hazards.curve import HazardCurve
 
 
 def as_dict(
-    curves: Sequence[HazardCurve],
-    names: Sequence[Sequence[str | None]],
-    answers: Sequence[HazardAnswer],
+    answer: HazardAnswer,
+    names: Sequence[str | None],
     remarks: Sequence[str] = (),
     refused: Mapping[int, Mapping[str, str]] | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract.
 
-    One block at one site is an object with its contributions; at several sites a list in it.
-    Several blocks are a list in it beside what they do in common, at several sites a list of that.
-    Those that cannot be used stand in the list without numbers, at several sites at its end.
+    One block is an object with its contributions. Several are a list in it, beside what they do in
+    common, at several sites beside a list of that. Those that cannot be used stand in the list
+    without numbers.
 
     Args:
-        names: identifiers of the blocks of each site.
+        names: identifiers of the blocks.
         refused: rows of the table of blocks that cannot be used, by their index: ``block_id``,
             ``site_id`` and ``reason``.
     """
+    places = [curve.place or None for curve in answer.curves]
+    columns = rate_columns(answer)
     rows = [
-        {
-            "site": curve.place or None,
-            "block_id": name,
-            "annual_rate": float(rates.annual_rate[i]),
-            "ci_low": float(rates.ci_low[i]),
-            "ci_high": float(rates.ci_high[i]),
-            "numerical_error": float(rates.numerical_error[i]),
-            "probability": float(rates.probability[i]),
-            **_quantiles(rates, i),
-        }
-        for curve, own, rates in zip(curves, names, answers, strict=True)
-        for i, name in enumerate(own)
-    ]
-    first = answers[0]
+        {"site": places[site], "block_id": name, **dict(zip(columns, values, strict=True))}
+        for site, name, *values in zip(
+            answer.site.tolist(), names,
+            *(_or_null(column) for column in columns.values()),
+            strict=True,
+        )
+    ]  # fmt: skip
     shared = {
-        "years": first.years,
-        "level": first.level,
-        "model": first.model,
-        "term": first.term,
-        "method": first.method,
-        "imt": curves[0].imt,
-        "curve_kind": first.curve_kind,
+        "years": answer.years,
+        "level": answer.level,
+        "model": answer.model,
+        "term": answer.term,
+        "method": answer.method,
+        "imt": answer.curves[0].imt,
+        "curve_kind": answer.curve_kind,
     }
-    warnings = [*remarks, *_warnings(curves, answers)]
-    if refused or any(len(own) > 1 for own in names):
-        rows = _with_refused(rows, refused or {}, in_order=len(answers) == 1)
-        sites = [_of_site(curve, one) for curve, one in zip(curves, answers, strict=True)]
-        common = sites[0] if len(sites) == 1 else {"sites": sites}
-        return {**common, **shared, "blocks": rows, "warnings": warnings}
-    branches = {"branches": [one.as_dict() for one in first.branches]} if first.branches else {}
-    if len(rows) > 1:
-        return {**shared, "answers": rows, "warnings": warnings}
+    warnings = [*remarks, *answer.warnings]
+    branches = {"branches": [one.as_dict() for one in answer.branches]} if answer.branches else {}
+    if refused or len(rows) > 1:
+        rows = _with_refused(rows, refused or {})
+        return {
+            **_in_common(answer, places), **shared, **branches, "blocks": rows,
+            "warnings": warnings,
+        }  # fmt: skip
     del rows[0]["block_id"]
     contributions = [
         {"from": low, "to": high, "annual_rate": part}
         for low, high, part in zip(
-            first.edges[:-1].tolist(), first.edges[1:].tolist(), first.contribution[0].tolist(),
-            strict=True,
+            answer.edges[:-1].tolist(), answer.edges[1:].tolist(),
+            answer.contribution[0].tolist(), strict=True,
         )
     ]  # fmt: skip
     return {
@@ -74,8 +67,28 @@ def as_dict(
     }  # fmt: skip
 
 
+def rate_columns(answer: HazardAnswer) -> dict[str, Any]:
+    """Return the rates and what is not known of them by the names of tables and JSON."""
+    columns = {
+        "annual_rate": answer.annual_rate,
+        "ci_low": answer.ci_low,
+        "ci_high": answer.ci_high,
+        "numerical_error": answer.numerical_error,
+        "probability": answer.probability,
+    }
+    if answer.quantiles:
+        columns |= {"branches_low": answer.branches_low, "branches_high": answer.branches_high}
+    for q, values in answer.quantiles.items():
+        columns[f"annual_rate_p{round(100.0 * q):02d}"] = values
+    return columns
+
+
+def _or_null(column: Any) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in column.tolist()]
+
+
 def _with_refused(
-    rows: list[dict[str, Any]], refused: Mapping[int, Mapping[str, str]], *, in_order: bool
+    rows: list[dict[str, Any]], refused: Mapping[int, Mapping[str, str]]
 ) -> list[dict[str, Any]]:
     """Return the rows with their reasons, and those that cannot be used among them."""
     empty = dict.fromkeys(rows[0])
@@ -85,49 +98,30 @@ def _with_refused(
             "reason": about["reason"]}
         for i, about in refused.items()
     }  # fmt: skip
-    if not in_order:
-        return [*answered, *others.values()]
     places = range(max(len(rows) + len(refused), *refused, 0) + 1)
     merged = (others[i] if i in others else next(answered, None) for i in places)
     return [row for row in merged if row is not None]
 
 
-def _warnings(curves: Sequence[HazardCurve], answers: Sequence[HazardAnswer]) -> list[str]:
-    """Return the warnings, each once; one that does not hold of every site names its own."""
-    everywhere = set.intersection(*(set(each.warnings) for each in answers))
-    named = {
-        text if text in everywhere or not curve.place else f"{curve.place}: {text}": None
-        for curve, each in zip(curves, answers, strict=True)
-        for text in each.warnings
-    }
-    return list(named)
-
-
-def _quantiles(answer: HazardAnswer, i: int) -> dict[str, float]:
-    """Return the quantiles of a block's rate over the branches of a logic tree."""
+def _in_common(answer: HazardAnswer, places: Sequence[str | None]) -> dict[str, Any]:
+    """Return what all blocks, and those of each site, do in common."""
+    common: dict[str, Any] = {"annual_rate_any": answer.annual_rate_any}
+    if len(places) == 1:
+        common = {"site": places[0], **common}
+        if answer.joint is not None:
+            common |= answer.joint.as_dict()
+    elif any(answer.joints):
+        common["sites"] = [
+            {"site": place, **joint.as_dict()}
+            for place, joint in zip(places, answer.joints, strict=True)
+            if joint is not None
+        ]
     return {
-        f"annual_rate_p{round(100.0 * q):02d}": float(rates["annual_rate"][i])
-        for q, rates in answer.quantiles.items()
+        **common,
+        "expected_failures_per_year": answer.expected_failures_per_year,
+        "expected_failures_low": answer.total_low,
+        "expected_failures_high": answer.total_high,
     }
-
-
-def _of_site(curve: HazardCurve, answer: HazardAnswer) -> dict[str, Any]:
-    """Return what the blocks of one site do in common."""
-    rate = answer.annual_rate_any
-    common: dict[str, Any] = {"site": curve.place or None}
-    if answer.joint is None:
-        common |= {"annual_rate_any": rate, "probability_any": float(answer.probability[0])}
-    else:
-        common |= answer.joint.as_dict()
-    common["expected_failures_per_year"] = answer.expected_failures_per_year
-    common |= {
-        f"annual_rate_any_p{round(100.0 * q):02d}": rates["annual_rate_any"]
-        for q, rates in answer.quantiles.items()
-        if "annual_rate_any" in rates
-    }
-    if answer.branches:
-        common["branches"] = [one.as_dict() for one in answer.branches]
-    return common
 
 
 def once_in(annual_rate: float) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import normal_steps
@@ -115,30 +116,39 @@ def _no_model(curve: HazardCurve) -> str:
 
 
 def ends_in_words(
-    curve: HazardCurve,
+    curves: Sequence[HazardCurve],
+    site: NDArray[np.intp],
     rate: FloatArray,
     above: FloatArray,
     above_at_most: FloatArray,
     below: FloatArray,
 ) -> Iterator[str]:
-    """Yield where shaking beyond the ends of a curve may matter.
+    """Yield where shaking beyond the ends of curves may matter; of several the worst is named.
 
     Args:
-        rate: rates of failure [1/a], shape (m,).
+        curves: the curve of each site.
+        site: index of each block's site, shape (m,).
+        rate: rates of failure [1/a], shape (m,); NaN of blocks that cannot be used.
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.
         below: probability of failure at the first level, shape (m,).
     """
-    unit = curve.measure.replace("sa_g", curve.imt + " in g")
-    open_above = above_at_most - above > NOTABLE * rate
-    if open_above.any():
-        worst = float((above_at_most - above)[open_above].max())
-        yield (
-            f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
-            f"{worst:.3g} failures a year to the answer"
-        )
-    if (below > NOTABLE).any():
-        yield (
-            f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
-            f"is already {float(below.max()):.3g}: weaker shaking is not counted"
-        )
+    more = above_at_most - above
+    for doubtful, size in ((more > NOTABLE * rate, more), (below > NOTABLE, below)):
+        if not doubtful.any():
+            continue
+        worst = int(np.argmax(np.where(doubtful, size, -1.0)))
+        curve, sites = curves[site[worst]], np.unique(site[doubtful]).size
+        unit = curve.measure.replace("sa_g", curve.imt + " in g")
+        name = f"the curve of {curve.place}" if len(curves) > 1 and curve.place else "the curve"
+        others = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
+        if size is more:
+            yield (
+                f"{name} ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
+                f"{float(more[worst]):.3g} failures a year to the answer{others}"
+            )
+        else:
+            yield (
+                f"{name} begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
+                f"is already {float(below[worst]):.3g}: weaker shaking is not counted{others}"
+            )

@@ -114,8 +114,9 @@ class StandingBlocks:
             outside = float(part @ share) / max(float(part.sum()), np.finfo(np.float64).tiny)
         names = ("annual_rate", "above", "above_at_most", "below")
         warnings = ends_in_words(
-            curve, *(self._mean(failures, name, several)[None] for name in names)
-        )
+            [curve], np.zeros(1, dtype=np.intp),
+            *(self._mean(failures, name, several)[None] for name in names),
+        )  # fmt: skip
         mean = float(self.weight @ rates[0, :, 0])
         return AnyRate(rates, mean, outside, tuple(warnings))
 

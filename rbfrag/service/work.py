@@ -9,7 +9,7 @@ import asyncio
 import multiprocessing
 import signal
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from fastapi import Request
 from pebble import ProcessExpired, ProcessPool
@@ -35,7 +35,9 @@ from rbfrag.service.reading import json_of, json_text
 from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
+    from rbfrag.hazards.curve import CurveKeywords
     from rbfrag.motions.ground_motion import GroundMotion
+    from rbfrag.question.fields import AnsweringFields
 
 FILE = "the file"
 """What messages call an accelerogram or a curve that was sent."""
@@ -126,7 +128,9 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     """Return what `rbfrag hazard` prints as JSON."""
-    from rbfrag.hazards.answer import hazard as answer
+    import numpy as np
+
+    from rbfrag.hazards.answer import hazard_at_sites
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
@@ -140,11 +144,19 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         curves,
         converted_period_s=None if convert is None else convert.period_s,
     )
-    keywords = query.given() | query.model_dump(
-        include={"years", "convert", "convert_sigma", "component"}
+    meaning = query.model_dump(include={"convert", "convert_sigma", "component"})
+    stated, how = query.question()
+    given = {name: [value] * len(curves) for name, value in stated.items()}
+    sites = np.arange(len(curves))
+    rates = hazard_at_sites(
+        [[curve] for curve in curves],
+        sites,
+        given,
+        cast("CurveKeywords", meaning),
+        cast("AnsweringFields", {**how, "db": db}),
+        years=query.years,
     )
-    rates = [answer(curve, **keywords, db=db) for curve in curves]
-    return json_text(as_dict(curves, [[None]] * len(curves), rates))
+    return json_text(as_dict(rates, [None] * len(curves)))
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.hazards import report
+from rbfrag.hazards.answer import counted
 from rbfrag.hazards.report import once_in
 from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
@@ -101,11 +100,15 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert [row["block_id"] for row in rows] == ["A7", "B2"]
     alone = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1")
     assert float(rows[0]["annual_rate"]) == pytest.approx(alone["annual_rate"], rel=1e-8)
-    found = shell.json("hazard", curve, "--blocks", "blocks.csv", "--years", "100")
+    alone = shell.json("hazard", curve, "--blocks", "blocks.csv")
+    assert (alone["annual_rate_any"], "bounds" in alone) == (None, False)
+    asked = ("hazard", curve, "--blocks", "blocks.csv", "--years", "100", "--joint")
+    found = shell.json(*asked)
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     assert set(found) == {
         "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "annual_rate_at_least",
-        "joint_law", "bounds", "expected_failures_per_year", "years", "level", "model", "term",
+        "joint_law", "bounds", "expected_failures_per_year", "expected_failures_low",
+        "expected_failures_high", "years", "level", "model", "term",
         "method", "imt", "curve_kind", "blocks", "warnings",
     }  # fmt: skip
     each = [row["annual_rate"] for row in found["blocks"]]
@@ -114,10 +117,12 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     # a Poisson process of earthquakes
     assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
     assert any("blocks are taken as those of one site" in text for text in found["warnings"])
-    printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
+    printed = shell(*asked).stdout
     assert f"{once_in(found['annual_rate_any'])} on average" in printed
-    assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
-    assert printed.startswith("At least one of the blocks")
+    assert f"{found['expected_failures_per_year']:.2g} failures a year (" in printed
+    assert "At least one of the blocks" in printed
+    ends = found["expected_failures_low"], found["expected_failures_high"]
+    assert ends[0] < sum(each) < ends[1]
     assert "numerical_error" not in printed
     assert f"Most often fail A7 ({once_in(each[0])}) and B2 ({once_in(each[1])})." in printed
 
@@ -145,20 +150,16 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
     head = "block_id,p2_1_s2,kr,site_id\n"
     Path("blocks.csv").write_text(head + "A,3,0.1,SLIDE-A\nB,10,0.2,0012\nC,3,0.2,0012\n")
     found = shell.json("hazard", mean, "--blocks", "blocks.csv", "--component", "rotd50",
-                       "--out", "rates.csv")  # fmt: skip
+                       "--out", "rates.csv", "--joint")  # fmt: skip
     assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
         ("SLIDE-A", "A"), ("0012", "B"), ("0012", "C"),
     ]  # fmt: skip
-    assert [one["site"] for one in found["sites"]] == ["SLIDE-A", "0012"]
+    assert [one["site"] for one in found["sites"]] == ["0012"]
     alone = shell.json("hazard", mean, "--site", "SLIDE-A", "--p2", "3", "--kr", "0.1",
                        "--component", "rotd50")  # fmt: skip
-    assert found["sites"][0]["annual_rate_any"] == pytest.approx(alone["annual_rate"], rel=1e-9)
-    assert any("rbfrag losses" in text for text in found["warnings"])
+    assert found["blocks"][0]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-9)
     with Path("rates.csv").open() as file:
         assert [row["site"] for row in csv.DictReader(file)] == ["SLIDE-A", "0012", "0012"]
-    own = {text.partition(": ")[0] for text in found["warnings"] if "outside the ranges" in text}
-    assert own <= {"SLIDE-A", "0012"}
-    assert own
     both = shell.json("hazard", mean, "--blocks", "blocks.csv", "--at-least", "2")
     counts = [[each["count"] for each in one["annual_rate_at_least"]]
               for one in both["sites"] if "annual_rate_at_least" in one]  # fmt: skip
@@ -181,8 +182,11 @@ def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree:
                        logic_tree / "realizations_7.csv")  # fmt: skip
     each = [shell.json("hazard", one, *asked)["annual_rate"] for one in branches]
     assert found["annual_rate"] == pytest.approx(np.dot((0.5, 0.3, 0.2), each), rel=1e-6)
-    assert found["annual_rate_p05"] == min(each)
-    assert found["annual_rate_p95"] == max(each)
+    assert found["branches_low"] == pytest.approx(min(each), rel=1e-9)
+    assert found["branches_high"] == pytest.approx(max(each), rel=1e-9)
+    # the branches and what is not known of the model together
+    assert found["annual_rate_p05"] < min(each) < found["annual_rate_p50"]
+    assert max(each) < found["annual_rate_p95"]
     assert found["curve_kind"] == "weighted branches"
     assert [row["weight"] for row in found["branches"]] == pytest.approx([0.5, 0.3, 0.2])
     # the engine's mean curve is that of the branches
@@ -214,9 +218,9 @@ def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
         writer.writerows([r["block_id"], r["p2_1_s2"], r["kr"]] for r in rows)
     each = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")["blocks"]
     # the mean of the rates is the rate of the mean fragility
-    for key in ("annual_rate", "ci_low", "ci_high"):
-        mean = np.mean([answer[key] for answer in each])
-        assert found[key] == pytest.approx(mean, rel=1e-4)
+    mean = np.mean([answer["annual_rate"] for answer in each])
+    assert found["annual_rate"] == pytest.approx(mean, rel=1e-9)
+    assert min(one["ci_low"] for one in each) < found["ci_low"] < mean < found["ci_high"]
     with Path("rates.csv").open() as file:
         (row,) = csv.DictReader(file)
     assert (row["block_id"], row["kr"]) == ("rock mass", "")
@@ -284,8 +288,9 @@ def test_free_standing_blocks_with_their_restitution(shell: Shell, refuses: Refu
     asked = ("hazard", "curve.csv", "--component", "single", "--kind", "rocking")
     answer = shell.json(*asked, "--blocks", "b.csv")
     rows = answer["blocks"]
-    assert any("kr_sigma of the blocks are not integrated" in text for text in answer["warnings"])
-    for row, stated in zip(rows, ((), ("--restitution", "0.8")), strict=True):
+    # what a block may be is integrated
+    uncertain = ("--kr-sigma", "0.1")
+    for row, stated in zip(rows, (uncertain, ("--restitution", "0.8")), strict=True):
         told = shell.json(*asked, "--p2", "7", "--kr", "0.2", *stated)
         assert told["model"] == "rocking-pgv"
         assert row["annual_rate"] == pytest.approx(told["annual_rate"], rel=1e-6)
@@ -327,9 +332,13 @@ def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> No
     assert told["probability_standing"] != certain["probability_standing"]
 
 
-def test_a_warning_of_one_site_of_three_names_it() -> None:
-    sites = [SimpleNamespace(place=name) for name in ("A", "B", "C")]
-    texts = (("coarse", "of all"), ("of all", "steep"), ("of all", "coarse"))
-    answers = [SimpleNamespace(warnings=each) for each in texts]
-    named = report._warnings(sites, answers)  # type: ignore[arg-type]
-    assert named == ["A: coarse", "of all", "B: steep", "C: coarse"]
+def test_warnings_are_counted_by_kind() -> None:
+    texts = ["curve 1: coarse", "of all", "curve 2: coarse", "of all", "curve 10: coarse"]
+    assert counted(texts) == ("curve 1: coarse (and 2 more of the kind)", "of all")
+
+
+def test_several_blocks_without_a_site_are_refused(refuses: Refuses, logic_tree: Path) -> None:
+    Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,10,0.2\n")
+    mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
+    told = refuses("hazard", mean, "--blocks", "blocks.csv")
+    assert "it is not known which block stands where" in told

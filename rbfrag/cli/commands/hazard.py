@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
+from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
@@ -17,21 +19,26 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
+from rbfrag.question.fields import BlockFields, WholeFields
 
 if TYPE_CHECKING:
-    from rbfrag.exchange.site_rates import SiteBlocks
     from rbfrag.hazards.answer import HazardAnswer
-    from rbfrag.hazards.curve import HazardCurve
+    from rbfrag.hazards.curve import CurveKeywords
+    from rbfrag.question.fields import AnsweringFields
 
 SHORT = (
     "site", "annual_rate", "ci_low", "ci_high", "annual_rate_any", "expected_failures_per_year",
+    "expected_failures_low", "expected_failures_high", "branches_low", "branches_high",
     "probability", "probability_any", "years", "model", "imt", "curve_kind",
 )  # fmt: skip
 """Values that are shown without --verbose."""
+
+MOST_ROWS = 20
+"""Blocks that people are shown; JSON and tables have all."""
 
 EXAMPLE = (
     "Example:  rbfrag hazard pgv-curve.csv --height 2.4 --width 0.5 --dip 3 --component rotd50"
@@ -47,28 +54,25 @@ class RateOptions:
         "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
         "realizations."
     )
+    joint: bool = option(
+        "Count earthquakes in which any of several blocks of a site fails, too.", False
+    )
     at_least: str | None = option(
-        "Numbers of failures in one earthquake whose rates are wanted, as 1,5,20. "
+        "Numbers of failures in one earthquake whose rates are wanted, as 1,5,20, with --joint. "
         "Default: 1, 2, 5, 10, …",
         metavar="K,K",
     )
 
-    def counts(self, blocks: int, most: int) -> list[int] | None:
-        """Return the numbers of failures whose rates are wanted at a site.
-
-        Args:
-            blocks: number of blocks at the site; what it cannot reach is left out.
-            most: number at the site that has most; beyond it a number is kept, and refused.
-        """
+    def counts(self) -> list[int] | None:
+        """Return the numbers of failures whose rates are wanted at a site."""
         if self.at_least is None:
             return None
         try:
-            numbers = [int(part) for part in self.at_least.split(",")]
+            return [int(part) for part in self.at_least.split(",")]
         except ValueError:
             raise InputError(
                 f"--at-least {self.at_least!r}: give whole numbers with commas, as 1,5,20"
             ) from None
-        return [number for number in numbers if number <= blocks or number > most]
 
 
 @stacked
@@ -80,11 +84,12 @@ def hazard(
         "logic tree.",
         metavar="CURVE...",
     ),
-    given: options.Block,
+    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
     blocks: BlocksOptions,
     meaning: options.Curve,
     answering: options.Answering,
     wanted: RateOptions,
+    workers: WorkerOptions,
     out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
@@ -95,9 +100,9 @@ def hazard(
     """Print the annual rate at which a block topples.
 
     The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. Blocks of --blocks stand at the curves' sites by site_id, else all at one: beside their
-    rates it gives how often an earthquake fails at least one of them, or more, by what the model
-    knows of blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are answered,
+    follows. Blocks of --blocks stand at the curves' sites by site_id. With --joint it gives how
+    often an earthquake fails at least one block of a site, or more, by what the model knows of
+    blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are answered,
     each by a model of that very measure; another needs --convert. With --weights curves
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
@@ -106,86 +111,84 @@ def hazard(
 
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
     from rbfrag.fragility.unusable import FROM_SUMS
-    from rbfrag.hazards.answer import hazard as answer
+    from rbfrag.hazards.answer import hazard_at_sites
+    from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import suited_in
+    from rbfrag.hazards.kernel import rate_part
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     table, is_class, remarks, rows = blocks.given_blocks(given)
     files = [suited_in(path, **vars(meaning)) for path in curve]
-    sites, joined, missing = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
+    at = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
     if rows is not None:
-        of_none = np.isin(np.arange(rows.blocks["row"].size), [*missing])
-        rows = rows.without(of_none, missing.__getitem__)
+        of_none = np.isin(np.arange(rows.blocks["row"].size), [*at.missing])
+        rows = rows.without(of_none, at.missing.__getitem__)
         remarks += rows.unusable_in_words(FROM_SUMS)
-    if plot is not None and (len(sites) > 1 or len(sites[0].names) > 1):
+    if plot is not None and len(at.names) > 1 and not is_class:
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
-    most = max(len(one.names) for one in sites)
-    answers = [
-        answer(
-            one.curves, **one.numbers, weights=wanted.weights,
-            at_least=wanted.counts(len(one.names), most), years=wanted.years, one_class=is_class,
-            **vars(meaning), **answering,
-        )
-        for one in sites
-    ]  # fmt: skip
+    elsewhere = workers.scheduler is not None or (workers.jobs or 1) > 1
+    run = workers.runner(rate_part) if elsewhere else None
+    answer = hazard_at_sites(
+        at.sites, at.site, at.given, cast("CurveKeywords", vars(meaning)),
+        cast("AnsweringFields", answering),
+        weight=branch_weights(wanted.weights, at.sites[0]), joint=wanted.joint,
+        at_least=wanted.counts(), years=wanted.years, one_class=is_class, run=run,
+    )  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers, rows), out, excel_text=excel_text)
-    first = [one.curves[0] for one in sites]
+        write_table(rate_columns(answer, at.columns, rows), out, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
-        plot_contribution(first[0], answers[0], plot)
+        plot_contribution(at.sites[0][0], answer, plot)
     document = as_dict(
-        first, [one.names for one in sites], answers,
-        (*remarks, *joined),
-        None if rows is None else rows.refused_by_row(),
-    )  # fmt: skip
+        answer, at.names, (*remarks, *at.remarks), None if rows is None else rows.refused_by_row()
+    )
     if printing.json:
         print_json(document)
         return
-    _print(document, sites, answers, first, verbose=printing.verbose)
+    _print(document, answer, at.names, verbose=printing.verbose)
 
 
 def _print(
     document: dict[str, Any],
-    sites: list[SiteBlocks],
-    answers: list[HazardAnswer],
-    curves: list[HazardCurve],
+    answer: HazardAnswer,
+    names: list[str | None],
     *,
     verbose: bool,
 ) -> None:
     warnings = document.pop("warnings")
     branches = document.pop("branches", None)
-    rows = document.pop("blocks", None) or document.pop("answers", None)
+    rows = document.pop("blocks", None)
     if rows is not None:
-        for own, one, curve_of in zip(sites, answers, curves, strict=True):
-            if one.joint is not None:
-                print(_in_common(one, curve_of))
-                print(most_often(own.names, one.annual_rate.tolist()))
+        for sentence in (*_of_all(answer), most_often(names, answer.annual_rate.tolist())):
+            print(sentence)
         document.pop("sites", None)
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
         counts = document.pop("annual_rate_at_least", None)
         print_pairs(document if verbose else _short(document))
-        for some in filter(None, (counts, branches, rows)):
+        shown = rows[: len(rows) if verbose else MOST_ROWS]
+        for some in filter(None, (counts, branches, shown)):
             print()
             if not verbose:
                 for row in some:
                     row.pop("numerical_error", None)
             print_rows(some if verbose else [rounded_values(row) for row in some])
+        if len(shown) < len(rows):
+            print(f"{len(rows) - len(shown):,} more: --out FILE writes all, --verbose prints them")
     else:
         del document["contributions"]
         print(rate_in_words(document))
-        for sentence in beyond_in_words(answers[0]):
+        for sentence in beyond_in_words(answer):
             print(sentence)
         print()
         print_pairs(document if verbose else _short(document))
         if document["annual_rate"] > 0.0:
             print()
-            print_table(["from", "to", "share_%"], _shares(answers[0], curves[0]))
+            print_table(["from", "to", "share_%"], _shares(answer, answer.curves[0]))
         if branches:
             print()
             print_table(list(branches[0]), [list(row.values()) for row in branches])
@@ -198,28 +201,35 @@ def _short(document: dict[str, Any]) -> dict[str, Any]:
     return rounded_values(known)
 
 
-def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
-    """Return what several blocks of one site do, in two sentences."""
-    assert answer.joint is not None
-    where = f"{curve.place}: at" if curve.place else "At"
-    expected = (
-        f"{answer.expected_failures_per_year:.2g} failures a year are expected of all "
-        f"{answer.annual_rate.size} blocks, several of them in one earthquake."
+def _of_all(answer: HazardAnswer) -> Iterator[str]:
+    """Yield what all blocks do, in sentences."""
+    size, sites = answer.annual_rate.size, len(answer.curves)
+    expected = answer.expected_failures_per_year
+    ends = f"{answer.total_low:.2g} to {answer.total_high:.2g}, {100.0 * answer.level:g} %"
+    where = f" at {sites:,} sites" if sites > 1 else ""
+    yield (
+        f"{expected:.2g} failures a year ({ends}, by what is not known of the model) are expected "
+        f"of all {size:,} blocks{where}, several of them in one earthquake."
     )
-    rate, chance = answer.joint.annual_rate_any, answer.joint.probability_any
-    if rate is not None and chance is not None:
-        return (
-            f"{where} least one of the blocks fails in an earthquake {once_in(rate)} on average, "
-            f"with a probability of {percent(chance)} in {answer.years:g} years. {expected}"
+    for curve, joint in zip(answer.curves, answer.joints, strict=True):
+        if joint is None:
+            continue
+        place = f"{curve.place}: at" if curve.place else "At"
+        rate, chance = joint.annual_rate_any, joint.probability_any
+        if rate is not None and chance is not None:
+            yield (
+                f"{place} least one of the blocks fails in an earthquake {once_in(rate)} on "
+                f"average, with a probability of {percent(chance)} in {answer.years:g} years."
+            )
+            continue
+        least, most = (
+            percent(joint.bounds[name]["probability_any"])
+            for name in ("fully_dependent", "independent")
         )
-    least, most = (
-        percent(answer.joint.bounds[name]["probability_any"])
-        for name in ("fully_dependent", "independent")
-    )
-    return (
-        f"{where} least one of the blocks fails in {answer.years:g} years with a probability of "
-        f"{least} under full dependence and {most} if independent. {expected}"
-    )
+        yield (
+            f"{place} least one of the blocks fails in {answer.years:g} years with a probability "
+            f"of {least} under full dependence and {most} if independent."
+        )
 
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:

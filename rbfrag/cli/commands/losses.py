@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,6 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, option, stacked
 
 if TYPE_CHECKING:
-    from rbfrag.hazards.event_counts import EventYears, PartCounts
     from rbfrag.hazards.losses import LossAnswer
 
 EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
@@ -40,9 +38,6 @@ SHORT = (
 
 OF_YEARS = ("largest_of_year", "sum_of_year", "beyond_effective_time")
 """Columns of a curve that are left out without --verbose."""
-
-AFTER_A_DEATH = "run the same command again"
-"""What to do when a worker process has died: nothing is stored."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +138,7 @@ def losses(
     """
     from rbfrag.exchange.block_rows import PORTFOLIO, read_blocks
     from rbfrag.exchange.event_losses import losses as answered
+    from rbfrag.hazards.event_counts import count_part
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     rows = read_blocks(table.blocks, meaning.kind, reads=PORTFOLIO, sheet=table.sheet)
@@ -152,7 +148,7 @@ def losses(
             expected=sampling.expected, seed=sampling.seed,
             investigation_time=time.investigation_time, ses=time.ses,
             imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,
-            **answering, run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
+            **answering, run=workers.runner(count_part), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)
@@ -164,25 +160,6 @@ def losses(
         print_json(answer.as_dict())
         return
     _print(answer, verbose=printing.verbose)
-
-
-class _Workers:
-    """Does the parts of the work by local processes, or by a cluster."""
-
-    def __init__(self, jobs: int | None, scheduler: str | None) -> None:
-        from rbfrag.campaign.executors.local import check_workers
-
-        check_workers(jobs, scheduler)
-        self._jobs, self._scheduler = jobs, scheduler
-
-    def __call__(self, parts: Iterator[EventYears], number: int) -> Iterator[PartCounts]:
-        from rbfrag.campaign.executors.local import executor
-        from rbfrag.hazards.event_counts import count_part
-
-        with executor(
-            count_part, self._jobs, self._scheduler, after_a_death=AFTER_A_DEATH
-        ) as execute:
-            yield from execute(parts, number)
 
 
 def _print(answer: LossAnswer, *, verbose: bool) -> None:

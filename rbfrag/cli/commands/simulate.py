@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.output import (
@@ -33,6 +34,10 @@ RECOVERY = "recovery"
 """What stands for failure past recovery in a list of rotations."""
 
 
+AFTER_A_DEATH = "run the same command again"
+"""What to do when a worker process has died of a command that stores nothing."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class WorkerOptions:
     """Who does the work."""
@@ -41,6 +46,22 @@ class WorkerOptions:
     scheduler: str | None = option(
         "Dask scheduler whose workers take the place of local ones, tcp://host:8786.", metavar="URL"
     )
+
+    def runner(self, work: Callable[[Any], Any]) -> Callable[[Iterator[Any], int], Iterator[Any]]:
+        """Return what does the parts of some work, by local processes or by a cluster.
+
+        Args:
+            work: does one part; a function of a module, which workers can find.
+        """
+        from rbfrag.campaign.executors.local import check_workers, executor
+
+        check_workers(self.jobs, self.scheduler)
+
+        def run(parts: Iterator[Any], number: int) -> Iterator[Any]:
+            with executor(work, self.jobs, self.scheduler, after_a_death=AFTER_A_DEATH) as execute:
+                yield from execute(parts, number)
+
+        return run
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -178,7 +178,7 @@ def _rate(block: Mapping[str, Any], question: RateQuestion, answering: RangeFiel
     # another model reads the curve's measure alone
     how: dict[str, Any] = {name: v for name, v in answering.items() if name in ("level", "db")}
     answer = hazard(curves, years=question.years, **block, **question.meaning, **how)
-    return Rate(curves[0], answer, as_dict([curves[0]], [[None]], [answer]))
+    return Rate(curves[0], answer, as_dict(answer, [None]))
 
 
 def _held(

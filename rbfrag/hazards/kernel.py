@@ -1,0 +1,424 @@
+"""Rates of failure of many blocks: P of each on the nodes of a grid against its site's mass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.fragility.checks import outside_domain
+from rbfrag.fragility.intervals import ParameterErrors, quantiles_of
+from rbfrag.fragility.method import arrays
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.mass import Grid, Indices, SiteMass, curve_mass, of_sites, under
+from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.solver.results import FloatArray
+from rbfrag.solver.scatter import fraction, lognormal
+
+_VALUES_AT_ONCE = 1 << 17
+"""Blocks times nodes that are worked on together: what they need stays near the processor."""
+
+_REACH, _EACH, _FEWEST_POINTS = 5.0, 0.1, 9
+"""How far what a block may be is integrated, in standard deviations, and in which steps of it."""
+
+_EDGE_EVERY = 10
+"""Nodes between two edges of what the parts of a rate are given for."""
+
+_BLOCKS_OF_A_PART = 4096
+_HALVINGS = 48
+_EVERY = 8
+"""Nodes of which one tells whether they are in the ranges that a model was fitted on."""
+
+
+@dataclass(frozen=True, eq=False)
+class KernelBlocks:
+    """Blocks that one model of one measure answers for.
+
+    Args:
+        model: the model.
+        median: the measure at u is median · exp(u).
+        numbers: what it reads of them, by field, draws x m; one draw of certain blocks.
+        weight: weights of the draws, which sum to 1.
+        site: index of each block's site, shape (m,).
+    """
+
+    model: FragilityModel
+    median: float
+    numbers: Mapping[str, FloatArray]
+    weight: FloatArray
+    site: Indices
+
+    @classmethod
+    def of(
+        cls,
+        model: FragilityModel,
+        median: float,
+        numbers: Mapping[str, FloatArray],
+        site: Indices,
+    ) -> list[tuple[Indices, KernelBlocks]]:
+        """Return certain and uncertain blocks, each with where they stand among all.
+
+        Args:
+            numbers: fields of the blocks and their standard deviations, shape (m,) each.
+        """
+        block = model.method.block
+        sigmas = {
+            name: np.nan_to_num(np.asarray(numbers[f"{name}_sigma"], dtype=np.float64))
+            for name in block.sigmas.values()
+            if f"{name}_sigma" in numbers
+        }
+        medians = {
+            name: np.asarray(value, dtype=np.float64)
+            for name, value in numbers.items()
+            if name not in block.sigmas
+        }
+        own = block.filled(medians)
+        # what a block has of itself goes with what it may be, unless that has a scatter of its own
+        medians |= {name: own[name] for name in sigmas if name in own}
+        uncertain = np.zeros(site.size, dtype=np.bool_)
+        for sigma in sigmas.values():
+            uncertain |= sigma > 0.0
+        result = []
+        for places in (np.flatnonzero(~uncertain), np.flatnonzero(uncertain)):
+            if not places.size:
+                continue
+            own = {name: sigma[places] for name, sigma in sigmas.items() if sigma[places].any()}
+            axes = [normal_steps(_points(float(sigma.max())), _REACH) for sigma in own.values()]
+            weight = np.ones(1)
+            for _, of_one in axes:
+                weight = np.outer(weight, of_one).ravel()
+            points = np.meshgrid(*(x for x, _ in axes), indexing="ij")
+            drawn = {name: value[places][None] for name, value in medians.items()}
+            for (name, sigma), z in zip(own.items(), points, strict=True):
+                law = fraction if name in block.fractions else lognormal
+                drawn[name] = law(z.reshape(-1, 1), drawn[name], sigma)
+            shape = weight.size, places.size
+            drawn = {n: np.broadcast_to(v, shape) for n, v in block.filled(drawn).items()}
+            result.append((places, cls(model, median, drawn, weight, site[places])))
+        return result
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.site.size
+
+    def only(self, chosen: Indices) -> KernelBlocks:
+        """Return some of the blocks."""
+        numbers = {name: each[:, chosen] for name, each in self.numbers.items()}
+        return KernelBlocks(self.model, self.median, numbers, self.weight, self.site[chosen])
+
+    def values(self, u: FloatArray) -> dict[str, Any]:
+        """Return what the formula reads at u, of a shape that broadcasts with draws x blocks."""
+        block, term = self.model.method.block, self.model.term
+        given: dict[str, Any] = {name: each[..., None] for name, each in self.numbers.items()}
+        given[term.inputs[0]] = self.median * np.exp(u)
+        return block.completed(given, term, arrays())
+
+    def forbidden(self, values: Mapping[str, Any]) -> NDArray[np.bool_]:
+        """Return where mechanics says that nothing fails."""
+        result = np.zeros((self.weight.size, self.size, 1), dtype=np.bool_)
+        for bound in self.model.bounds(values):
+            result = result | bound.holds(values)
+        return result
+
+    def allowed_from(self, grid: Grid) -> FloatArray:
+        """Return u from which on mechanics lets each fail, draws x blocks, within the grid."""
+        shape = (self.weight.size, self.size)
+        low = np.full(shape, grid.u[0] - grid.step)
+        high = np.full(shape, grid.u[-1] + grid.step)
+        if not self.model.form.bounds:
+            return low
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            forbidden = self.forbidden(self.values(middle[..., None]))[..., 0]
+            low, high = np.where(forbidden, middle, low), np.where(forbidden, high, middle)
+        return high
+
+
+class Table(NamedTuple):
+    """P of m blocks on nodes, and how it changes with the parameters.
+
+    Args:
+        probability: P, m x nodes.
+        slopes: derivatives of P by each parameter, m x nodes or None.
+        outside: 1 where blocks and shaking lie outside the ranges fitted, m x nodes.
+    """
+
+    probability: FloatArray
+    slopes: tuple[FloatArray, ...] | None
+    outside: FloatArray
+
+
+def _points(sigma: float) -> int:
+    return max(_FEWEST_POINTS, 2 * math.ceil(_REACH * sigma / _EACH) + 1)
+
+
+def table_of(
+    blocks: KernelBlocks, grid: Grid, first: int, allowed: FloatArray, *, slopes: bool = True
+) -> Table:
+    """Return P of the blocks on the nodes of a grid from one on.
+
+    Where P jumps at what mechanics allows, the two nodes about the jump get what makes a sum over
+    nodes of a smooth mass right to the second order: with the jump t steps below its next node,
+    that node has 1/2 + t - t²/2 of it and the one before t²/2.
+
+    Args:
+        allowed: u from which on mechanics lets each fail, draws x blocks.
+    """
+    u = grid.u[first:]
+    with np.errstate(all="ignore"):
+        p, by_parameter, values = _evaluated(blocks, u, slopes=slopes)
+        draws = blocks.weight.size
+        # of many draws each jumps elsewhere, which comes to the same
+        jumps = draws == 1 and bool((allowed[0] > u[0]).any())
+        if jumps:
+            # P just above the jump: to P itself, one more node
+            at, at_slopes, _ = _evaluated(blocks, allowed[..., None] + 1e-9, slopes=slopes)
+            _smooth_jumps(grid, first, allowed[0], p[0], at[0, :, 0])
+            for own, one in zip(by_parameter, at_slopes, strict=True):
+                _smooth_jumps(grid, first, allowed[0], own[0], one[0, :, 0])
+        outside = _outside(blocks, values, u.size)
+
+    def mean(each: FloatArray) -> FloatArray:
+        return each[0] if draws == 1 else np.tensordot(blocks.weight, each, axes=1)
+
+    return Table(
+        mean(p), tuple(mean(each) for each in by_parameter) if slopes else None, mean(outside)
+    )
+
+
+def _evaluated(
+    blocks: KernelBlocks, u: FloatArray, *, slopes: bool
+) -> tuple[FloatArray, list[FloatArray], dict[str, Any]]:
+    model, ns, values = blocks.model, arrays(), blocks.values(u)
+    unscaled, h = model.form.unscaled(model.parameters, values, ns)
+    eta, link = unscaled.eta * h, model.method.link
+    forbidden = blocks.forbidden(values)
+    p = np.where(forbidden, 0.0, link.probability(eta, ns))
+    if not slopes:
+        return p, [], values
+    density = np.where(forbidden, 0.0, link.density(eta, ns) * h)
+    # far below its bound a density is 0, and a slope there may be infinite
+    return p, [np.where(density > 0.0, density * slope, 0.0) for slope in unscaled.slopes], values
+
+
+def _smooth_jumps(
+    grid: Grid, first: int, allowed: FloatArray, values: FloatArray, jump: FloatArray
+) -> None:
+    x = allowed / grid.step - grid.first - first
+    node = np.ceil(x).astype(np.intp)
+    row = np.flatnonzero((x > 0.0) & (node < values.shape[1]) & np.isfinite(jump))
+    node, t = node[row], (node - x)[row]
+    values[row, node] += jump[row] * (t - 0.5 * t * t - 0.5)
+    values[row, node - 1] += jump[row] * 0.5 * t * t
+
+
+def _outside(blocks: KernelBlocks, values: Mapping[str, Any], size: int) -> FloatArray:
+    """Return where blocks and shaking lie outside the ranges, by every few nodes."""
+    some = np.arange(_EVERY // 2, size + _EVERY // 2, _EVERY)
+    some = np.minimum(some, size - 1)
+    thin = {
+        name: value[..., some] if np.shape(value)[-1:] == (size,) and size > 1 else value
+        for name, value in values.items()
+    }
+    model = blocks.model
+    model.with_ratios(thin)
+    outside = np.zeros((blocks.weight.size, blocks.size, some.size), dtype=np.bool_)
+    for finding in outside_domain(model, thin):
+        outside |= finding.holds
+    if model.spread is not None:
+        outside |= ~model.spread.holds(thin, arrays())
+    return np.repeat(outside, _EVERY, axis=-1)[..., :size].astype(np.float64)
+
+
+class Rates(NamedTuple):
+    """What the kernel gives of m blocks.
+
+    Args:
+        rate: annual rate of failure of each [1/a].
+        half: what the interval of its rate reaches to on either side, Student's quantile times
+            the standard error [1/a], by the delta method.
+        gradient: derivatives of the rate by the model's parameters, k x m.
+        error: how far the grid may be off [1/a].
+        outside: part of the rate from outside the ranges that the model was fitted on [1/a].
+        branches: rate in each branch [1/a], branches x m.
+        ends: P at the first and the last level of the curve and at its end, 3 x m.
+    """
+
+    rate: FloatArray
+    half: FloatArray
+    gradient: FloatArray
+    error: FloatArray
+    outside: FloatArray
+    branches: FloatArray
+    ends: FloatArray
+
+
+class RatePart(NamedTuple):
+    """Blocks of some sites, as they travel to a worker.
+
+    Args:
+        number: place of the part in the order of all.
+        row: the model as stored.
+        blocks: the other attributes of `KernelBlocks`, by name.
+        mass: of these sites alone.
+        level: confidence level of the interval.
+    """
+
+    number: int
+    row: ModelRow
+    blocks: Mapping[str, Any]
+    mass: SiteMass
+    level: float
+
+
+class PartRates(NamedTuple):
+    """The rates of a part."""
+
+    number: int
+    rates: Rates
+
+
+Run = Callable[[Iterator[RatePart], int], Iterator[PartRates]]
+"""Does the parts of the work, of which the number is given, and yields the results in any order."""
+
+
+def rate_part(part: RatePart) -> PartRates:
+    """Return the rates of a part; a function of a module, for worker processes."""
+    blocks = KernelBlocks(FragilityModel.from_row(part.row), **part.blocks)
+    return PartRates(part.number, rates(blocks, part.mass, part.level))
+
+
+def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = None) -> Rates:
+    """Return the annual rates of failure of some blocks.
+
+    The parts of the work do not depend on who does them, nor does the answer.
+
+    Args:
+        level: confidence level of the interval.
+        run: does the parts of the work; None for here, all at once.
+    """
+    if run is not None:
+        return _in_parts(blocks, mass, level, run)
+    allowed = blocks.allowed_from(mass.grid)
+    k, b = len(blocks.model.parameters), mass.branches.shape[0]
+    rows = np.zeros((6 + k + b, blocks.size))
+    for some, first in chunks(blocks, mass.grid, allowed):
+        own = blocks.only(some)
+        rows[:, some] = _sums(own, table_of(own, mass.grid, first, allowed[:, some]), mass, first)
+    gradient = rows[3 : 3 + k]
+    return Rates(
+        rows[0], half_width(blocks.model.errors, gradient, level), gradient, rows[1], rows[2],
+        rows[3 + k : 3 + k + b], rows[3 + k + b :],
+    )  # fmt: skip
+
+
+def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> Rates:
+    order = np.argsort(blocks.site, kind="stable")
+    parts = np.split(order, np.arange(_BLOCKS_OF_A_PART, order.size, _BLOCKS_OF_A_PART))
+
+    def given() -> Iterator[RatePart]:
+        for number, some in enumerate(parts):
+            own = blocks.only(some)
+            low, high = int(own.site.min()), int(own.site.max()) + 1
+            columns = {
+                "median": own.median, "numbers": own.numbers, "weight": own.weight,
+                "site": own.site - low,
+            }  # fmt: skip
+            here = of_sites(mass, slice(low, high))
+            yield RatePart(number, own.model.row, columns, here, level)
+
+    each = sorted(run(given(), len(parts)))
+    joined = (np.concatenate(values, axis=-1) for values in zip(*(r for _, r in each), strict=True))
+    back = np.argsort(order)
+    return Rates(*(values[..., back] for values in joined))
+
+
+def half_width(errors: ParameterErrors, gradient: FloatArray, level: float) -> FloatArray:
+    """Return Student's quantile times the standard error of what has these derivatives, (m,)."""
+    return np.asarray(errors.half_width(list(gradient), quantiles_of(level), arrays()))
+
+
+def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tuple[Indices, int]]:
+    """Yield blocks that are worked on together, and the first node at which one of them may fail.
+
+    Blocks that begin to fail at like levels go together.
+    """
+    starts = np.floor(allowed.min(axis=0) / grid.step).astype(np.intp) - grid.first - 1
+    starts = np.clip(starts, 0, grid.size - 1)
+    order = np.argsort(starts, kind="stable")
+    start = 0
+    while start < order.size:
+        first = int(starts[order[start]])
+        many = max(1, _VALUES_AT_ONCE // ((grid.size - first) * blocks.weight.size))
+        yield order[start : start + many], first
+        start += many
+
+
+def _sums(blocks: KernelBlocks, table: Table, mass: SiteMass, first: int) -> list[FloatArray]:
+    def against(masses: FloatArray, values: FloatArray) -> FloatArray:
+        own = masses[:, first:]
+        if own.shape[0] == 1:
+            return np.asarray(values @ own[0])
+        return np.asarray(np.einsum("mn,mn->m", values, own[blocks.site]))
+
+    rate = against(mass.mass, table.probability)
+    assert table.slopes is not None
+    off = against(mass.mass, _off_by(table.probability))
+    ends = [rate * 0.0] * 3
+    if mass.ends is not None:
+        ends = []
+        for unit in (mass.ends.first, mass.ends.last, mass.ends.end):
+            group = unit[mass.ends.group] if unit.shape[0] > 1 else unit
+            ends.append(np.minimum(against(group, table.probability), 1.0))
+    return [
+        rate,
+        np.abs(off),
+        against(mass.mass, table.probability * table.outside),
+        *(against(mass.mass, slope) for slope in table.slopes),
+        *(against(branch, table.probability) for branch in mass.branches),
+        *ends,
+    ]
+
+
+def _off_by(values: FloatArray) -> FloatArray:
+    """Return what every second value differs by from the cubic through those between.
+
+    That is the error of a grid of twice the step.
+    """
+    result = np.zeros(values.shape)
+    a, b, c, d = (values[:, i : values.shape[1] - 6 + i : 2] for i in (0, 2, 4, 6))
+    result[:, 3:-3:2] = values[:, 3:-3:2] - (9.0 * (b + c) - a - d) / 16.0
+    return result
+
+
+def curve_contributions(
+    curve: HazardCurve, shaking: LevelShaking, blocks: Sequence[KernelBlocks]
+) -> tuple[FloatArray, FloatArray]:
+    """Return which levels of a curve the mean rate of some blocks comes from.
+
+    Returns:
+        Edges between levels, shape (k + 1,), and the part of the rate from each interval [1/a],
+        shape (1, k); what lies beyond the last level is in none.
+    """
+    mass = curve_mass([[curve]], np.ones(1), shaking)
+    grid, total = mass.grid, np.zeros(mass.grid.size)
+    for some in blocks:
+        p = table_of(some, grid, 0, some.allowed_from(grid), slopes=False).probability
+        total += p.sum(axis=0)
+    mean = mass.smoothing.of(total / sum(some.size for some in blocks))
+    part = under([curve], grid, beyond=False)[0] * mean
+    low, high = np.log(curve.levels[[0, -1]])
+    starts = np.flatnonzero((grid.u > low) & (grid.u < high))[_EDGE_EVERY::_EDGE_EVERY]
+    edges = np.exp(grid.u[starts] - 0.5 * grid.step)
+    return (
+        np.concatenate([curve.levels[:1], edges, curve.levels[-1:]]),
+        np.add.reduceat(part, np.append(0, starts))[None],
+    )

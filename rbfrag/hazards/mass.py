@@ -1,0 +1,289 @@
+"""How often a year shaking lies about each of equally spaced levels, at some sites.
+
+A rate of failure is a sum over u = ln(level),
+
+    λ_f = ∫ P(u) (-dλ) = Σ W_n P(u_n),
+
+with the mass W_n = ∫ c_n(u) (-dλ), c_n the cardinal function of cubic interpolation between nodes.
+The mass belongs to a site and P to a block, so that each is computed once. What else a level may
+mean to a model, the scatter of a single component about it, is put on the mass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.sparse import csr_array
+
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.solver.results import FloatArray
+
+Indices = NDArray[np.intp]
+
+_GAUSS = np.array([-1.0, 1.0]) / math.sqrt(3.0)
+"""Points of the rule of Gauss and Legendre on [-1, 1]; both weigh 1."""
+
+_BESIDE = 2  # nodes that cubic interpolation reads on either side
+
+
+class Grid(NamedTuple):
+    """Nodes at whole multiples of a step of u = ln(level).
+
+    Args:
+        step: the step.
+        first: multiple of the first node.
+        size: number of nodes.
+    """
+
+    step: float
+    first: int
+    size: int
+
+    @classmethod
+    def over(cls, step: float, low: float, high: float, shift: int = 0) -> Grid:
+        """Return the grid for u between two values and so many nodes more on either side."""
+        first = math.floor(low / step) - _BESIDE - shift
+        return cls(step, first, math.ceil(high / step) + _BESIDE + 1 + shift - first)
+
+    @property
+    def u(self) -> FloatArray:
+        """ln(level) of the nodes, shape (size,)."""
+        return np.asarray(self.step * (self.first + np.arange(self.size)))
+
+    def cubic(self, u: FloatArray) -> tuple[Indices, FloatArray]:
+        """Return the first of four nodes about each u and Lagrange's weights, shape (4, …)."""
+        x = np.clip(u / self.step - self.first, 0.0, self.size - 1.0)
+        start = np.clip(np.floor(x).astype(np.intp) - 1, 0, self.size - 4)
+        t = x - start
+        a, b, c, d = t, t - 1.0, t - 2.0, t - 3.0
+        weights = np.stack([-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0])
+        return start, weights
+
+    def spread(self, u: FloatArray) -> csr_array:
+        """Return the matrix that puts masses at u on the nodes, shape (size, number of u)."""
+        start, weights = self.cubic(u)
+        rows = (start + np.arange(4)[:, None]).ravel()
+        columns = np.tile(np.arange(u.size), 4)
+        return csr_array((weights.ravel(), (rows, columns)), shape=(self.size, u.size))
+
+
+class Smoothing(NamedTuple):
+    """Scatter about a level: masses a whole number of nodes apart.
+
+    Args:
+        every: nodes between two of them.
+        weight: their weights, an odd number, which sum to 1.
+    """
+
+    every: int
+    weight: FloatArray
+
+    @property
+    def reach(self) -> int:
+        """Nodes to the outermost one."""
+        return self.every * (self.weight.size // 2)
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Return values on nodes, the last axis, with the scatter; beyond its ends there is none.
+
+        The scatter is the same to both sides, so that this smooths a mass and a probability alike.
+        """
+        if self.weight.size == 1:
+            return values
+        size, result = values.shape[-1], np.zeros(values.shape)
+        for weight, shift in zip(
+            self.weight, range(-self.reach, self.reach + 1, self.every), strict=True
+        ):
+            to = slice(max(shift, 0), size + min(shift, 0))
+            of = slice(max(-shift, 0), size - max(shift, 0))
+            result[..., to] += weight * values[..., of]
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class CurveEnds:
+    """Where the curves of some sites end, as unit masses at levels of them.
+
+    Args:
+        group: which of the rows each site has, shape (sites,).
+        first: unit mass at the first level, rows x nodes.
+        last: the same at the last level with a rate.
+        end: the same at the level from which on nothing is exceeded; a row of 0 where the curve
+            states none.
+        open: whether it states none, shape (rows,).
+        rate: rate of the last level of each site [1/a], shape (sites,).
+    """
+
+    group: Indices
+    first: FloatArray
+    last: FloatArray
+    end: FloatArray
+    open: NDArray[np.bool_]
+    rate: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SiteMass:
+    """Mass of some sites, and of each of some branches of their logic tree.
+
+    Args:
+        mass: the weighted mean over the branches, with scatter [1/a], sites x nodes.
+        branches: the same of each, branches x sites x nodes; empty for one.
+        weight: weights of the branches, which sum to 1.
+        smoothing: the scatter that is on the masses.
+        ends: of the curves that have most weight; None of event sets.
+    """
+
+    grid: Grid
+    mass: FloatArray
+    branches: FloatArray
+    weight: FloatArray
+    smoothing: Smoothing
+    ends: CurveEnds | None = None
+
+
+def smoothing_of(shaking: LevelShaking) -> tuple[float, Smoothing]:
+    """Return the step of the grid for what levels are to a model, and the scatter on it."""
+    if shaking.shift.size == 1:
+        return STEP, Smoothing(1, np.ones(1))
+    apart = math.log(shaking.shift[1] / shaking.shift[0])
+    return apart / NODES_A_SHIFT, Smoothing(NODES_A_SHIFT, shaking.weight)
+
+
+STEP = 0.01
+"""Step of the grid where nothing scatters about the levels."""
+
+NODES_A_SHIFT = 8
+"""Nodes between two points of the scatter."""
+
+
+def curve_mass(
+    branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, shaking: LevelShaking
+) -> SiteMass:
+    """Return the mass under the hazard curves of some sites.
+
+    Shaking beyond the last level counts as that level, the least that it can be; below the first
+    level nothing is counted.
+
+    Args:
+        branches: curves of one measure, one a site in each branch.
+        weight: weights of the branches, which sum to 1.
+    """
+    step, smoothing = smoothing_of(shaking)
+    curves = [curve for each in branches for curve in each]
+    highest = (c.levels[-1] if c.end_level is None else c.end_level for c in curves)
+    low = math.log(min(float(curve.levels[0]) for curve in curves))
+    grid = Grid.over(step, low, math.log(max(highest)), smoothing.reach)
+    masses = np.stack([under(each, grid) for each in branches])
+    masses = np.stack([smoothing.of(each) for each in masses])
+    return SiteMass(
+        grid,
+        np.tensordot(weight, masses, axes=1),
+        masses if len(branches) > 1 else np.empty((0, *masses.shape[1:])),
+        weight,
+        smoothing,
+        _ends(branches[int(np.argmax(weight))], grid, smoothing),
+    )
+
+
+def _alike(curves: Sequence[HazardCurve]) -> Iterator[tuple[Indices, HazardCurve]]:
+    """Yield the sites whose curves have the same levels, and one of their curves."""
+    groups: dict[bytes, list[int]] = {}
+    for i, curve in enumerate(curves):
+        groups.setdefault(curve.levels.tobytes(), []).append(i)
+    for places in groups.values():
+        yield np.array(places, dtype=np.intp), curves[places[0]]
+
+
+def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> FloatArray:
+    """Return the mass under the curves, without scatter, sites x nodes.
+
+    Two points of Gauss to each step of the grid: a rule that is alike in each step leaves a mass as
+    smooth as the curve.
+
+    Args:
+        beyond: count shaking beyond the last level as that level.
+    """
+    mass = np.zeros((len(curves), grid.size))
+    for places, curve in _alike(curves):
+        u = np.log(curve.levels)
+        inner = grid.u[(grid.u > u[0]) & (grid.u < u[-1])]
+        edges = np.concatenate([u[:1], inner, u[-1:]])
+        half = 0.5 * np.diff(edges)
+        points = ((edges[:-1] + half)[:, None] + half[:, None] * _GAUSS).ravel()
+        rates = np.stack([curves[i].annual_rate for i in places.tolist()], axis=1)
+        spread = grid.spread(np.append(points, u[-1]))
+        for start in range(0, places.size, _SITES_AT_ONCE):
+            some = slice(start, start + _SITES_AT_ONCE)
+            log_rate = PchipInterpolator(u, np.log(rates[:, some]))
+            density = np.maximum(-log_rate(points, 1), 0.0) * np.exp(log_rate(points))
+            density *= np.repeat(half, 2)[:, None]
+            mass[places[some]] = (spread @ np.vstack([density, float(beyond) * rates[-1:, some]])).T
+    return mass
+
+
+_SITES_AT_ONCE = 512
+
+
+def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> CurveEnds:
+    keys: dict[tuple[float, float, float | None], int] = {}
+    group = np.array(
+        [keys.setdefault((c.levels[0], c.levels[-1], c.end_level), len(keys)) for c in curves]
+    )
+
+    def unit(levels: Sequence[float | None]) -> FloatArray:
+        known = np.array([1.0 if level is None else level for level in levels])
+        rows = grid.spread(np.log(known)).toarray().T
+        rows[[level is None for level in levels]] = 0.0
+        return smoothing.of(rows)
+
+    first, last, end = zip(*keys, strict=True)
+    return CurveEnds(
+        group, unit(first), unit(last), unit(end), np.array([level is None for level in end]),
+        np.array([float(curve.annual_rate[-1]) for curve in curves]),
+    )  # fmt: skip
+
+
+def event_mass(
+    events: EventSet, name: str, sites: Indices, shaking: LevelShaking
+) -> tuple[SiteMass, FloatArray]:
+    """Return the mass of an event set at some sites, and u of each of its rows.
+
+    Args:
+        name: the measure.
+        sites: indices of the sites, rising.
+
+    Returns:
+        The mass, and ln(level) of the rows; -inf where nothing shook.
+    """
+    step, smoothing = smoothing_of(shaking)
+    with np.errstate(divide="ignore"):
+        u = np.log(events.measures[name])
+    row = np.flatnonzero(np.isfinite(u) & np.isin(events.site, sites))
+    ends = (u[row].min(), u[row].max()) if row.size else (0.0, 0.0)
+    grid = Grid.over(step, float(ends[0]), float(ends[1]), smoothing.reach)
+    start, weights = grid.cubic(u[row])
+    weights *= events.weight[events.event[row]]
+    cell = np.searchsorted(sites, events.site[row]) * grid.size + start
+    mass = np.zeros(sites.size * grid.size)
+    for node in range(4):
+        mass += np.bincount(cell + node, weights[node], minlength=mass.size)
+    whole = smoothing.of(mass.reshape(sites.size, grid.size))
+    empty = np.empty((0, *whole.shape))
+    return SiteMass(grid, whole, empty, np.ones(1), smoothing), u
+
+
+def of_sites(mass: SiteMass, sites: slice) -> SiteMass:
+    """Return the mass of some of the sites."""
+    ends = mass.ends
+    if ends is not None:
+        ends = replace(ends, group=ends.group[sites], rate=ends.rate[sites])
+    return replace(mass, mass=mass.mass[sites], branches=mass.branches[:, sites], ends=ends)
