@@ -22,6 +22,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
+Indices = NDArray[np.intp]
 
 UNKNOWN = 0
 """Polarity of a block whose azimuth is not known: component and polarity are drawn at random."""
@@ -129,6 +130,17 @@ class Placement:
     def correlation(self, dependence: Dependence) -> FloatArray:
         """Return R of every two blocks, shape (n, n); azimuths must be known."""
         return dependence.correlation(*vars(self).values())
+
+
+def any_fails(probability: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return P that any block fails under full dependence and if independent, tables x nodes each.
+
+    Args:
+        probability: P, tables x blocks x nodes.
+    """
+    with np.errstate(divide="ignore"):
+        none = np.log1p(-probability).sum(axis=-2)
+    return probability.max(axis=-2), -np.expm1(none)
 
 
 def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
@@ -274,25 +286,57 @@ def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Depen
     for start in range(0, n, rows):
         i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
         i += start
-        d_l, d_y = np.abs(blocks.l[i] - blocks.l[j]), np.abs(blocks.ln_y[i] - blocks.ln_y[j])
-        site = blocks.site[i] == blocks.site[j]
-        component = site & (blocks.component[i] == blocks.component[j])
-        sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
-        either = site & (sign == UNKNOWN)
-        r = law.of_pairs(d_l, d_y, site, component & ~either, sign)
-        excess = joint_excess(a[i], a[j], r)
-        if either.any():  # another component in half of the cases, else the same or opposite side
-            here = np.ones(int(either.sum()), dtype=np.bool_)
-            own = [
-                joint_excess(
-                    a[i[either]], a[j[either]],
-                    law.of_pairs(d_l[either], d_y[either], here, here, np.full(here.size, side)),
-                )
-                for side in (-1.0, 1.0)
-            ]  # fmt: skip
-            excess[either] = 0.5 * excess[either] + 0.25 * (own[0] + own[1])
-        total += float(excess @ (w[i] * w[j]))
+        total += float(pair_excess(a[i], a[j], blocks, i, j, law) @ (w[i] * w[j]))
     return total
+
+
+def pair_excess(
+    a: FloatArray, b: FloatArray, blocks: Placement, i: Indices, j: Indices, law: Dependence
+) -> FloatArray:
+    """Return the covariance of the failures of pairs of one earthquake, shape (pairs,).
+
+    Of a block with unknown azimuth it is the mean over the azimuths: another component in half of
+    the cases, else the same or the opposite side.
+
+    Args:
+        a: bounds of Z of the first blocks, shape (pairs,).
+        b: the same of the others.
+        i: indices of the first blocks.
+        j: of the others.
+    """
+    r, either, sides = _pair_correlations(blocks, i, j, law)
+    excess = joint_excess(a, b, r)
+    if either.any():
+        own = sum(joint_excess(a[either], b[either], side) for side in sides)
+        excess[either] = 0.5 * excess[either] + 0.25 * own
+    return excess
+
+
+def least_and_greatest(blocks: Placement, law: Dependence) -> tuple[float, float]:
+    """Return the least and the greatest R that two of some blocks of one earthquake may have."""
+    r, _, sides = _pair_correlations(blocks, *np.triu_indices(blocks.size, 1), law)
+    ways = np.concatenate([r, *sides])
+    return float(ways.min(initial=1.0)), float(ways.max(initial=-1.0))
+
+
+def _pair_correlations(
+    blocks: Placement, i: Indices, j: Indices, law: Dependence
+) -> tuple[FloatArray, NDArray[np.bool_], list[FloatArray]]:
+    """Return R of pairs, which of them may face either way, and their R on both ways.
+
+    The first R of these is that of different components.
+    """
+    d_l, d_y = np.abs(blocks.l[i] - blocks.l[j]), np.abs(blocks.ln_y[i] - blocks.ln_y[j])
+    site = blocks.site[i] == blocks.site[j]
+    sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
+    either = site & (sign == UNKNOWN)
+    component = site & ~either & (blocks.component[i] == blocks.component[j])
+    here = np.ones(int(either.sum()), dtype=np.bool_)
+    sides = [
+        law.of_pairs(d_l[either], d_y[either], here, here, np.full(here.size, side))
+        for side in (-1.0, 1.0)
+    ]
+    return law.of_pairs(d_l, d_y, site, component, sign), either, sides
 
 
 def checked(

@@ -9,18 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import COMPONENTS, Placement
+from rbfrag.fragility.joint import COMPONENTS, SIDES, Indices, Placement
 from rbfrag.solver.results import FloatArray
 
-Indices = NDArray[np.intp]
-
-REPLICATES = 8
+REPLICATES = 2
 """Independent scrambles of the points; what means over them differ by is their error."""
 
 MOST_RANK = 256
@@ -33,20 +32,24 @@ _LEAST = 2.0**-33
 _LEAST_SHARE = 1e-13
 
 
-def uniform_points(size: int, power: int, seed: int) -> Iterator[FloatArray]:
-    """Yield one scramble of points after another, uniform between 0 and 1, shape (2^power, size).
-
-    Args:
-        size: number of coordinates; those beyond the first `MOST_EVEN` are drawn at random.
-        power: base-2 logarithm of the number of points.
-    """
+@lru_cache(maxsize=4)
+def _even_normals(power: int, seed: int) -> FloatArray:
+    """Return normals of low discrepancy, `MOST_EVEN` x points of all scrambles: one set for all."""
     from scipy.stats.qmc import Sobol
 
-    for generator in np.random.default_rng(seed).spawn(REPLICATES):
-        even = min(size, MOST_EVEN)
-        rest = generator.random((1 << power, size - even))
-        drawn = [Sobol(even, rng=generator).random_base2(power)] if even else []
-        yield np.clip(np.concatenate([*drawn, rest], axis=1), _LEAST, 1.0 - _LEAST)
+    drawn = [
+        Sobol(MOST_EVEN, rng=generator).random_base2(power)
+        for generator in np.random.default_rng(seed).spawn(REPLICATES)
+    ]
+    uniform = np.ascontiguousarray(np.concatenate(drawn).T)
+    return np.asarray(ndtri(np.clip(uniform, _LEAST, 1.0 - _LEAST)))
+
+
+@lru_cache(maxsize=4)
+def _first_sides(power: int, seed: int, rows: int) -> NDArray[np.int8]:
+    """Return the side that each of some blocks faces first, rows x points."""
+    generator = np.random.default_rng([seed, rows])
+    return generator.integers(SIDES, size=(rows, REPLICATES << power), dtype=np.int8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,42 +87,51 @@ class LatentPoints:
         self._power = max(0, int(np.log2(max(1, points // REPLICATES))))
         self._parts = list(_parts(dependence, blocks))
         variance = [np.square(part.loading).sum(axis=0) for part in self._parts]
-        self._order = np.argsort(-np.concatenate([*variance, np.zeros(0)]), kind="stable")
+        order = np.argsort(-np.concatenate([*variance, np.zeros(0)]), kind="stable")
+        self._coordinate = np.argsort(order, kind="stable")
 
     @property
     def points(self) -> int:
         """Number of points of all replicates."""
         return REPLICATES << self._power
 
-    def replicates(self) -> Iterator[FloatArray]:
-        """Yield Z of one scramble after another, shape (sides, points, n).
+    def sides(self) -> tuple[FloatArray, NDArray[np.int8]]:
+        """Return Z on each side that blocks may face, and the side that each faces first.
 
-        Sides are four where an azimuth is not known, else one.
+        Sides are four where an azimuth is not known, else one; turned by one after another, each
+        block faces each of its sides once.
+
+        Returns:
+            Sides x n x points of one replicate after another, and n x points.
         """
-        for point in uniform_points(self._order.size, self._power, self._seed):
-            normal = np.empty_like(point)
-            normal[:, self._order] = ndtri(point)
-            yield self._values(normal)
-
-    def _values(self, normal: FloatArray) -> FloatArray:
         blocks, start = self._blocks, 0
-        slots = COMPONENTS if blocks.drawn.any() else 1
-        field = np.zeros((3, slots, blocks.size, normal.shape[0]))
+        n, drawn = blocks.size, blocks.drawn
+        slots, ways = (COMPONENTS, SIDES) if drawn.any() else (1, 1)
+        field, normal = np.zeros((3, slots, n, self.points)), self._normals()
         for part in self._parts:
             stop = start + part.loading.shape[1]
-            field[part.kind, part.slot, part.member] += part.loading @ normal[:, start:stop].T
+            values = part.loading @ normal[self._coordinate[start:stop]]
+            field[part.kind, part.slot, part.member] += values
             start = stop
         common, symmetric, antisymmetric = field
-        sides = (
-            [(slot, side) for slot in range(slots) for side in (1, -1)] if slots > 1 else [(0, 1)]
-        )
-        z = np.empty((len(sides), normal.shape[0], blocks.size))
-        for k, (slot, side) in enumerate(sides):
-            own = np.where(blocks.drawn, slot, 0)
-            facing = np.where(blocks.drawn, side, blocks.polarity)[:, None]
-            rows = own, np.arange(blocks.size)
-            z[k] = (common[0] + symmetric[rows] + facing * antisymmetric[rows]).T
-        return z
+        symmetric += common[0]
+        z = np.stack([symmetric[k // 2] + q * antisymmetric[k // 2] for k, q in _SIDES[:ways]])
+        known = ~drawn
+        z[:, known] = (symmetric[0] + blocks.polarity[:, None] * antisymmetric[0])[known]
+        rows = max(n, MOST_EVEN)  # one set for all but large sites
+        return z, _first_sides(self._power, self._seed, rows)[:n]
+
+    def _normals(self) -> FloatArray:
+        """Return independent normals, the most important of low discrepancy, rank x points."""
+        normal, more = _even_normals(self._power, self._seed), self._coordinate.size - MOST_EVEN
+        if more <= 0:
+            return normal
+        generator = np.random.default_rng([self._seed, more])
+        return np.concatenate([normal, generator.standard_normal((more, self.points))])
+
+
+_SIDES = tuple(enumerate((1, -1) * COMPONENTS))
+"""Sides: both polarities of one component, then of the other."""
 
 
 def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rbfrag.hazards.annual_rate import FailureRate, probability_in
-from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.joint_thresholds import JointThresholds
-from rbfrag.hazards.shaking import ends_in_words
+from rbfrag.hazards.annual_rate import probability_in
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
+
+if TYPE_CHECKING:
+    from rbfrag.hazards.joint_thresholds import JointRates
 
 NO_LAW = "bounds"
 """Joint law where only bounds are known."""
@@ -54,14 +54,12 @@ class JointRate:
         joint_law: how the blocks of one earthquake fail together.
         bounds: the rate and the probability under full dependence, where the block of the greatest
             P fails first, and if blocks fail independently at each level of the shaking.
-        warnings: what these numbers take for granted.
     """
 
     at_least: tuple[CountRate, ...]
     annual_rate_any_ci: tuple[float, float] | None
     joint_law: str
     bounds: Mapping[str, Mapping[str, float]]
-    warnings: tuple[str, ...]
 
     @property
     def annual_rate_any(self) -> float | None:
@@ -76,51 +74,41 @@ class JointRate:
     @classmethod
     def of(
         cls,
-        any_bounds: FailureRate,
-        block_rates: FloatArray,
-        thresholds: JointThresholds | None,
-        curve: HazardCurve,
+        any_bounds: Sequence[float],
         years: float,
+        rates: JointRates | None = None,
+        ends_of_any: tuple[float, float] | None = None,
     ) -> JointRate:
-        """Return the integral of P(any fails | x) over -dλ, by the model's stored dependence.
+        """Return the rates of one site with their probabilities.
 
         Earthquakes are the Poisson process, not failures: the probability in T years is
         1 - exp(-λ_any T).
 
         Args:
-            any_bounds: rates at which any fails under full dependence and if independent.
-            block_rates: rates of the single blocks [1/a], shape (n,).
-            thresholds: levels at which blocks fail by the model's copula; None where it is not
-                known.
+            any_bounds: rates at which any fails under full dependence and if independent [1/a].
+            years: the period [a].
+            rates: what :func:`~rbfrag.hazards.joint_thresholds.joint_rates` gives, of any failure
+                first; None where the law is not known.
+            ends_of_any: both ends of the interval of the rate of any failure [1/a].
         """
-        names = ("annual_rate", "above", "above_at_most", "below")
-        ends = ends_in_words(
-            [curve], np.zeros(1, dtype=np.intp), *(getattr(any_bounds, name)[1:] for name in names)
-        )
-        rates = any_bounds.annual_rate
         bounds = {
             name.replace(" ", "_"): {
                 "annual_rate_any": float(rate),
                 "probability_any": float(probability_in(years, rate)),
             }
-            for name, rate in zip((DEPENDENT, INDEPENDENT), rates, strict=True)
+            for name, rate in zip((DEPENDENT, INDEPENDENT), any_bounds, strict=True)
         }
-        here = tuple(f"annual_rate_any: {text}" for text in ends)
-        if thresholds is None:
-            return cls((), None, NO_LAW, bounds, here)
-        rates_at, errors = thresholds.rates(curve, block_rates)
+        if rates is None:
+            return cls((), None, NO_LAW, bounds)
+        of_first = rates.rate[:, 0], rates.error, probability_in(years, rates.rate[:, 0])
         tiny = np.finfo(np.float64).tiny
         at_least = tuple(
-            CountRate(
-                count, float(rate), float(error / max(rate, tiny)),
-                float(probability_in(years, rate)),
+            CountRate(count, rate, error / max(rate, tiny), probability)
+            for count, rate, error, probability in zip(
+                rates.counts, *(values.tolist() for values in of_first), strict=True
             )
-            for count, rate, error in zip(
-                thresholds.counts, rates_at[:, 0, 0], errors, strict=True
-            )
-        )  # fmt: skip
-        ends_of_any = float(rates_at[0, 0, 1]), float(rates_at[0, 0, 2])
-        return cls(at_least, ends_of_any, COPULA, bounds, here)
+        )
+        return cls(at_least, ends_of_any, COPULA, bounds)
 
     @classmethod
     def mean(cls, parts: Sequence[JointRate], weights: FloatArray) -> JointRate:
@@ -133,9 +121,8 @@ class JointRate:
             law: {name: meant(part.bounds[law][name] for part in parts) for name in numbers}
             for law, numbers in parts[0].bounds.items()
         }
-        warnings = tuple(dict.fromkeys(text for part in parts for text in part.warnings))
         if parts[0].joint_law == NO_LAW:
-            return cls((), None, NO_LAW, bounds, warnings)
+            return cls((), None, NO_LAW, bounds)
         at_least = tuple(
             CountRate(
                 first.count,
@@ -150,7 +137,7 @@ class JointRate:
             meant(part.annual_rate_any_ci[i] for part in parts if part.annual_rate_any_ci)
             for i in (0, 1)
         )
-        return cls(at_least, (low, high), parts[0].joint_law, bounds, warnings)
+        return cls(at_least, (low, high), parts[0].joint_law, bounds)
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""

@@ -1,150 +1,218 @@
-"""At which shaking the first, second, … block of a site fails, at points of low discrepancy.
+"""How often a year so many of a site's blocks fail: P on nodes of the shaking against its mass.
 
-Given Z every block fails from one level of the shaking on, x_i = P_i⁻¹(Φ(Z_i)). The rate of
-earthquakes with k failures or more therefore is the mean over Z of λ at the k-th smallest x_i: one
-set of points answers for all curves and all k, and no level of the shaking needs points of its own.
+Given Z every block fails from one level of the shaking on, that at which P_i = Φ(Z_i); this level
+is exceeded λ_i(Z_i) times a year. The rate of earthquakes with k failures or more is the mean over
+Z of the k-th greatest λ_i(Z_i): one set of points of low discrepancy answers for all k.
+
+What is known without points is taken from there: one block; two, by Φ₂ at each node; independent
+ones; ones that have one Z. Everything else is corrected by the sum of the λ_i, whose mean is the
+sum of the blocks' own rates (a control variate, Hammersley and Handscomb 1964).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint import IntArray, Placement, any_fails, least_and_greatest, pair_excess
 from rbfrag.fragility.joint_points import REPLICATES, LatentPoints
-from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.model_blocks import ProbabilityTable
+from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
-_VALUES, _OF_DRAWS = 2**19, 2**23
-_MOST_POINTS, _FEWEST_POINTS = 2**14, 2**10
-_FEWEST_OF_A_DRAW = 2**8
+MOST_POINTS, FEWEST_POINTS = 4096, 1024
+"""Points of all replicates: the more, the fewer blocks."""
 
-_STEPS, _REACH = 128, 8.0
-"""Steps of Z to one standard deviation, and how far they reach, where thresholds are tabled."""
+_STEPS, _REACH = 64, 8.0
+"""Steps of Z to one standard deviation, and how far they reach, where λ of a block is tabled."""
 
-_MOST_KEPT = 100
-"""Blocks up to which the thresholds of all are kept, whose rates are known, to correct by them."""
-
-_SURE = 38.0
+_LEVELS = ndtr(np.arange(-_REACH * _STEPS, _REACH * _STEPS + 1) / _STEPS)
+_VALUES, _SAME, _MOST_PAIRED = 1 << 17, 1e-9, 1000
 
 
-@dataclass(frozen=True, eq=False)
-class JointThresholds:
-    """Levels at which the k-th block fails.
+class JointRates(NamedTuple):
+    """How often earthquakes fail so many blocks or more, for each of some tables of P.
 
     Args:
         counts: the numbers of failures k, rising.
-        log_level: ln x at which the k-th block fails, counts x draws of the blocks' parameters x
-            bands of P x scrambles x points; beyond the table where it does not.
-        every: the same of each single block, by the first draw and band, scrambles x points x
-            blocks; None for many blocks or draws.
+        rate: annual rates [1/a], counts x tables.
+        error: standard errors of the first table's as quadratures [1/a]; 0 of what is exact.
     """
 
     counts: tuple[int, ...]
-    log_level: FloatArray
-    every: FloatArray | None
-
-    @classmethod
-    def of(
-        cls,
-        table: ProbabilityTable,
-        blocks: Placement,
-        dependence: Dependence,
-        counts: Sequence[int] = (1,),
-        *,
-        seed: int = 0,
-    ) -> JointThresholds:
-        """Return the levels by a model's copula.
-
-        Args:
-            table: P by draws x bands x blocks.
-            counts: numbers of failures, from 1 to the number of blocks.
-        """
-        draws, bands, n, _ = table.values.shape
-        values, fewest = (
-            (_VALUES, _FEWEST_POINTS) if draws == 1 else (_OF_DRAWS // draws, _FEWEST_OF_A_DRAW)
-        )
-        points = LatentPoints(
-            dependence, blocks, int(np.clip(values // n, fewest, _MOST_POINTS)), seed
-        )
-        ordered = sorted(set(counts))
-        at = [count - 1 for count in ordered]
-        inverse = _inverse(table)
-        first = np.arange(n) * inverse.shape[-1]
-        result, every = [], []
-        for z, generator in zip(
-            points.replicates(), np.random.default_rng(seed).spawn(REPLICATES), strict=True
-        ):
-            place = np.clip(np.rint((z + _REACH) * _STEPS), 0, inverse.shape[-1] - 1)
-            place = place.astype(np.intp) + first
-            sides = place.shape[0]
-            turn = generator.integers(sides, size=place.shape[1:])
-            replicate = np.empty((len(at), draws, bands, place.shape[0] * place.shape[1]))
-            own = []
-            for side in range(sides):  # each block faces each of its sides once
-                chosen = np.take_along_axis(place, (turn + side)[None] % sides, axis=0)[0]
-                some = slice(side * chosen.shape[0], (side + 1) * chosen.shape[0])
-                for draw, band in np.ndindex(draws, bands):
-                    levels = inverse[draw, band].ravel()[chosen]
-                    if n <= _MOST_KEPT and draws == 1 and band == 0:
-                        own.append(levels.copy())
-                    if at == [0]:
-                        replicate[0, draw, band, some] = levels.min(axis=1)
-                    else:
-                        levels.partition(at, axis=1)
-                        replicate[:, draw, band, some] = levels[:, at].T
-            result.append(replicate)
-            every.extend([np.concatenate(own)] if own else [])
-        return cls(tuple(ordered), np.stack(result, axis=3), np.stack(every) if every else None)
-
-    def rates(
-        self, curve: HazardCurve, block_rates: FloatArray | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return annual rates of k failures or more, and their standard errors as quadratures.
-
-        Where every block's levels are kept, the rates are corrected by how far the sum over the
-        blocks is from that of the known rates, in the proportion in which both go together (a
-        control variate, Hammersley and Handscomb 1964).
-
-        Args:
-            block_rates: rates of the single blocks [1/a], shape (n,); None for no correction.
-
-        Returns:
-            Rates [1/a], counts x draws x bands; errors [1/a] of the first draw and band, (counts,).
-        """
-        rate = curve.rate_from(self.log_level)
-        means = rate.mean(axis=-1)
-        first = means[:, 0, 0].copy()
-        if self.every is not None and block_rates is not None:
-            total = curve.rate_from(self.every).sum(axis=-1)
-            spread = total - total.mean()
-            variance = float(np.mean(spread**2))
-            for k in range(first.shape[0]):
-                slope = float(np.mean(rate[k, 0, 0] * spread)) / variance if variance > 0.0 else 0.0
-                first[k] -= slope * (total.mean(axis=-1) - float(block_rates.sum()))
-        error = first.std(axis=-1, ddof=1) / np.sqrt(first.shape[-1])
-        mean = means.mean(axis=-1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            factor = np.where(mean[:, 0, 0] > 0.0, first.mean(axis=-1) / mean[:, 0, 0], 1.0)
-        return np.asarray(mean * np.maximum(factor, 0.0)[:, None, None]), np.asarray(error)
-
-    def probability(self, level: float) -> FloatArray:
-        """Return P of k failures or more at a level of the shaking, shape (counts,)."""
-        fails = self.log_level[:, 0, 0] <= np.log(level)
-        return np.asarray(fails.mean(axis=(-1, -2)))
+    rate: FloatArray
+    error: FloatArray
 
 
-def _inverse(table: ProbabilityTable) -> FloatArray:
-    """Return ln x at which blocks fail, draws x bands x blocks x steps of Z."""
-    values, nodes = table.values, table.nodes
-    z = np.arange(-_REACH * _STEPS, _REACH * _STEPS + 1) / _STEPS
-    bound = np.clip(ndtri(np.maximum.accumulate(values, axis=-1)), -_SURE, _SURE)
-    inverse = np.empty((*values.shape[:-1], z.size))
-    for row in np.ndindex(values.shape[:-1]):
-        inverse[row] = np.interp(z, bound[row], nodes, right=nodes[-1] + 1.0)
-    return inverse
+def joint_rates(
+    probability: FloatArray,
+    mass: FloatArray,
+    blocks: Placement,
+    law: Dependence,
+    counts: Sequence[int] = (1,),
+    *,
+    seed: int = 0,
+) -> JointRates:
+    """Return how often a year so many blocks of one site fail.
+
+    All tables answer by the same points, so that what they differ by is no scatter.
+
+    Args:
+        probability: P, tables x blocks x nodes of equal steps of ln(level), rising.
+        mass: annual rate of shaking about each node [1/a], shape (nodes,).
+        blocks: the n blocks.
+        law: what they share.
+        counts: numbers of failures, from 1 to n.
+    """
+    ks, n = sorted(set(counts)), blocks.size
+    least, most = (-1.0, 1.0) if n > _MOST_PAIRED else least_and_greatest(blocks, law)
+    each = probability @ mass
+    total = each.sum(axis=1)
+    error = np.zeros(len(ks))
+    if n == 1:
+        rate = each.T
+    elif most < _SAME and least > -_SAME:
+        rate = np.stack([at_least(table, ks) @ mass for table in probability], axis=1)
+    elif least > 1.0 - _SAME:
+        rate = np.sort(probability, axis=1)[:, [n - k for k in ks]].swapaxes(0, 1) @ mass
+    elif n == 2:
+        both = np.stack([_both(table, blocks, law) for table in probability]) @ mass
+        rate = np.stack([total - both if k == 1 else both for k in ks])
+    else:
+        rate, error = _by_points(probability, mass, blocks, law, ks, seed, total)
+    # no law of these P goes beyond
+    low, high = (p @ mass for p in any_fails(probability))
+    high = high if least > -_SAME else total
+    for i, k in enumerate(ks):
+        rate[i] = np.clip(rate[i], low if k == 1 else 0.0, np.maximum(high, low))
+        high = np.minimum(rate[i], total / (k + 1.0))
+    return JointRates(tuple(ks), rate, error)
+
+
+def at_least(probability: FloatArray, counts: Sequence[int]) -> FloatArray:
+    """Return P that k or more of independent blocks fail, counts x nodes.
+
+    Args:
+        probability: P, blocks x nodes.
+    """
+    number = np.zeros((max(counts), probability.shape[1]))
+    number[0] = 1.0
+    for p in probability:
+        number[1:] += p * (number[:-1] - number[1:])
+        number[0] *= 1.0 - p
+    return np.asarray(1.0 - np.cumsum(number, axis=0)[[k - 1 for k in counts]])
+
+
+def _both(probability: FloatArray, blocks: Placement, law: Dependence) -> FloatArray:
+    """Return P that both of two blocks fail, shape (nodes,)."""
+    one, other = probability
+    some = np.flatnonzero(np.minimum(one, other) > 0.0)
+    both, first = np.zeros(one.size), np.zeros_like(some)
+    a, b = ndtri(one[some]), ndtri(other[some])
+    both[some] = one[some] * other[some] + pair_excess(a, b, blocks, first, first + 1, law)
+    return np.clip(both, 0.0, np.minimum(one, other))
+
+
+def _by_points(
+    probability: FloatArray,
+    mass: FloatArray,
+    blocks: Placement,
+    law: Dependence,
+    counts: Sequence[int],
+    seed: int,
+    total: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    points = int(np.clip(_VALUES // blocks.size, FEWEST_POINTS, MOST_POINTS))
+    z, side = LatentPoints(law, blocks, points, seed).sides()
+    above = mass[::-1].cumsum()[::-1]
+    rate, error = np.empty((len(counts), probability.shape[0])), np.empty(len(counts))
+    for number, table in enumerate(probability):
+        levels = _rates_of_levels(np.ascontiguousarray(table), above, _LEVELS)
+        mean, product, mean_sum, squares = _moments(levels, z, side, np.array(counts))
+        spread = squares.mean() - mean_sum.mean() ** 2
+        shared = product.mean(axis=0) - mean.mean(axis=0) * mean_sum.mean()
+        slope = shared / spread if spread > 0.0 else np.zeros(len(counts))
+        corrected = mean - slope * (mean_sum - total[number])[:, None]
+        rate[:, number] = corrected.mean(axis=0)
+        if number == 0:
+            error = corrected.std(axis=0, ddof=1) / np.sqrt(corrected.shape[0])
+    return rate, error
+
+
+@kernel
+def _rates_of_levels(probability: FloatArray, above: FloatArray, levels: FloatArray) -> FloatArray:
+    """Return how often a year P reaches each of some rising levels, blocks x levels."""
+    n, nodes = probability.shape
+    result = np.zeros((n, levels.size))
+    for i in range(n):
+        p = probability[i]
+        k, low, high = 0, 0.0, p[0]
+        for j in range(levels.size):
+            level = levels[j]
+            while k < nodes and high < level:
+                k += 1
+                if k < nodes:
+                    low, high = high, max(high, p[k])
+            if k == nodes:
+                break
+            # between the middles of two cells the rate is straight
+            last = above[k + 1] if k + 1 < nodes else 0.0
+            own = 0.5 * (above[k] + last)
+            if k == 0:
+                result[i, j] = above[0]
+            else:
+                before = 0.5 * (above[k - 1] + above[k])
+                t = (level - low) / (high - low)
+                result[i, j] = before + t * (own - before)
+    return result
+
+
+@kernel
+def _moments(
+    levels: FloatArray, z: FloatArray, side: NDArray[np.int8], counts: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return means over the points of each replicate.
+
+    Args:
+        levels: rates by steps of Z, blocks x steps.
+        z: Z on each side that a block may face, sides x blocks x points.
+        side: the first side of each, blocks x points.
+        counts: numbers of failures k.
+
+    Returns:
+        Of the k-th greatest rate and its product with the sum, replicates x counts; of the sum and
+        its square, (replicates,).
+    """
+    sides, n, points = z.shape
+    most, end = counts.max(), levels.shape[1] - 1
+    mean, product = np.zeros((REPLICATES, counts.size)), np.zeros((REPLICATES, counts.size))
+    mean_sum, squares = np.zeros(REPLICATES), np.zeros(REPLICATES)
+    own, rates = np.empty((n, points)), np.empty(n)
+    for turn in range(sides):  # each block faces each of its sides once
+        for i in range(n):
+            for point in range(points):
+                x = (z[(side[i, point] + turn) % sides, i, point] + _REACH) * _STEPS
+                x = min(max(x, 0.0), end - 1e-9)
+                j = int(x)
+                own[i, point] = levels[i, j] + (x - j) * (levels[i, j + 1] - levels[i, j])
+        for point in range(points):
+            r = point * REPLICATES // points
+            total, greatest = 0.0, 0.0
+            for i in range(n):
+                rates[i] = own[i, point]
+                total += rates[i]
+                greatest = max(greatest, rates[i])
+            if most > 1:
+                rates.sort()
+            for k in range(counts.size):
+                rate = greatest if most == 1 else rates[n - counts[k]]
+                mean[r, k] += rate
+                product[r, k] += rate * total
+            mean_sum[r] += total
+            squares[r] += total * total
+    number = points // REPLICATES * sides
+    return mean / number, product / number, mean_sum / number, squares / number

@@ -69,6 +69,15 @@ class ProbabilityTable:
         """Return the probabilities, shape (rows, nodes)."""
         return self.values.reshape(-1, self.values.shape[-1])
 
+    def mass(self, curve: HazardCurve) -> FloatArray:
+        """Return how often a year shaking is about each node [1/a], what is beyond at the last."""
+        nodes, last = self.nodes, np.log(curve.levels[-1])
+        edges = np.append(nodes - 0.5 * self.step, nodes[-1] + 0.5 * self.step)
+        mass = -np.diff(curve.rate_from(np.minimum(edges, last)))
+        mass[1:-1] -= np.diff(mass, 2) / 24.0  # from what is in a cell to what is at its node
+        ends = np.maximum(1.0 - np.abs(nodes - last) / self.step, 0.0)
+        return np.asarray(mass + float(curve.annual_rate[-1]) * ends)
+
     @property
     def fine(self) -> Fragility:
         """The probabilities at levels of the curve's measure, rows x levels."""

@@ -6,17 +6,16 @@ model comes with both ends of its interval, which go through the law as P does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint import Placement, any_fails
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards.annual_rate import FailureRate, Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import ModelBlocks, ProbabilityTable
 from rbfrag.hazards.shaking import ends_in_words
 from rbfrag.solver.results import FloatArray
@@ -55,58 +54,55 @@ class StandingBlocks:
     Args:
         count: number of blocks m.
         weight: weights of the k draws of their parameters, which sum to 1, shape (k,).
-        laws: names of the laws by which they fail together; the first answers.
         any_fails: from levels, shape (n,), to the probability that any fails, laws but the copula x
             draws x bands in rows; the bands are P and the two ends of its interval, or P alone.
         coarse: the same from a table of twice the step; None where P is known at every level.
-        thresholds: levels at which they fail by the model's copula; None where that is not known.
-        each: P of every block, where their parameters are known and that law has to be corrected.
+        table: P of every block, draws x bands x blocks; None for a fragility of the caller's.
+        known: how they stand and what they share; None where that is not known.
         of_model: the blocks as the model knows them; None for a fragility of the caller's.
     """
 
     count: int
     weight: FloatArray
-    laws: tuple[str, ...]
     any_fails: Fragility
     coarse: Fragility | None = None
-    thresholds: JointThresholds | None = None
-    each: ProbabilityTable | None = None
+    table: ProbabilityTable | None = None
+    known: tuple[Placement, Dependence] | None = None
     of_model: ModelBlocks | None = None
 
     @classmethod
     def of_fragility(cls, fragility: Fragility, levels: FloatArray) -> StandingBlocks:
         """Return blocks of which the caller gives P at each level, a row for each block."""
         count = np.atleast_2d(fragility(levels)).shape[0]
-
-        def any_fails(x: FloatArray) -> FloatArray:
-            return _rows(bounds(np.atleast_2d(fragility(x))[None, None]))
-
-        return cls(count, np.ones(1), _laws(count), any_fails)
+        return cls(count, np.ones(1), lambda x: _laws(np.atleast_2d(fragility(x))[None, None]))
 
     @classmethod
     def of_blocks(cls, blocks: ModelBlocks, curves: list[HazardCurve]) -> StandingBlocks:
         """Return blocks that a model answers for, over the levels of some curves."""
         table, count, law = blocks.tabled(curves), blocks.count, blocks.model.dependence
-        any_of = ProbabilityTable(table.low, table.step, _rows(bounds(table.values)))
-        thresholds = each = None
-        placement = blocks.placement()
-        if count > 1 and law is not None and placement is not None:
-            thresholds = JointThresholds.of(table, placement, law)
-            if thresholds.every is not None:
-                each = ProbabilityTable(table.low, table.step, table.values[0, 0])
-        laws = (*((COPULA,) if thresholds is not None else ()), *_laws(count))
-        return cls(count, blocks.weight, laws, any_of.fine, any_of.coarse, thresholds, each, blocks)
+        any_of = ProbabilityTable(table.low, table.step, _laws(table.values))
+        where = blocks.placement()
+        known = None if count < 2 or law is None or where is None else (where, law)
+        return cls(count, blocks.weight, any_of.fine, any_of.coarse, table, known, blocks)
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the laws by which they fail together; the first answers."""
+        if self.count == 1:
+            return (ONE_BLOCK,)
+        return (*((COPULA,) if self.known is not None else ()), DEPENDENT, INDEPENDENT)
 
     def rate(self, curve: HazardCurve) -> AnyRate:
         """Return how often any of them fails under a curve."""
         failures = failure_rate(curve, self.any_fails, self.coarse)
-        k, several = self.weight.size, len(self.laws) - (self.thresholds is not None)
+        k, several = self.weight.size, len(self.laws) - (self.known is not None)
         rates = failures.annual_rate.reshape(several, k, -1)
-        if self.thresholds is not None:
-            each = None
-            if self.each is not None:
-                each = failure_rate(curve, self.each.fine, self.each.coarse).annual_rate
-            rates = np.concatenate([self.thresholds.rates(curve, each)[0], rates])
+        if self.known is not None and self.table is not None:
+            from rbfrag.hazards.joint_thresholds import joint_rates
+
+            each = self.table.values.reshape(-1, *self.table.values.shape[2:])
+            joint = joint_rates(each, self.table.mass(curve), *self.known).rate
+            rates = np.concatenate([joint.reshape(1, k, -1), rates])
         part = self._mean(failures, "contribution", several)
         outside = 0.0
         if self.of_model is not None:
@@ -144,25 +140,11 @@ class AnyRate:
     warnings: tuple[str, ...]
 
 
-def _laws(count: int) -> tuple[str, ...]:
-    return (ONE_BLOCK,) if count == 1 else (DEPENDENT, INDEPENDENT)
-
-
-def bounds(p: FloatArray) -> Mapping[str, FloatArray]:
-    """Return P that any of n blocks fails by the laws that need no estimate, best known first.
+def _laws(p: FloatArray) -> FloatArray:
+    """Return P that any block fails by the laws that need no estimate, in rows.
 
     Args:
-        p: P, shape (k, bands, n, levels).
-
-    Returns:
-        Of one block its own P; of several that of the greatest P, if all fail or none, and that of
-        independent ones; each of shape (k, bands, levels).
+        p: P, draws x bands x blocks x levels; of one block its own answers.
     """
-    if p.shape[2] == 1:
-        return {ONE_BLOCK: p[:, :, 0]}
-    return {DEPENDENT: p.max(axis=2), INDEPENDENT: 1.0 - (1.0 - p).prod(axis=2)}
-
-
-def _rows(laws: Mapping[str, FloatArray]) -> FloatArray:
-    values = list(laws.values())
-    return np.stack(values).reshape(-1, values[0].shape[-1])
+    laws = p[:, :, 0] if p.shape[2] == 1 else np.stack(any_fails(p))
+    return laws.reshape(-1, p.shape[-1])
