@@ -30,11 +30,18 @@ from rbfrag.hazards.branches import (
 )
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
-from rbfrag.hazards.joint_rate import JointRate
-from rbfrag.hazards.joint_sites import joint_rates
-from rbfrag.hazards.kernel import KernelBlocks, Rates, Run, curve_contributions, half_width, rates
+from rbfrag.hazards.joint_rate import JointRate, joint_at_sites
+from rbfrag.hazards.kernel import (
+    KernelBlocks,
+    Rates,
+    Run,
+    curve_contributions,
+    half_width,
+    interval_end,
+    rates,
+)
 from rbfrag.hazards.mass import Indices, SiteMass, curve_mass
-from rbfrag.hazards.model_blocks import RateKeywords, parts_by_model
+from rbfrag.hazards.model_parts import RateKeywords, parts_by_model
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
 from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
@@ -296,17 +303,16 @@ def hazard_at_sites(
     result = _Rates.of(each, sound.size, len(mass.branches))
     if one_class:
         result, where = result.mean(each, level), np.zeros(1, dtype=np.intp)
-    wanted = joint or at_least is not None
     joints: tuple[JointRate | None, ...] = (None,) * len(sites)
-    if wanted and not one_class:
-        joints = joint_rates(sites, where, parts, reading, level, branch_weight, at_least, years)
+    of_joints: tuple[str, ...] = ()
+    if (joint or at_least is not None) and not one_class:
+        joints, of_joints = joint_at_sites(each, mass, at_least, years, level)
     ends = _beyond(result, mass, where)
     texts = [
         *remarks, *_unusable(reason, sound, one_class=one_class), *reading.warnings,
         *_of_curves(sites), *(part.model.form.advice for part in parts if part.model.form.advice),
         *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
-        *_numbers_in_words(result),
-        *(text for one in joints if one is not None for text in one.warnings),
+        *_numbers_in_words(result), *of_joints,
     ]  # fmt: skip
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
@@ -416,17 +422,6 @@ def _total_half(each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: floa
         for errors, gradient in gradients.values()
     ]
     return float(np.sqrt(np.square(halves).sum()))
-
-
-def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> FloatArray:
-    """Return an end of the interval of rates, rate · exp(side · half/rate), by the delta method.
-
-    Args:
-        half: Student's quantile times the standard error of the rate.
-        side: -1 or 1.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rate > 0.0, rate * np.exp(side * np.divide(half, rate)), rate)
 
 
 def _beyond(result: _Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:

@@ -1,19 +1,25 @@
-"""How often per year an earthquake fails any, or k or more, of several blocks of one site."""
+"""How often per year an earthquake fails any, or k or more, of several blocks of one site.
+
+The ends of the interval of the rate of any failure are its rates where the model's parameters are
+moved by their error in the direction that changes the sum of the blocks' rates most.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from rbfrag.errors import InputError
+from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.hazards.annual_rate import probability_in
+from rbfrag.hazards.joint_thresholds import JointRates, joint_rates
+from rbfrag.hazards.kernel import KernelBlocks, Rates, error_step, probabilities
+from rbfrag.hazards.mass import Indices, SiteMass
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
-
-if TYPE_CHECKING:
-    from rbfrag.hazards.joint_thresholds import JointRates
 
 NO_LAW = "bounds"
 """Joint law where only bounds are known."""
@@ -94,7 +100,7 @@ class JointRate:
         bounds = {
             name.replace(" ", "_"): {
                 "annual_rate_any": float(rate),
-                "probability_any": float(probability_in(years, rate)),
+                "probability_any": float(probability_in(years, np.asarray(rate))),
             }
             for name, rate in zip((DEPENDENT, INDEPENDENT), any_bounds, strict=True)
         }
@@ -150,3 +156,120 @@ class JointRate:
             "joint_law": self.joint_law,
             "bounds": {name: dict(values) for name, values in self.bounds.items()},
         }
+
+
+def joint_at_sites(
+    each: Sequence[tuple[Indices, KernelBlocks, Rates]],
+    mass: SiteMass,
+    at_least: Sequence[int] | None,
+    years: float,
+    level: float,
+) -> tuple[tuple[JointRate | None, ...], tuple[str, ...]]:
+    """Return how often earthquakes fail several blocks of each site, and what is to be said.
+
+    Args:
+        each: blocks of each model with their rates.
+        at_least: numbers of failures whose rates are wanted; None for usual ones. What the blocks
+            of a site do not reach is left out, unless those of no site do.
+        years: period of the probabilities [a].
+        level: confidence level of the interval.
+
+    Raises:
+        InputError: a number of failures that the blocks of no site reach.
+    """
+    sites = mass.mass.shape[0]
+    number = np.zeros(sites, dtype=np.intp)
+    for _, blocks, _ in each:
+        number += np.bincount(blocks.site, minlength=sites)
+    most = int(np.max(number))
+    for count in at_least or ():
+        if isinstance(count, bool) or not 1 <= count <= most:
+            text = f"at least {count} failures of {most} blocks: give numbers from 1 to {most}"
+            raise InputError(text)
+    result: list[JointRate | None] = [None] * sites
+    why: dict[str, None] = {}
+    for site in np.flatnonzero(number > 1).tolist():
+        here = [
+            (blocks.only(own), rates.gradient[:, own].sum(axis=1))
+            for _, blocks, rates in each
+            if (own := np.flatnonzero(blocks.site == site)).size
+        ]
+        counts = [k for k in ((1, *at_least) if at_least else USUAL_COUNTS) if k <= number[site]]
+        unknown = _unknown([blocks for blocks, _ in here])
+        result[site] = _of_site(here, mass, site, counts, years, level, known=not unknown)
+        if unknown:
+            why[unknown] = None
+    if not any(result):
+        return tuple(result), ()
+    counted = int(number[number > 1].max())
+    return tuple(result), (
+        f"annual_rate_any: {'all' if sites == 1 else 'up to'} {counted} blocks are taken as those "
+        "of one site, of unknown azimuth",
+        *(
+            f"{text}: bounds has annual_rate_any under full dependence and if they fail "
+            "independently"
+            for text in why
+        ),
+    )
+
+
+def _unknown(here: Sequence[KernelBlocks]) -> str:
+    """Return why it is not known what the blocks of a site share; empty text where it is."""
+    models = {blocks.model.name: blocks.model for blocks in here}
+    if any(model.dependence is None or model.method.block.size is None
+           for model in models.values()):  # fmt: skip
+        return "what the blocks share in one earthquake is not known to this model"
+    if len(models) > 1:
+        return "what blocks of several models share in one earthquake is not known"
+    if sum(blocks.size for blocks in here) > MOST_JOINT:
+        return f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
+    return ""
+
+
+def _of_site(
+    here: Sequence[tuple[KernelBlocks, FloatArray]],
+    mass: SiteMass,
+    site: int,
+    counts: Sequence[int],
+    years: float,
+    level: float,
+    *,
+    known: bool,
+) -> JointRate:
+    model, blocks = here[0][0].model, [some for some, _ in here]
+    steps: list[FloatArray | float] = [0.0]
+    law = model.dependence if known else None
+    if law is not None:
+        step = error_step(model, np.sum([own for _, own in here], axis=0), level)
+        steps = [0.0, -step, step]
+    tables = np.stack(
+        [
+            np.concatenate([probabilities(some, mass.grid, step) for some in blocks])
+            for step in steps
+        ]
+    )
+    own = mass.mass[site]
+    branches = mass.branches[:, site][mass.weight > 0.0] if mass.branches.size else own[None]
+    weights = mass.weight[mass.weight > 0.0]
+    parts, ends = [], None
+    if law is not None:
+        where = _placement(blocks)
+        rate = joint_rates(tables, own, where, law).rate[0]
+        ends = float(rate[1:].min()), float(rate[1:].max())
+    for branch in branches:
+        bounds = [float(p @ branch) for p in any_fails(tables[0])]
+        rates = None if law is None else joint_rates(tables[:1], branch, where, law, counts)
+        parts.append(JointRate.of(bounds, years, rates, ends))
+    return JointRate.mean(parts, weights) if len(parts) > 1 else parts[0]
+
+
+def _placement(here: Sequence[KernelBlocks]) -> Placement:
+    """Return the blocks of a site as those of unknown azimuths, by their medians."""
+    block = here[0].model.method.block
+    medians = {
+        name: np.concatenate([blocks.numbers[name][blocks.weight.size // 2] for blocks in here])
+        for name in block.names
+    }
+    placement = Placement.of_numbers(block, medians, polarity=UNKNOWN)
+    assert placement is not None
+    return placement

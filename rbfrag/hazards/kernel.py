@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -344,6 +344,44 @@ def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> R
 def half_width(errors: ParameterErrors, gradient: FloatArray, level: float) -> FloatArray:
     """Return Student's quantile times the standard error of what has these derivatives, (m,)."""
     return np.asarray(errors.half_width(list(gradient), quantiles_of(level), arrays()))
+
+
+def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> FloatArray:
+    """Return an end of the interval of rates, rate · exp(side · half/rate), by the delta method.
+
+    Args:
+        half: Student's quantile times the standard error of the rate.
+        side: -1 or 1.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rate > 0.0, rate * np.exp(side * np.divide(half, rate)), rate)
+
+
+def error_step(model: FragilityModel, gradient: FloatArray, level: float) -> FloatArray:
+    """Return how far the parameters go to the upper end of the interval of some number, shape (k,).
+
+    The step is along V g, the direction of the ellipse of errors in which the number changes most.
+
+    Args:
+        gradient: derivatives g of the number by the parameters, shape (k,).
+    """
+    along = np.array(model.row.covariance) @ gradient
+    variance = float(gradient @ along)
+    if not variance > 0.0:
+        return np.zeros(gradient.size)
+    return np.asarray(along * (half_width(model.errors, gradient[:, None], level)[0] / variance))
+
+
+def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | float = 0.0) -> FloatArray:
+    """Return P of the blocks on all nodes of a grid, m x nodes, never falling.
+
+    Args:
+        step: what is added to the model's parameters.
+    """
+    parameters = tuple(np.add(blocks.model.parameters, step).tolist())
+    moved = replace(blocks, model=replace(blocks.model, parameters=parameters))
+    p = table_of(moved, grid, 0, moved.allowed_from(grid), slopes=False).probability
+    return np.maximum.accumulate(p, axis=1)
 
 
 def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tuple[Indices, int]]:

@@ -1,24 +1,49 @@
 """Blocks of one site, and how often any of them fails, by each law of joint failure.
 
-Blocks may be uncertain: draws of their parameters, with weights, each make a set of blocks. P of a
-model comes with both ends of its interval, which go through the law as P does.
+Blocks may be uncertain: draws of their parameters, with weights, each make a set of blocks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
+from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import Placement, any_fails
+from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.hazards.annual_rate import FailureRate, Fragility, failure_rate
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.unusable import refuse_elements
+from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.model_blocks import ModelBlocks, ProbabilityTable
-from rbfrag.hazards.shaking import ends_in_words
+from rbfrag.hazards.joint_thresholds import joint_rates
+from rbfrag.hazards.kernel import (
+    KernelBlocks,
+    Rates,
+    error_step,
+    interval_end,
+    probabilities,
+    rates,
+)
+from rbfrag.hazards.mass import SiteMass, curve_mass
+from rbfrag.hazards.model_parts import parts_by_model
+from rbfrag.hazards.shaking import LevelShaking, ends_in_words
+from rbfrag.question.blocks import NUMBERS
+from rbfrag.question.fields import AnsweringFields, BlockFields
+from rbfrag.question.keywords import LEVEL
 from rbfrag.solver.results import FloatArray
+from rbfrag.solver.scatter import fraction, lognormal
+
+ALL_STAND = "that all of them stand is the question"
+"""Why blocks of which one cannot be used are refused."""
+
+_SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
+_ALWAYS = 2
+"""Size and strength have their points even where certain: what else scatters does not move them."""
 
 ONE_BLOCK = "one block"
 COPULA = "the model's copula"
@@ -48,87 +73,12 @@ def normals_by_law(law: Dependence | None, where: Placement | None, n: int) -> d
 
 
 @dataclass(frozen=True, eq=False)
-class StandingBlocks:
-    """The blocks of one site.
-
-    Args:
-        count: number of blocks m.
-        weight: weights of the k draws of their parameters, which sum to 1, shape (k,).
-        any_fails: from levels, shape (n,), to the probability that any fails, laws but the copula x
-            draws x bands in rows; the bands are P and the two ends of its interval, or P alone.
-        coarse: the same from a table of twice the step; None where P is known at every level.
-        table: P of every block, draws x bands x blocks; None for a fragility of the caller's.
-        known: how they stand and what they share; None where that is not known.
-        of_model: the blocks as the model knows them; None for a fragility of the caller's.
-    """
-
-    count: int
-    weight: FloatArray
-    any_fails: Fragility
-    coarse: Fragility | None = None
-    table: ProbabilityTable | None = None
-    known: tuple[Placement, Dependence] | None = None
-    of_model: ModelBlocks | None = None
-
-    @classmethod
-    def of_fragility(cls, fragility: Fragility, levels: FloatArray) -> StandingBlocks:
-        """Return blocks of which the caller gives P at each level, a row for each block."""
-        count = np.atleast_2d(fragility(levels)).shape[0]
-        return cls(count, np.ones(1), lambda x: _laws(np.atleast_2d(fragility(x))[None, None]))
-
-    @classmethod
-    def of_blocks(cls, blocks: ModelBlocks, curves: list[HazardCurve]) -> StandingBlocks:
-        """Return blocks that a model answers for, over the levels of some curves."""
-        table, count, law = blocks.tabled(curves), blocks.count, blocks.model.dependence
-        any_of = ProbabilityTable(table.low, table.step, _laws(table.values))
-        where = blocks.placement()
-        known = None if count < 2 or law is None or where is None else (where, law)
-        return cls(count, blocks.weight, any_of.fine, any_of.coarse, table, known, blocks)
-
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the laws by which they fail together; the first answers."""
-        if self.count == 1:
-            return (ONE_BLOCK,)
-        return (*((COPULA,) if self.known is not None else ()), DEPENDENT, INDEPENDENT)
-
-    def rate(self, curve: HazardCurve) -> AnyRate:
-        """Return how often any of them fails under a curve."""
-        failures = failure_rate(curve, self.any_fails, self.coarse)
-        k, several = self.weight.size, len(self.laws) - (self.known is not None)
-        rates = failures.annual_rate.reshape(several, k, -1)
-        if self.known is not None and self.table is not None:
-            from rbfrag.hazards.joint_thresholds import joint_rates
-
-            each = self.table.values.reshape(-1, *self.table.values.shape[2:])
-            joint = joint_rates(each, self.table.mass(curve), *self.known).rate
-            rates = np.concatenate([joint.reshape(1, k, -1), rates])
-        part = self._mean(failures, "contribution", several)
-        outside = 0.0
-        if self.of_model is not None:
-            share = self.of_model.share_outside(np.sqrt(failures.edges[1:] * failures.edges[:-1]))
-            outside = float(part @ share) / max(float(part.sum()), np.finfo(np.float64).tiny)
-        names = ("annual_rate", "above", "above_at_most", "below")
-        warnings = ends_in_words(
-            [curve], np.zeros(1, dtype=np.intp),
-            *(self._mean(failures, name, several)[None] for name in names),
-        )  # fmt: skip
-        mean = float(self.weight @ rates[0, :, 0])
-        return AnyRate(rates, mean, outside, tuple(warnings))
-
-    def _mean(self, failures: FailureRate, name: str, laws: int) -> FloatArray:
-        """Return the mean over the draws of P of the first law that is integrated, shape (...)."""
-        values = getattr(failures, name)
-        rows = values.reshape(laws, self.weight.size, -1, *values.shape[1:])
-        return np.asarray(np.tensordot(self.weight, rows[0, :, 0], axes=1))
-
-
-@dataclass(frozen=True, eq=False)
 class AnyRate:
     """How often any of some blocks fails under one hazard curve.
 
     Args:
-        annual_rate: rates [1/a], laws x draws x bands.
+        annual_rate: rates [1/a], laws x draws x bands; the bands are the rate and the two ends of
+            its interval, or the rate alone.
         mean: the mean over the draws of the first of each [1/a].
         outside: part of it from outside the ranges that the model was fitted on.
         warnings: what the ends of the curve leave open.
@@ -140,11 +90,225 @@ class AnyRate:
     warnings: tuple[str, ...]
 
 
-def _laws(p: FloatArray) -> FloatArray:
-    """Return P that any block fails by the laws that need no estimate, in rows.
+class StandingBlocks(Protocol):
+    """The blocks of one site."""
+
+    @property
+    def count(self) -> int:
+        """Number of blocks m."""
+
+    @property
+    def weight(self) -> FloatArray:
+        """Weights of the k draws of their parameters, which sum to 1, shape (k,)."""
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the laws by which they fail together; the first answers."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is taken for granted."""
+
+    def rate(self, curve: HazardCurve) -> AnyRate:
+        """Return how often any of them fails under a curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class FragilityBlocks:
+    """Blocks of which the caller gives P at each level, a row for each block."""
+
+    fragility: Fragility
+    count: int
+    weight = np.ones(1)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the laws by which they fail together; the first answers."""
+        return _laws(self.count)
+
+    def rate(self, curve: HazardCurve) -> AnyRate:
+        """Return how often any of them fails under a curve."""
+        result = failure_rate(curve, lambda x: _by_law(np.atleast_2d(self.fragility(x))))
+        ends = result.annual_rate, result.above, result.above_at_most, result.below
+        texts = ends_in_words([curve], _FIRST_SITE, *(values[:1] for values in ends))
+        rates = result.annual_rate[:, None, None]
+        return AnyRate(rates, float(rates[0, 0, 0]), 0.0, tuple(texts))
+
+
+@dataclass(frozen=True, eq=False)
+class ModelBlocks:
+    """Blocks of one kind, as certain or uncertain as they are, and the model that answers for them.
 
     Args:
-        p: P, draws x bands x blocks x levels; of one block its own answers.
+        numbers: what the model reads of them, by field, draws x blocks each.
+        weight: weights of the draws, which sum to 1, shape (k,).
+        medians: the same of the medians, shape (m,) each.
+        shaking: what the curve's levels are to the model.
+        remarks: what is to be said of the blocks.
     """
-    laws = p[:, :, 0] if p.shape[2] == 1 else np.stack(any_fails(p))
-    return laws.reshape(-1, p.shape[-1])
+
+    numbers: Mapping[str, FloatArray]
+    weight: FloatArray
+    medians: Mapping[str, FloatArray]
+    shaking: LevelShaking
+    model: FragilityModel
+    level: float
+    remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        given: Mapping[str, Any],
+        shaking: LevelShaking,
+        *,
+        draws: int,
+        seed: int,
+        answering: AnsweringFields,
+    ) -> ModelBlocks:
+        """Return the blocks of medians and standard deviations."""
+        stated = dict(given)
+        for sigma in [name for name in stated if name.endswith("_sigma")]:
+            of = sigma.removesuffix("_sigma")
+            # what a block has of itself is not known before its model is
+            if of not in (*NUMBERS, *stated) and np.any(stated.pop(sigma)):
+                raise InputError(f"{sigma} goes with {of}: give its mean, too")
+        if all(name == "kind" or name.endswith("_sigma") for name in stated):
+            raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
+        parts, remarks, reason = parts_by_model(stated, shaking.name, answering)
+        refuse_elements(reason, ALL_STAND, BlockFields.__optional_keys__)
+        if len(parts) > 1:
+            kinds = " and ".join(part.model.row.kind for part in parts)
+            raise InputError(f"the blocks are of kinds {kinds}: ask of each kind by itself")
+        (part,) = parts
+        size, block = reason.size, part.model.method.block
+        order = np.argsort(part.places)
+        values = {name: each[order] for name, each in part.numbers.items()}
+        for name in stated:
+            if name.endswith("_sigma") and name not in block.sigmas and np.any(stated[name]):
+                kind = part.model.row.kind
+                raise InputError(f"{name} does not go with kind {kind}: leave it out")
+        numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
+        medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
+        scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}
+        z, weight = _standard_draws(
+            [values.get(sigma, np.zeros(size)) for sigma in scatters.values()], draws, seed
+        )
+        drawn = {name: each[None] for name, each in medians.items()}
+        for (name, sigma), points in zip(scatters.items(), z, strict=True):
+            law = fraction if name in block.fractions else lognormal
+            drawn[name] = law(points, medians[name], values.get(sigma, np.zeros(size)))
+        whole = (weight.size, size)
+        drawn = {name: np.broadcast_to(each, whole) for name, each in drawn.items()}
+        level = answering.get("level", LEVEL)
+        return cls(drawn, weight, medians, shaking, part.model, level, remarks)
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return next(iter(self.medians.values())).size
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the laws by which they fail together; the first answers."""
+        known = self.count > 1 and None not in (self.model.dependence, self.placement())
+        return (COPULA, *_laws(self.count)) if known else _laws(self.count)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the model and the curve's meaning take for granted."""
+        block = self.model.method.block
+        assumed = (block.support,) if self.model.kind == block.kind and block.support else ()
+        return (*self.remarks, *self.shaking.warnings, *assumed, *self.model.notes)
+
+    def placement(self) -> Placement | None:
+        """Return the blocks as those of one site with unknown azimuths; None without a size."""
+        return Placement.of_numbers(self.model.method.block, self.medians, polarity=UNKNOWN)
+
+    def rate(self, curve: HazardCurve) -> AnyRate:
+        """Return how often any of them fails under a curve."""
+        mass = curve_mass([[curve]], np.ones(1), self.shaking)
+        k, m = self.weight.size, self.count
+        numbers = {name: each.reshape(1, -1) for name, each in self.numbers.items()}
+        site = np.zeros(k * m, dtype=np.intp)
+        blocks = KernelBlocks(self.model, self.shaking.median, numbers, np.ones(1), site)
+        each = rates(blocks, mass, self.level)
+        rate, outside = (self._mean(values) for values in (each.rate, each.outside))
+        first, last, end = (self._mean(values) for values in each.ends)
+        beyond = float(curve.annual_rate[-1])
+        most = beyond * (np.ones(m) if curve.end_level is None else end)
+        sites = np.zeros(m, dtype=np.intp)
+        warnings = ends_in_words([curve], sites, rate, beyond * last, most, first)
+        if m == 1:
+            ends = (interval_end(each.rate, each.half, side) for side in (-1.0, 1.0))
+            by_law = np.stack([each.rate, *ends], axis=1)[None]
+        else:
+            by_law = self._together(blocks, mass, each)
+        share = outside.sum() / max(float(rate.sum()), np.finfo(np.float64).tiny)
+        mean = float(self.weight @ by_law[0, :, 0])
+        return AnyRate(by_law, mean, float(share), tuple(warnings))
+
+    def _mean(self, values: FloatArray) -> FloatArray:
+        """Return the mean over the draws, shape (m,)."""
+        return np.asarray(self.weight @ values.reshape(self.weight.size, -1))
+
+    def _together(self, blocks: KernelBlocks, mass: SiteMass, each: Rates) -> FloatArray:
+        """Return how often any of several blocks fails, laws x draws x bands."""
+        k, m, own = self.weight.size, self.count, mass.mass[0]
+        gradient = each.gradient @ np.repeat(self.weight, m)
+        step = error_step(self.model, gradient, self.level)
+        moved = [probabilities(blocks, mass.grid, part) for part in (0.0, -step, step)]
+        p = np.stack([part.reshape(k, m, -1) for part in moved], axis=1)
+        laws = [_by_law(one) @ own for one in p.reshape(k * 3, m, -1)]
+        by_law = np.stack(laws, axis=1).reshape(-1, k, 3)
+        law, where = self.model.dependence, self.placement()
+        if law is None or where is None:
+            return by_law
+        joint = joint_rates(p.reshape(k * 3, m, -1), own, where, law).rate
+        return np.concatenate([joint.reshape(1, k, 3), by_law])
+
+
+_FIRST_SITE = np.zeros(1, dtype=np.intp)
+
+
+def _laws(count: int) -> tuple[str, ...]:
+    return (ONE_BLOCK,) if count == 1 else (DEPENDENT, INDEPENDENT)
+
+
+def _by_law(p: FloatArray) -> FloatArray:
+    """Return P that any fails by the laws that need no estimate, in rows; blocks are rows of p."""
+    return p if p.shape[0] == 1 else np.stack(any_fails(p))
+
+
+def _standard_draws(
+    sigmas: Sequence[FloatArray], draws: int, seed: int
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return standard normal values of each parameter, draws x blocks each, and weights.
+
+    One block: a product of steps, exact for smooth integrands. Several: scrambled Sobol points
+    (Owen 1998), normal by their quantiles.
+    """
+    m = sigmas[0].size
+    if not any(sigma.any() for sigma in sigmas):
+        return [np.zeros((1, m)) for _ in sigmas], np.ones(1)
+    if m == 1:
+        steps = [normal_steps(_SIGMA_POINTS if s.any() else 1, _SIGMA_REACH) for s in sigmas]
+        weight = np.ones(1)
+        for _, of_one in steps:
+            weight = np.outer(weight, of_one).ravel()
+        return [
+            z.reshape(-1, 1) for z in np.meshgrid(*(x for x, _ in steps), indexing="ij")
+        ], weight
+    if isinstance(draws, bool) or not 1 <= draws <= 2**16:
+        raise InputError(f"draws = {draws}: give a number from 1 to 65536")
+    from scipy.special import ndtri
+    from scipy.stats.qmc import Sobol
+
+    uncertain = [i for i, sigma in enumerate(sigmas) if sigma.any() or i < _ALWAYS]
+    points = Sobol(len(uncertain) * m, rng=np.random.default_rng(seed)).random(
+        1 << (draws - 1).bit_length()
+    )
+    z = ndtri(points[:draws])
+    place = {i: slice(k * m, (k + 1) * m) for k, i in enumerate(uncertain)}
+    each = [z[:, place[i]] if i in place else np.zeros((draws, m)) for i in range(len(sigmas))]
+    return each, np.full(draws, 1.0 / draws)

@@ -15,10 +15,17 @@ from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
-from rbfrag.hazards.model_blocks import ModelBlocks, RateKeywords
+from rbfrag.hazards.model_parts import RateKeywords
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
-from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
+from rbfrag.hazards.standing_blocks import (
+    DEPENDENT,
+    INDEPENDENT,
+    AnyRate,
+    FragilityBlocks,
+    ModelBlocks,
+    StandingBlocks,
+)
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
@@ -184,12 +191,13 @@ def survival(
     each, weight = branch_curves(curves, weights, meaning)
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
+    blocks: StandingBlocks
     if fragility is None:
         shaking = LevelShaking.of(each[0], **meaning)
-        known = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
-        blocks = StandingBlocks.of_blocks(known, each)
+        known = blocks = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
     elif not given:
-        blocks = StandingBlocks.of_fragility(fragility, each[0].levels)
+        count = np.atleast_2d(fragility(each[0].levels)).shape[0]
+        blocks = FragilityBlocks(fragility, count)
     else:
         raise InputError("fragility says all of the blocks: leave p2 and kr out")
     rates = [blocks.rate(curve) for curve in each]
@@ -290,8 +298,7 @@ def _warnings(
     for curve in curves:
         yield from curve.warnings
         yield from quantile_warning(curve, "survival")
-    if (known := blocks.of_model) is not None:
-        yield from known.warnings
+    yield from blocks.warnings
     for rate in rates:
         yield from rate.warnings
     outside = max(rate.outside for rate in rates)

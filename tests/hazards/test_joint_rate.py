@@ -13,7 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.hazards import joint_sites
+from rbfrag.hazards import joint_rate
 from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.answer import HazardAnswer, hazard, hazard_at_sites, mixture_quantiles
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
@@ -96,7 +96,7 @@ def test_without_an_estimate_both_bounds_are_given() -> None:
 def test_many_blocks_have_the_bounds_of_few(monkeypatch: pytest.MonkeyPatch) -> None:
     p2, kr = np.linspace(1.0, 10.0, 5), np.linspace(0.1, 0.2, 5)
     few = answered(p2, kr, SHARED)
-    monkeypatch.setattr(joint_sites, "MOST_JOINT", 4)
+    monkeypatch.setattr(joint_rate, "MOST_JOINT", 4)
     many = answered(p2, kr, SHARED)
     assert few.annual_rate_any is not None
     assert many.annual_rate_any is None

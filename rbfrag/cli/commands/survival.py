@@ -80,7 +80,7 @@ def survival(
     weighted again by what the standing blocks say of each.
     """
     from rbfrag.hazards.curve_file import as_curves
-    from rbfrag.hazards.model_blocks import ALL_STAND
+    from rbfrag.hazards.standing_blocks import ALL_STAND
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)

@@ -1,0 +1,66 @@
+"""Blocks by the model that answers for them under hazard curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.hazards.curve import CurveKeywords
+from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import BlockKeywords, model_for
+from rbfrag.solver.results import FloatArray
+
+
+class RateKeywords(BlockKeywords[V], CurveKeywords, AnsweringFields, total=False):
+    """What blocks are asked about under hazard curves, and by which model."""
+
+
+class ModelPart(NamedTuple):
+    """Blocks that one model answers for.
+
+    Args:
+        places: where they stand among all, shape (m,).
+        numbers: what the model reads of them, by field, shape (m,) each.
+    """
+
+    places: NDArray[np.intp]
+    numbers: Mapping[str, FloatArray]
+    model: FragilityModel
+
+
+def parts_by_model(
+    given: Mapping[str, Any], measure: str, answering: AnsweringFields
+) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
+    """Return blocks by the model that answers for them.
+
+    Returns:
+        The parts, what is to be said of the blocks, and of each why it cannot be used, empty for
+        those that can.
+
+    Raises:
+        InputError: blocks that are described twice or in part, or are of one kind without a model.
+        UnknownModelError: no model of that name, or of the one kind that there is.
+    """
+    blocks, whole = blocks_of_arrays(given)
+    reason = block_reasons_of(blocks, whole)
+    parts = []
+    for group in blocks.groups:
+        places = np.arange(whole) if group.places is None else group.places
+        try:
+            chosen = model_for(answering, (*group.numbers, measure), group.kind)
+        except (InputError, UnknownModelError) as error:
+            if len(blocks.groups) == 1:
+                raise
+            reason[places] = np.where(reason[places] == "", str(error), reason[places])
+            continue
+        own = np.flatnonzero(reason[places] == "")
+        if own.size:
+            values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
+            parts.append(ModelPart(places[own], values, chosen))
+    return parts, blocks.remarks, reason
