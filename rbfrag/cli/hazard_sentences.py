@@ -112,7 +112,7 @@ def _condition(answer: SurvivalAnswer) -> str:
 def losses_in_words(answer: LossAnswer) -> Iterator[str]:
     """Yield how many blocks fail, how often one does, and what it costs."""
     failures = with_error(answer.average_annual_failures, answer.error(answer.failures))
-    blocks, rate = several(answer.portfolio.size, "block"), answer.annual_rate_any
+    blocks, rate = several(int(answer.portfolio.count.sum()), "block"), answer.annual_rate_any
     if answer.events.is_scenario:
         yield f"{failures} of {blocks} are expected to fail."
         if rate is not None:

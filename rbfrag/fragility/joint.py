@@ -304,7 +304,7 @@ def pair_excess(
         i: indices of the first blocks.
         j: of the others.
     """
-    r, either, sides = _pair_correlations(blocks, i, j, law)
+    r, either, sides = pair_correlations(blocks, i, j, law)
     excess = joint_excess(a, b, r)
     if either.any():
         own = sum(joint_excess(a[either], b[either], side) for side in sides)
@@ -314,12 +314,12 @@ def pair_excess(
 
 def least_and_greatest(blocks: Placement, law: Dependence) -> tuple[float, float]:
     """Return the least and the greatest R that two of some blocks of one earthquake may have."""
-    r, _, sides = _pair_correlations(blocks, *np.triu_indices(blocks.size, 1), law)
+    r, _, sides = pair_correlations(blocks, *np.triu_indices(blocks.size, 1), law)
     ways = np.concatenate([r, *sides])
     return float(ways.min(initial=1.0)), float(ways.max(initial=-1.0))
 
 
-def _pair_correlations(
+def pair_correlations(
     blocks: Placement, i: Indices, j: Indices, law: Dependence
 ) -> tuple[FloatArray, NDArray[np.bool_], list[FloatArray]]:
     """Return R of pairs, which of them may face either way, and their R on both ways.

@@ -1,9 +1,8 @@
 """Samples of which blocks fail in one earthquake, by the copula of `rbfrag.fragility.dependence`.
 
-Up to `MOST_AT_ONCE` blocks of known azimuth the matrix of correlations is factored. Beyond that,
-and where an azimuth is drawn anew in every sample, the parts of Z are drawn one by one: what an
-earthquake and a site share are Ornstein-Uhlenbeck processes in l = ln p, what a component shares is
-a product of two, in l and ln y. Cost and memory then grow with n alone.
+The parts of Z are drawn one by one: what an earthquake and a site share are Ornstein-Uhlenbeck
+processes in l = ln p, what a component shares is a product of two, in l and ln y. Cost and memory
+grow with n alone.
 """
 
 from __future__ import annotations
@@ -16,13 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import COMPONENTS, Placement, checked
+from rbfrag.fragility.joint import COMPONENTS, SIDES, Indices, Placement, checked
 from rbfrag.solver.results import FloatArray
-
-Indices = NDArray[np.intp]
-
-MOST_AT_ONCE = 2000
-"""Blocks up to which the whole matrix of correlations is factored."""
 
 JITTER = 1e-8
 """Added to the diagonal, so that a matrix of nearly equal blocks can be factored."""
@@ -43,20 +37,47 @@ class JointSampler:
     the same.
     """
 
-    def __init__(self, dependence: Dependence, blocks: Placement) -> None:
-        self._blocks = blocks
-        whole = blocks.size <= MOST_AT_ONCE and not blocks.drawn.any()
-        self._whole = _factored(dependence, blocks) if whole else None
-        self._parts = _Parts(dependence, blocks) if self._whole is None else None
+    def __init__(self, law: Dependence, blocks: Placement) -> None:
+        self._law, self._blocks = law, blocks
+        # what is drawn for a block: its own component, or both where the azimuth is not known
+        n, drawn = np.arange(blocks.size), blocks.drawn
+        self._second = np.flatnonzero(drawn)
+        block = np.concatenate([n, self._second])
+        component = np.concatenate(
+            [np.where(drawn, 0, blocks.component), np.ones_like(self._second)]
+        )
+        self._event = _Line(blocks.l, (blocks.earthquake,), law.l_e)
+        self._site = _Line(blocks.l, (blocks.earthquake, blocks.site), law.l_e)
+        of_block = (blocks.earthquake[block], blocks.site[block], component)
+        self._symmetric, self._antisymmetric = (
+            _Surface(blocks.l[block], blocks.ln_y[block], of_block, (length, law.l_y))
+            for length in (law.l_v, law.l_o)
+        )
+
+    def sides(self, draws: int, generator: np.random.Generator) -> FloatArray:
+        """Return Z on each side that blocks may face, shape (sides, draws, n).
+
+        Sides are four where an azimuth is not known, of known ones then all alike; else one.
+        """
+        law, n, second = self._law, self._blocks.size, self._second
+        common = np.sqrt(law.rho_e) * self._event.draw(draws, generator)
+        common += np.sqrt(law.rho_s) * self._site.draw(draws, generator)
+        symmetric = np.sqrt(law.rho_v) * self._symmetric.draw(draws, generator)
+        antisymmetric = np.sqrt(law.rho_o) * self._antisymmetric.draw(draws, generator)
+        z = np.empty((SIDES if second.size else 1, draws, n))
+        for k in range(z.shape[0]):
+            own = np.arange(n)
+            if k >= SIDES // COMPONENTS:
+                own[second] = np.arange(n, n + second.size)
+            facing = np.where(self._blocks.drawn, 1 - 2 * (k % 2), self._blocks.polarity)
+            z[k] = common + symmetric[:, own] + facing * antisymmetric[:, own]
+        return z
 
     def normals(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return Z, shape (draws, n)."""
-        if self._parts is not None:
-            return self._parts.draw(draws, generator)
-        z = np.empty((draws, self._blocks.size))
-        for own, node, factor in self._whole or ():
-            z[:, own] = (generator.standard_normal((draws, factor.shape[0])) @ factor.T)[:, node]
-        return z
+        z = self.sides(draws, generator)
+        side = generator.integers(z.shape[0], size=(1, *z.shape[1:]))
+        return np.asarray(np.take_along_axis(z, side, axis=0)[0])
 
     def failures(
         self, probability: ArrayLike, draws: int, generator: np.random.Generator
@@ -91,17 +112,6 @@ class JointSampler:
         return counts
 
 
-def _factored(law: Dependence, blocks: Placement) -> list[tuple[Indices, Indices, FloatArray]]:
-    """Return the blocks of each earthquake, which unlike one each is, and the latter's factor."""
-    factors = []
-    for number in np.unique(blocks.earthquake):
-        own = np.flatnonzero(blocks.earthquake == number)
-        first, node = _unlike(*(part[own] for part in vars(blocks).values()))
-        r = blocks.only(own[first]).correlation(law)
-        factors.append((own, node, _cholesky(r)))
-    return factors
-
-
 def _cholesky(r: FloatArray) -> FloatArray:
     n = r.shape[-1]
     r[..., np.arange(n), np.arange(n)] += JITTER
@@ -118,44 +128,6 @@ def _unlike(*columns: NDArray[np.generic]) -> tuple[Indices, Indices]:
     node = np.empty(order.size, dtype=np.intp)
     node[order] = np.cumsum(new) - 1
     return order[new], node
-
-
-class _Parts:
-    """Earthquake, site and component drawn one by one."""
-
-    def __init__(self, law: Dependence, blocks: Placement) -> None:
-        self._law, self._blocks = law, blocks
-        # what is drawn for a block: its own component, or both where the azimuth is not known
-        n, drawn = np.arange(blocks.size), blocks.drawn
-        self._second = np.flatnonzero(drawn)
-        block = np.concatenate([n, self._second])
-        component = np.concatenate(
-            [np.where(drawn, 0, blocks.component), np.ones_like(self._second)]
-        )
-        self._event = _Line(blocks.l, (blocks.earthquake,), law.l_e)
-        self._site = _Line(blocks.l, (blocks.earthquake, blocks.site), law.l_e)
-        of_block = (blocks.earthquake[block], blocks.site[block], component)
-        self._symmetric, self._antisymmetric = (
-            _Surface(blocks.l[block], blocks.ln_y[block], of_block, (length, law.l_y))
-            for length in (law.l_v, law.l_o)
-        )
-
-    def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
-        """Return Z, shape (draws, n)."""
-        law, n, second = self._law, self._blocks.size, self._second
-        z = np.sqrt(law.rho_e) * self._event.draw(draws, generator)
-        z += np.sqrt(law.rho_s) * self._site.draw(draws, generator)
-        symmetric = self._symmetric.draw(draws, generator)
-        antisymmetric = self._antisymmetric.draw(draws, generator)
-        side = np.broadcast_to(self._blocks.polarity, (draws, n)).astype(np.float64)
-        if second.size:
-            other = generator.integers(COMPONENTS, size=(draws, second.size)) == 1
-            for field in (symmetric, antisymmetric):
-                field[:, second] = np.where(other, field[:, n:], field[:, second])
-            side[:, second] = generator.choice((-1.0, 1.0), size=(draws, second.size))
-        z += np.sqrt(law.rho_v) * symmetric[:, :n]
-        z += np.sqrt(law.rho_o) * side * antisymmetric[:, :n]
-        return np.asarray(z)
 
 
 class _Line:

@@ -1,4 +1,8 @@
-"""What fails in each earthquake of a part of an event set: expected, or sampled jointly."""
+"""What fails in each earthquake of a part of an event set: expected, and sampled jointly.
+
+A row of a portfolio may stand for like blocks. Z of one of these is that of the side it faces, so
+that as many fail as face sides whose Z is low enough; how many face each side is multinomial.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
-from rbfrag.fragility.joint import FailureCount, count_moments
+from rbfrag.fragility.joint import SIDES, Indices, IntArray
+from rbfrag.fragility.joint_sampling import JointSampler
+from rbfrag.fragility.large_counts import LargeCounts, LatentEvent
+from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.standing_blocks import (
-    COPULA,
-    DEPENDENT,
-    INDEPENDENT,
-    Normals,
-    normals_by_law,
-)
+from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.solver.results import FloatArray
-
-IntArray = NDArray[np.int64]
-Indices = NDArray[np.intp]
 
 PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 16, 1 << 22
 """Blocks times rows of shaking, and samples of all events, of one part of the work."""
@@ -32,11 +30,18 @@ PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 16, 1 << 22
 NOTHING = 1e-12
 """Smaller probabilities are zero."""
 
-MOST_IN_CLOSED_FORM = 100
-"""Blocks of one event whose joint law is computed without samples; its cost grows as the square."""
+LARGE, ENOUGH_SITES = 1000, 30
+"""Unlike blocks beyond which, at so many sites or more, only their number is drawn."""
 
 _VALUES_AT_ONCE = 1 << 19
 _OF_EVENTS, _OF_BLOCKS = 0, 1
+_MOST_KEPT = 16
+_STRENGTHS, _SIZES, _REACH = 41, 9, 5.0
+"""Points of what like blocks scatter by, and how far they reach in standard deviations."""
+
+_FARTHEST = 38.0
+_MOST_SUMMED = 50
+"""Costs of like blocks that are drawn one by one; the sum of more by its three moments."""
 
 
 class EventYears(NamedTuple):
@@ -48,6 +53,7 @@ class EventYears(NamedTuple):
         counts: numbers of failures that curves are given for, rising.
         losses: losses that curves are given for, rising.
         samples: samples of each event; 0 for expected values alone.
+        shifted: the portfolio by models of other parameters, which answer by the same samples.
     """
 
     number: int
@@ -57,13 +63,14 @@ class EventYears(NamedTuple):
     losses: FloatArray
     samples: int
     seed: int
+    shifted: tuple[Portfolio, ...] = ()
 
 
 class Curves(NamedTuple):
     """How often numbers are reached: sums of weights, and of their squares.
 
     The rows are rates of events, years whose largest event, and years whose sum reaches a number,
-    each of shape (laws, k).
+    each of shape (laws, k), the laws of shifted portfolios after those of the portfolio itself.
     """
 
     events: FloatArray
@@ -87,12 +94,13 @@ class PartCounts:
     Args:
         failures: expected failures, shape (n,).
         loss: expected loss, shape (n,).
-        loss_variance: its variance, shape (laws, n); NaN where it is not computed.
-        any_fails: probability of any failure, shape (laws, n); NaN likewise.
-        bounds: the same under full dependence and independence, shape (2, n).
-        blocks: annual rate of failure of each block of the portfolio, the sum of squares of its
+        loss_variance: its variance, shape (laws, n); NaN without two samples.
+        any_fails: probability of any failure, shape (laws, n); NaN where samples would tell it.
+        any_shifted: rate of events with any failure by the shifted portfolios, (shifted, laws).
+        bounds: the same as `any_fails` under full dependence and independence, shape (2, n).
+        blocks: annual rate of failure of one block of each row, the sum of squares of its
             contributions, and the part of it from outside the ranges that the model was fitted on,
-            shape (3, n blocks).
+            shape (3, rows).
         counts: curves of the numbers of failures.
         losses: curves of the losses.
         quantiles: numbers of failures and losses of all samples of a scenario, else empty.
@@ -103,6 +111,7 @@ class PartCounts:
     loss: FloatArray
     loss_variance: FloatArray
     any_fails: FloatArray
+    any_shifted: FloatArray
     bounds: FloatArray
     blocks: FloatArray
     counts: Curves
@@ -114,16 +123,18 @@ class Shaken(NamedTuple):
     """Blocks that one event may fail.
 
     Args:
-        block: their indices, shape (m,).
+        block: rows of the portfolio, shape (m,).
         row: rows of their shaking.
-        probability: P of each, the mean over all scatter.
+        probability: P of one block of each, the mean over all scatter.
         outside: part of it from outside the ranges that the model was fitted on.
+        shift: by how much Φ⁻¹ of P differs by the shifted portfolios, (1 + shifted) x m; first 0.
     """
 
     block: Indices
     row: Indices
     probability: FloatArray
     outside: FloatArray
+    shift: FloatArray
 
 
 def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
@@ -131,58 +142,74 @@ def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
     return (DEPENDENT, INDEPENDENT) if portfolio.dependence is None else (COPULA,)
 
 
+def shift_error(rates: FloatArray) -> FloatArray:
+    """Return the standard error of ln λ from the parameters.
+
+    Args:
+        rates: λ by the parameters, then by them one standard deviation to both sides along each
+            principal axis of their covariance, shape (1 + 2 axes, …).
+    """
+    log = np.log(np.maximum(rates, np.finfo(np.float64).tiny))
+    return np.asarray(np.sqrt((0.25 * (log[1::2] - log[2::2]) ** 2).sum(axis=0)))
+
+
 def count_part(part: EventYears) -> PartCounts:
     """Return what fails in the events of a part; a function of a module, for worker processes."""
     events, portfolio = part.events, part.portfolio
-    n, laws = events.event_id.size, laws_of(portfolio)
-    cost = portfolio.mean_loss
+    n, laws = events.event_id.size, len(laws_of(portfolio))
+    cost, number = portfolio.mean_loss, portfolio.count
     failures, loss, bounds = np.zeros(n), np.zeros(n), np.zeros((2, n))
     blocks = np.zeros((3, portfolio.size))
-    any_fails, variance = np.zeros((len(laws), n)), np.zeros((len(laws), n))
-    counts, losses = (Curves.empty(len(laws), k.size) for k in (part.counts, part.losses))
-    drawn = np.zeros((len(laws), n, 2, part.samples)) if part.samples else None
+    rows = laws * (1 + len(part.shifted))
+    drawn, with_any = np.zeros((rows, n, 2, part.samples)), np.zeros((rows, n))
+    kept: dict[bytes, JointSampler | LargeCounts | None] = {}
     for event, shaken in _shaken(part):
         own, p = shaken.block, shaken.probability
-        failures[event] = p @ portfolio.weight[own]
+        failures[event] = p @ (portfolio.weight[own] * number[own])
         counted = portfolio.weight[own] > 0.0
-        bounds[0, event] = p[counted].max(initial=0.0)
-        bounds[1, event] = -np.expm1(np.log1p(-np.minimum(p[counted], 1.0 - 1e-16)).sum())
+        bounds[:, event] = _bounds(p[counted], number[own][counted])
         mean = events.weight[event] * p
         blocks[0, own] += mean
         blocks[1, own] += mean * mean
         blocks[2, own] += events.weight[event] * shaken.outside
         if cost is not None:
-            loss[event] = p @ cost[own]
-        if drawn is None:
-            any_fails[:, event], variance[:, event] = _closed_form(
-                portfolio, shaken, bounds[:, event]
-            )
-            continue
-        known = portfolio.dependence
-        where = None if known is None else portfolio.placement(own)
-        for law, normals in enumerate(normals_by_law(known, where, own.size).values()):
-            drawn[law, event], any_fails[law, event] = _sampled(part, event, shaken, normals)
-    if drawn is not None:
-        if part.samples > 1:
-            variance = drawn[:, :, 1].var(axis=-1, ddof=1)
-        else:
-            variance[:] = np.nan
-        counts, losses = (
-            _curves(events, drawn[:, :, i], ends)
-            for i, ends in enumerate((part.counts, part.losses))
-        )
-    scenario = drawn is not None and events.is_scenario
+            loss[event] = p @ (cost[own] * number[own])
+        if part.samples:
+            key = own.tobytes()
+            if key not in kept:
+                if len(kept) == _MOST_KEPT:
+                    kept.clear()
+                kept[key] = _sampler(portfolio, own)
+            drawn[:, event], with_any[:, event] = _sampled(part, event, shaken, kept[key])
+    variance = np.full((laws, n), np.nan)
+    if part.samples > 1:
+        variance = drawn[:laws, :, 1].var(axis=-1, ddof=1)
+    if not part.samples:  # known alone where no law matters, as of single blocks
+        known = bounds if laws == len(bounds) else bounds[:1]
+        with_any = known if laws > 1 else np.where(np.ptp(bounds, axis=0) <= 0.0, known, np.nan)
+    counts, losses = (
+        _curves(events, drawn[:, :, i], ends) for i, ends in enumerate((part.counts, part.losses))
+    )
     return PartCounts(
-        part.number, failures, loss, variance, any_fails, bounds, blocks, counts, losses,
-        quantiles=drawn if scenario and drawn is not None else np.empty(0),
+        part.number, failures, loss, variance, with_any[:laws],
+        (with_any[laws:] @ events.weight).reshape(-1, laws), bounds, blocks, counts, losses,
+        quantiles=drawn[:laws] if part.samples and events.is_scenario else np.empty(0),
     )  # fmt: skip
+
+
+def _bounds(p: FloatArray, count: IntArray) -> tuple[float, float]:
+    """Return P of any failure under full dependence and independence."""
+    if count.sum() < 2:
+        return float(p.sum()), float(p.sum())
+    none = count @ np.log1p(-np.minimum(p, 1.0 - 1e-16))
+    return float(p.max(initial=0.0)), float(-np.expm1(none))
 
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     """Yield each event that may fail a block, with those blocks."""
     events, portfolio = part.events, part.portfolio
     z, weight = portfolio.scatter_points()
-    parts: list[tuple[Indices, Indices, FloatArray, FloatArray]] = []
+    parts: list[tuple[NDArray[np.generic], ...]] = []
     for site in np.intersect1d(events.site, portfolio.site):
         own = np.flatnonzero(portfolio.site == site)
         rows = np.flatnonzero(events.site == site)
@@ -197,101 +224,284 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
                 for values in (at_points, at_points * ~inside)
             )
             which, block = np.nonzero(p > NOTHING)
-            parts.append((own[block], chunk[which], p[which, block], outside[which, block]))
+            shifted = [
+                np.einsum("rkm,k->rm", other.probability(own, shaking, points)[0], weight)
+                for other in part.shifted
+            ]
+            columns = (each[which, block] for each in (p, outside, *shifted))
+            parts.append((own[block], chunk[which], *columns))
     if not parts:
         return
-    block, row, p, outside = (np.concatenate(column) for column in zip(*parts, strict=True))
+    block, row, p, outside, *more = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((block, events.event[row]))
-    block, row, p, outside = block[order], row[order], p[order], outside[order]
+    block, row, outside = block[order], row[order], outside[order]
+    each = np.minimum(np.stack([p, *more])[:, order], 1.0)
+    with np.errstate(invalid="ignore"):
+        shift = np.nan_to_num(ndtri(each) - ndtri(each[:1]), nan=0.0)
     event = events.event[row]
     starts = np.flatnonzero(np.diff(event, prepend=-1))
     for first, last in pairwise([*starts.tolist(), event.size]):
         some = slice(first, last)
         yield (
             int(event[first]),
-            Shaken(block[some], row[some], np.minimum(p[some], 1.0), outside[some]),
+            Shaken(block[some], row[some], each[0, some], outside[some], shift[:, some]),
         )
 
 
-def _closed_form(
-    portfolio: Portfolio, shaken: Shaken, bounds: FloatArray
-) -> tuple[FloatArray, ...]:
-    """Return the probability of any failure and the variance of the loss by each law."""
-    own, p = shaken.block, shaken.probability
-    cost = np.zeros(own.size) if portfolio.mean_loss is None else portfolio.mean_loss[own]
-    # what one failure costs scatters by itself
-    scatter = float((p * cost * cost * np.expm1(portfolio.loss_sigma[own] ** 2)).sum())
-    alone = float((p * (1.0 - p) * cost * cost).sum()) + scatter
+def _sampler(portfolio: Portfolio, own: Indices) -> JointSampler | LargeCounts | None:
+    """Return what draws how some blocks fail together; None where only bounds are known."""
     law = portfolio.dependence
     if law is None:
-        order = np.argsort(p)
-        p, cost = p[order], cost[order]
-        stronger = cost.sum() - np.cumsum(cost)  # of those whose P is greater: min(P, P') = P
-        together = float(p @ (cost * (cost + 2.0 * stronger)) - (p @ cost) ** 2)
-        return bounds, np.array([together + scatter, alone])
-    if own.size > MOST_IN_CLOSED_FORM:
-        return np.full(1, np.nan), np.full(1, np.nan)
-    where = portfolio.placement(own)
-    variance = count_moments(p, where, law, cost)[1] + scatter if cost.any() else 0.0
-    counted = portfolio.weight[own] > 0.0
-    count = FailureCount.of(p[counted], where.only(counted), law)
-    return np.array([count.probability_any]), np.array([variance])
+        return None
+    where, sites = portfolio.placement(own), np.unique(portfolio.site[own]).size
+    certain = not portfolio.is_uncertain and (portfolio.weight[own] > 0.0).all()
+    if own.size > LARGE and sites >= ENOUGH_SITES and certain:
+        return LargeCounts(law, where, portfolio.count[own])
+    return JointSampler(law, where)
 
 
 def _sampled(
-    part: EventYears, event: int, shaken: Shaken, normals: Normals
-) -> tuple[FloatArray, float]:
+    part: EventYears, event: int, shaken: Shaken, sampler: JointSampler | LargeCounts | None
+) -> tuple[FloatArray, FloatArray]:
     """Return numbers of failures and losses of the samples of one event, and the share with any.
 
-    The stream of random numbers is that of the event, whichever part it stands in.
+    The stream of random numbers is that of the event, whichever part it stands in. By the shifted
+    portfolios the same samples answer.
     """
-    portfolio, draws, own = part.portfolio, part.samples, shaken.block
-    number = int(part.events.event_id[event])
-    generator = np.random.default_rng([part.seed, _OF_EVENTS, number])
-    probability = _probabilities(part, shaken, generator)
-    counted, result, with_any = portfolio.weight[own] > 0.0, np.zeros((2, draws)), 0
-    at_once = max(1, _VALUES_AT_ONCE // own.size)
+    portfolio, draws, own, laws = (
+        part.portfolio,
+        part.samples,
+        shaken.block,
+        laws_of(part.portfolio),
+    )
+    generator = np.random.default_rng([part.seed, _OF_EVENTS, int(part.events.event_id[event])])
+    rows = len(laws) * shaken.shift.shape[0]
+    result, with_any = np.zeros((rows, 2, draws)), np.zeros(rows)
+    if isinstance(sampler, LargeCounts):
+        latent = sampler.latent(draws, generator)
+        for row, shift in enumerate(shaken.shift):
+            result[row], with_any[row] = _of_many(part, shaken, sampler, latent, shift)
+        return result, with_any
+    bounds = _bounds_of_z(part, shaken, generator)
+    scattered = int((portfolio.count[own] > 1).sum()) if portfolio.is_uncertain else 0
+    at_once = max(1, _VALUES_AT_ONCE // (own.size + SIDES * _STRENGTHS * _SIZES * scattered))
     for start in range(0, draws, at_once):
         some = slice(start, min(start + at_once, draws))
         k = some.stop - start
-        p = probability(k)
-        fails = normals(k, generator) <= ndtri(p)
-        with_any += int(fails[:, counted].any(axis=1).sum())
-        result[0, some] = fails @ portfolio.weight[own]
-        if portfolio.loss is not None:
-            sample, block = np.nonzero(fails)
-            sigma = portfolio.loss_sigma[own[block]]
-            z = generator.standard_normal(sample.size) if sigma.any() else 0.0
-            cost = portfolio.loss[own[block]] * np.exp(sigma * z)
-            result[1, some] = np.bincount(sample, cost, minlength=k)
+        here = bounds(k)
+        for number, law in enumerate(laws):
+            sides = _sides(law, sampler, (k, own.size), generator)
+            z = _Latent.of(sides, portfolio.count[own], generator, alone=law == INDEPENDENT)
+            for i, shift in enumerate(shaken.shift):
+                row = number + i * len(laws)
+                failures = z.failures(here, shift)
+                with_any[row] += failures[:, portfolio.weight[own] > 0.0].any(axis=1).sum()
+                result[row, 0, some] = failures @ portfolio.weight[own]
+                result[row, 1, some] = _costs(portfolio, own, failures, z.seed)
     return result, with_any / draws
 
 
-def _probabilities(
-    part: EventYears, shaken: Shaken, generator: np.random.Generator
-) -> Callable[[int], FloatArray]:
-    """Return a function for P of the blocks in the next samples, of a shape that broadcasts.
+def _sides(
+    law: str, sampler: JointSampler | None, shape: tuple[int, int], generator: np.random.Generator
+) -> FloatArray:
+    """Return Z on each side that blocks may face, sides x draws x m."""
+    if sampler is not None:
+        return sampler.sides(shape[0], generator)
+    columns = 1 if law == DEPENDENT else shape[1]
+    return np.broadcast_to(generator.standard_normal((1, shape[0], columns)), (1, *shape))
 
-    The component's scatter is that of the event at the site. A block's own parameters are those of
-    its sample in every event.
+
+class _Bounds(NamedTuple):
+    """Bounds below which Z fails a block.
+
+    Args:
+        bound: of each row, draws x m; the first axis may be 1.
+        scattered: which rows are of like blocks whose own parameters scatter, shape (m,).
+        scores: their bounds by strength, falling, and size, strengths x sizes x draws x rows.
+        strengths: the standard normal values of the strengths.
+        weight: of the sizes.
+    """
+
+    bound: FloatArray
+    scattered: NDArray[np.bool_]
+    scores: FloatArray
+    strengths: FloatArray
+    weight: FloatArray
+
+    def share(self, z: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return P of one of these like blocks given Z, sides x draws x rows.
+
+        It fails up to the strength at which the bound is Z.
+        """
+        score = self.scores + shift[self.scattered]
+        last = (score >= z[:, None, None]).sum(axis=1, keepdims=True) - 1
+        first = np.clip(last, 0, self.strengths.size - 2)
+        score = np.broadcast_to(score, (z.shape[0], *score.shape[:2], *z.shape[1:]))
+        high, low = (np.take_along_axis(score, first + i, axis=1)[:, 0] for i in (0, 1))
+        apart = np.maximum(high - low, 1e-300)
+        t = np.clip((high - z[:, None]) / apart, 0.0, 1.0)
+        strength = self.strengths[first[:, 0]] + t * (self.strengths[1] - self.strengths[0])
+        return np.asarray(np.einsum("spkm,p->skm", ndtr(strength) * (last[:, 0] >= 0), self.weight))
+
+
+@dataclass(frozen=True, eq=False)
+class _Latent:
+    """Z of some samples of one event.
+
+    Args:
+        count: blocks of each row, shape (m,).
+        single: Z of the rows of one block, draws x rows.
+        like: Z of the others on each side, sides x draws x rows.
+        facing: how many of these face each side, same shape; None where each has a Z of its own.
+        seed: of what else is random.
+    """
+
+    count: IntArray
+    single: FloatArray
+    like: FloatArray
+    facing: IntArray | None
+    seed: int
+
+    @classmethod
+    def of(
+        cls, sides: FloatArray, count: IntArray, generator: np.random.Generator, *, alone: bool
+    ) -> _Latent:
+        """Return Z of samples by the sides that blocks face, each as likely."""
+        ones, number = sides[..., count == 1], sides.shape[0]
+        side = generator.integers(number, size=(1, *ones.shape[1:]))
+        like, facing = sides[..., count > 1], None
+        if like.size and not alone:
+            each = np.full(number, 1.0 / number)
+            drawn = generator.multinomial(count[count > 1], each, size=like.shape[1:])
+            facing = np.moveaxis(drawn, -1, 0)
+        seed = int(generator.integers(1 << 62))
+        return cls(count, np.take_along_axis(ones, side, axis=0)[0], like, facing, seed)
+
+    def failures(self, bounds: _Bounds, shift: FloatArray) -> FloatArray:
+        """Return how many blocks of each row fail, draws x m."""
+        bound, like = bounds.bound + shift, self.count > 1
+        result = np.empty((self.single.shape[0], self.count.size))
+        result[:, ~like] = self.single <= bound[:, ~like]
+        if not like.any():
+            return result
+        generator = np.random.default_rng(self.seed)
+        if self.facing is None:
+            p = np.broadcast_to(ndtr(bound[:, like]), (result.shape[0], int(like.sum())))
+            result[:, like] = generator.binomial(self.count[like], p)
+            return result
+        fails = self.like <= bound[:, like]
+        if bounds.scattered.any():
+            share, own = fails.astype(np.float64), bounds.scattered[like]
+            share[..., own] = bounds.share(self.like[..., own], shift)
+            result[:, like] = generator.binomial(self.facing, share).sum(axis=0)
+        else:
+            result[:, like] = (self.facing * fails).sum(axis=0)
+        return result
+
+
+def _bounds_of_z(
+    part: EventYears, shaken: Shaken, generator: np.random.Generator
+) -> Callable[[int], _Bounds]:
+    """Return a function for the bounds of Z in the next samples.
+
+    The component's scatter is that of the event at the site. A single block's own parameters are
+    those of its sample in every event; those of like blocks are drawn by what they are given Z.
     """
     portfolio, own = part.portfolio, shaken.block
-    if not (portfolio.component.scatter > 0.0 or portfolio.is_uncertain):
-        return lambda _: shaken.probability
+    strengths = np.linspace(-_REACH, _REACH, _STRENGTHS)
+    sizes, weight = normal_steps(_SIZES, _REACH)
+    sigma = portfolio.size_sigma[own] + portfolio.strength_sigma[own]
+    scattered = (portfolio.count[own] > 1) & (sigma > 0.0)
+    none = np.empty((_STRENGTHS, _SIZES, 1, 0))
+    if not (portfolio.component.scatter > 0.0 or sigma.any()):
+        bound = ndtri(shaken.probability)[None]
+        return lambda _: _Bounds(bound, scattered, none, strengths, weight)
     sites, site = np.unique(portfolio.site[own], return_inverse=True)
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
     streams = [
         [np.random.default_rng([part.seed, _OF_BLOCKS, block, i]) for block in own.tolist()]
-        for i in range(2 if portfolio.is_uncertain else 0)
+        for i in range(2 if sigma.any() else 0)
     ]
 
-    def next_samples(k: int) -> FloatArray:
+    def next_samples(k: int) -> _Bounds:
         xi = generator.standard_normal((k, sites.size))[:, site]
         z = [np.stack([one.standard_normal(k) for one in each], axis=1) for each in streams]
         z_p, z_k = z or (np.zeros(1), np.zeros(1))
-        return portfolio.probability(own, shaking, (xi, z_p, z_k))[0]
+        p, scores = portfolio.probability(own, shaking, (xi, z_p, z_k))[0], none
+        if scattered.any():
+            some = {name: values[scattered] for name, values in shaking.items()}
+            points = (xi[:, scattered], sizes[:, None, None], strengths[:, None, None, None])
+            each = portfolio.probability(own[scattered], some, points)[0]
+            chances = np.diff(ndtr(strengths[:-1] + 0.5 * np.diff(strengths)), prepend=0, append=1)
+            p = np.broadcast_to(p, xi.shape).copy()
+            p[:, scattered] = np.einsum("jikm,j,i->km", each, chances, weight)
+            scores = np.clip(ndtri(each), -_FARTHEST, _FARTHEST)
+        return _Bounds(ndtri(p), scattered, scores, strengths, weight)
 
     return next_samples
+
+
+def _costs(portfolio: Portfolio, own: Indices, failures: FloatArray, seed: int) -> FloatArray:
+    """Return what the failures of each sample cost, shape (draws,)."""
+    if portfolio.loss is None:
+        return np.zeros(failures.shape[0])
+    loss, sigma = portfolio.loss[own], portfolio.loss_sigma[own]
+    if not sigma.any():
+        return np.asarray(failures @ loss)
+    sample, block = np.nonzero(failures)
+    number = failures[sample, block].astype(np.int64)
+    cost = number * np.ones(sample.size)
+    generator, some = np.random.default_rng([seed, 1]), sigma[block]
+    for many in (False, True):
+        chosen = np.flatnonzero((some > 0.0) & ((number > _MOST_SUMMED) == many))
+        draw = _sum_by_moments if many else _sum_of_each
+        cost[chosen] = draw(number[chosen], some[chosen], generator)
+    return np.asarray(np.bincount(sample, loss[block] * cost, minlength=failures.shape[0]))
+
+
+def _sum_of_each(number: IntArray, sigma: FloatArray, generator: np.random.Generator) -> FloatArray:
+    """Return sums of lognormals of median 1."""
+    each = np.repeat(np.arange(number.size), number)
+    values = np.exp(sigma[each] * generator.standard_normal(each.size))
+    return np.asarray(np.bincount(each, values, minlength=number.size))
+
+
+def _sum_by_moments(
+    number: IntArray, sigma: FloatArray, generator: np.random.Generator
+) -> FloatArray:
+    """Return values of the gamma law, shifted, that has three moments of these sums."""
+    square = np.exp(sigma * sigma)
+    mean, sd = np.sqrt(square), np.sqrt(square * (square - 1.0))
+    skewness = (square + 2.0) * np.sqrt(square - 1.0)
+    shape, scale = 4.0 * number / skewness**2, 0.5 * sd * skewness
+    return number * mean + scale * (generator.standard_gamma(shape) - shape)
+
+
+def _common(part: EventYears, shaken: Shaken) -> float:
+    """Return the share of the scatter of what fails blocks that the component's is of."""
+    portfolio, own = part.portfolio, shaken.block
+    if not portfolio.component.scatter > 0.0:
+        return 0.0
+    shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
+    ends = (portfolio.probability(own, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
+    high, low = (np.clip(ndtri(p), -_FARTHEST, _FARTHEST) for p in ends)
+    slope = 0.5 * float(np.average(high - low, weights=shaken.probability))
+    return slope * slope / (1.0 + slope * slope)
+
+
+def _of_many(
+    part: EventYears, shaken: Shaken, sampler: LargeCounts, latent: LatentEvent, shift: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return numbers of failures and losses of many blocks, and the probability of any."""
+    portfolio, own = part.portfolio, shaken.block
+    mean_loss, square = np.zeros(own.size), np.zeros(own.size)
+    if portfolio.mean_loss is not None:
+        mean_loss = portfolio.mean_loss[own]
+        square = mean_loss**2 * np.exp(portfolio.loss_sigma[own] ** 2)
+    weight = portfolio.weight[own]
+    marks = ((weight, weight**2), (mean_loss, square))
+    bound = ndtri(shaken.probability) + shift
+    return sampler.sums(bound, _common(part, shaken), latent, marks)
 
 
 def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:

@@ -60,12 +60,14 @@ class JointRate:
         joint_law: how the blocks of one earthquake fail together.
         bounds: the rate and the probability under full dependence, where the block of the greatest
             P fails first, and if blocks fail independently at each level of the shaking.
+        warnings: what these numbers take for granted.
     """
 
     at_least: tuple[CountRate, ...]
     annual_rate_any_ci: tuple[float, float] | None
     joint_law: str
     bounds: Mapping[str, Mapping[str, float]]
+    warnings: tuple[str, ...] = ()
 
     @property
     def annual_rate_any(self) -> float | None:
@@ -127,8 +129,9 @@ class JointRate:
             law: {name: meant(part.bounds[law][name] for part in parts) for name in numbers}
             for law, numbers in parts[0].bounds.items()
         }
+        warnings = tuple(dict.fromkeys(text for part in parts for text in part.warnings))
         if parts[0].joint_law == NO_LAW:
-            return cls((), None, NO_LAW, bounds)
+            return cls((), None, NO_LAW, bounds, warnings)
         at_least = tuple(
             CountRate(
                 first.count,
@@ -143,7 +146,7 @@ class JointRate:
             meant(part.annual_rate_any_ci[i] for part in parts if part.annual_rate_any_ci)
             for i in (0, 1)
         )
-        return cls(at_least, (low, high), parts[0].joint_law, bounds)
+        return cls(at_least, (low, high), parts[0].joint_law, bounds, warnings)
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""

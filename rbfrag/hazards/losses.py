@@ -15,7 +15,6 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import normal_quantile
 from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
-    MOST_IN_CLOSED_FORM,
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
     Curves,
@@ -328,8 +327,7 @@ def event_losses(
     of random numbers is that of the event, so that the answer does not depend on who computes what.
 
     Args:
-        samples: samples of each event; 0 for expected values alone, with the probability of any
-            failure by the beta-binomial law of the exact mean and variance.
+        samples: samples of each event; 0 for expected values alone.
         run: does the parts of the work, as worker processes may; None for here.
         on_progress: called with the numbers of events done and of all.
 
@@ -397,7 +395,7 @@ def _only(events: EventSet, group: NDArray[np.intp]) -> EventSet:
 def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
     """Return the numbers of failures and the losses that curves are given for."""
     weight = portfolio.weight[portfolio.weight > 0.0]
-    most = float(weight.sum())
+    most = float(portfolio.weight @ portfolio.count)
     if not weight.size:
         counts = np.empty(0)
     elif (weight == np.rint(weight)).all():
@@ -410,7 +408,7 @@ def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
     if loss is None or not loss.any():
         return counts, np.empty(0)
     sigma = portfolio.loss_sigma
-    high = float((loss * np.exp(3.0 * sigma)).sum())
+    high = float((loss * np.exp(3.0 * sigma)) @ portfolio.count)
     low = float((loss * np.exp(-2.0 * sigma))[loss > 0.0].min())
     return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * _REACHED
 
@@ -456,7 +454,7 @@ def _answer(
         exceedance=exceedance,
         loss_exceedance=loss_exceedance,
         quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
-        warnings=_warnings(events, portfolio, laws, blocks, any_fails, samples),
+        warnings=_warnings(events, portfolio, laws, blocks, any_fails),
     )  # fmt: skip
 
 
@@ -530,7 +528,8 @@ def _of_rows(events: EventSet, portfolio: Portfolio, blocks: FloatArray) -> Floa
     Like blocks of one row have one P in each event.
     """
     cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
-    parts = (portfolio.weight * blocks[0], portfolio.weight * np.sqrt(blocks[1]), cost * blocks[0])
+    weight = portfolio.count * portfolio.weight
+    parts = (weight * blocks[0], weight * np.sqrt(blocks[1]), portfolio.count * cost * blocks[0])
     rate, error, loss = (
         np.bincount(portfolio.row, part, minlength=len(portfolio.block_ids)) for part in parts
     )
@@ -570,7 +569,6 @@ def _warnings(
     laws: tuple[str, ...],
     blocks: FloatArray,
     any_fails: FloatArray,
-    samples: int,
 ) -> tuple[str, ...]:
     warnings = [*events.warnings, *portfolio.remarks]
     if len(portfolio.measures) > 1:
@@ -589,17 +587,11 @@ def _warnings(
         warnings.append(
             f"{why}: given are bounds, full dependence and independence at the shaking of each site"
         )
-    elif portfolio.size > 1:
+    elif portfolio.count.sum() > 1:
         warnings.append("the blocks are taken as of unknown azimuth: none shares a side by intent")
     if np.isnan(any_fails).any():
         warnings.append(
-            f"events that may fail more than {MOST_IN_CLOSED_FORM} blocks have no probability of "
-            "any failure and no variance without samples: bounds are given"
-        )
-    elif not samples and portfolio.component.scatter > 0.0:
-        warnings.append(
-            "without samples the scatter of the component is taken as each block's own where "
-            "blocks are counted together"
+            "without samples nothing is said of what several blocks do together: bounds are given"
         )
     rate, outside = float(blocks[0].sum()), float(blocks[2].sum())
     if rate > 0.0 and outside > NOTABLE * rate:
@@ -612,8 +604,9 @@ def _warnings(
         rare = (blocks[0] > 0.0) & (blocks[0] * effective < 1.0)
         if rare.any():
             warnings.append(
-                f"{int(rare.sum())} of {portfolio.size} blocks fail less than once in the "
-                f"{effective:.6g} years that the events cover: their rates are not resolved"
+                f"{int(portfolio.count @ rare)} of {int(portfolio.count.sum())} blocks fail less "
+                f"than once in the {effective:.6g} years that the events cover: their rates are "
+                "not resolved"
             )
     return (*warnings, *_weakest_at_thin_shaking(events, portfolio))
 

@@ -24,21 +24,19 @@ from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
 
-MOST_BLOCKS = 100_000
-"""Blocks of a portfolio, like ones of a count with them."""
-
 _REACH, _STEP, _FEWEST_POINTS = 5.0, 0.1, 9
 """How far a logarithm's scatter is integrated, in standard deviations, and in which steps of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Portfolio:
-    """n blocks, sorted by their site.
+    """Blocks in n rows, sorted by their site: of each the like blocks that a row of a table is of.
 
     Args:
         block_ids: names of the rows of the table that the blocks are of.
         site_ids: names of the sites of these rows.
-        row: row of the table that each block is of, shape (n,).
+        row: row of the table that each is of, shape (n,).
+        count: number of like blocks, each with an azimuth of its own, shape (n,).
         site: index of each block's site, rising, shape (n,).
         numbers: what a model may read of a block, by field, the medians, shape (n,) each; NaN where
             it is not stated.
@@ -57,6 +55,7 @@ class Portfolio:
     block_ids: tuple[str, ...]
     site_ids: tuple[str, ...]
     row: IntArray
+    count: IntArray
     site: IntArray
     numbers: Mapping[str, FloatArray]
     size_sigma: FloatArray
@@ -100,13 +99,7 @@ class Portfolio:
         chosen = {one: models[one] for one in dict.fromkeys(kinds)}
         places = {one: i for i, one in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
-        if count.sum() > MOST_BLOCKS:
-            raise InputError(
-                f"there are {count.sum():g} blocks, by their counts: at most {MOST_BLOCKS} are "
-                "answered; a weight makes one failure count for many"
-            )
-        row = np.repeat(np.arange(n), count.astype(np.int64))
-        row = row[np.argsort(sites[row], kind="stable")]
+        row = np.argsort(sites, kind="stable")
         loss = numbers("loss", 0.0) * weight if "loss" in columns else None
         blocks = [chosen[one].method.block for one in kinds]
         stated = numbers_in(columns)
@@ -125,6 +118,7 @@ class Portfolio:
             block_ids=tuple(str(name) for name in names),
             site_ids=tuple(site_ids[i] for i in sites.tolist()),
             row=row,
+            count=count.astype(np.int64)[row],
             site=sites[row],
             numbers={
                 name: np.asarray(stated[name], dtype=np.float64)[row]
@@ -147,7 +141,7 @@ class Portfolio:
 
     @property
     def size(self) -> int:
-        """Number of blocks n, like ones of a count with them."""
+        """Number of rows n."""
         return self.row.size
 
     @property

@@ -13,11 +13,9 @@ from tests.fragility.portfolio_draws import LAW, anywhere
 DRAWS = 20_000
 
 
-@pytest.fixture(params=["whole", "parts", "grid"])
+@pytest.fixture(params=["factors", "grid"])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Each way of drawing, for portfolios of any size."""
-    if request.param != "whole":
-        monkeypatch.setattr(joint_sampling, "MOST_AT_ONCE", 0)
     if request.param == "grid":
         monkeypatch.setattr(joint_sampling, "MOST_OF_A_COMPONENT", 1)
     return str(request.param)
@@ -34,7 +32,6 @@ def test_covariance_is_the_matrix_of_correlations(way: str) -> None:
 
 def test_covariance_on_nodes_of_a_grid(monkeypatch: pytest.MonkeyPatch) -> None:
     # so many unlike values that the nodes are no longer their own
-    monkeypatch.setattr(joint_sampling, "MOST_AT_ONCE", 0)
     random = np.random.default_rng(4)
     blocks = Placement.of(
         random.uniform(-1.2, 1.7, 1000), random.normal(size=1000),
