@@ -312,7 +312,7 @@ def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = 
     rows = np.zeros((6 + k + b, blocks.size))
     for some, first in chunks(blocks, mass.grid, allowed):
         own = blocks.only(some)
-        rows[:, some] = _sums(own, table_of(own, mass.grid, first, allowed[:, some]), mass, first)
+        rows[:, some] = sums_of(own, table_of(own, mass.grid, first, allowed[:, some]), mass, first)
     gradient = rows[3 : 3 + k]
     return Rates(
         rows[0], half_width(blocks.model.errors, gradient, level), gradient, rows[1], rows[2],
@@ -400,7 +400,13 @@ def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tu
         start += many
 
 
-def _sums(blocks: KernelBlocks, table: Table, mass: SiteMass, first: int) -> list[FloatArray]:
+def sums_of(blocks: KernelBlocks, table: Table, mass: SiteMass, first: int) -> list[FloatArray]:
+    """Return rate, error, part from outside, gradient, rates in branches, and P at the ends.
+
+    Args:
+        first: the first node of the table.
+    """
+
     def against(masses: FloatArray, values: FloatArray) -> FloatArray:
         own = masses[:, first:]
         if own.shape[0] == 1:
@@ -410,9 +416,8 @@ def _sums(blocks: KernelBlocks, table: Table, mass: SiteMass, first: int) -> lis
     rate = against(mass.mass, table.probability)
     assert table.slopes is not None
     off = against(mass.mass, _off_by(table.probability))
-    ends = [rate * 0.0] * 3
+    ends = []
     if mass.ends is not None:
-        ends = []
         for unit in (mass.ends.first, mass.ends.last, mass.ends.end):
             group = unit[mass.ends.group] if unit.shape[0] > 1 else unit
             ends.append(np.minimum(against(group, table.probability), 1.0))

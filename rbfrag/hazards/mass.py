@@ -22,8 +22,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
 
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.event_set import EventSet, IntArray
 from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.solver.integrator.compiled import inner_kernel, kernel
 from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]
@@ -254,7 +255,7 @@ def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> Cu
 
 def event_mass(
     events: EventSet, name: str, sites: Indices, shaking: LevelShaking
-) -> tuple[SiteMass, FloatArray]:
+) -> tuple[SiteMass, FloatArray, FloatArray]:
     """Return the mass of an event set at some sites, and u of each of its rows.
 
     Args:
@@ -262,23 +263,68 @@ def event_mass(
         sites: indices of the sites, rising.
 
     Returns:
-        The mass, and ln(level) of the rows; -inf where nothing shook.
+        The mass; one of squared weights without scatter, sites x nodes; and ln(level) of the rows,
+        -inf where nothing shook.
     """
     step, smoothing = smoothing_of(shaking)
     with np.errstate(divide="ignore"):
         u = np.log(events.measures[name])
-    row = np.flatnonzero(np.isfinite(u) & np.isin(events.site, sites))
-    ends = (u[row].min(), u[row].max()) if row.size else (0.0, 0.0)
+    place = np.full(len(events.site_ids), -1)
+    place[sites] = np.arange(sites.size)
+    seen = np.isfinite(u) & (place[events.site] >= 0)
+    ends = (u[seen].min(), u[seen].max()) if seen.any() else (0.0, 0.0)
     grid = Grid.over(step, float(ends[0]), float(ends[1]), smoothing.reach)
-    start, weights = grid.cubic(u[row])
-    weights *= events.weight[events.event[row]]
-    cell = np.searchsorted(sites, events.site[row]) * grid.size + start
-    mass = np.zeros(sites.size * grid.size)
-    for node in range(4):
-        mass += np.bincount(cell + node, weights[node], minlength=mass.size)
-    whole = smoothing.of(mass.reshape(sites.size, grid.size))
+    each = np.zeros((2, sites.size, grid.size))
+    add_mass(each, place, events.site, events.event, events.weight, u, *grid)
+    whole = smoothing.of(each[0])
     empty = np.empty((0, *whole.shape))
-    return SiteMass(grid, whole, empty, np.ones(1), smoothing), u
+    return SiteMass(grid, whole, empty, np.ones(1), smoothing), each[1], u
+
+
+@kernel
+def add_mass(
+    mass: FloatArray,
+    place: Indices,
+    site: IntArray,
+    event: IntArray,
+    weight: FloatArray,
+    u: FloatArray,
+    step: float,
+    first: int,
+    size: int,
+) -> None:
+    """Add weights of events, and their squares, to the nodes about the shaking of each row.
+
+    Args:
+        mass: what is added to, 2 x sites x nodes.
+        place: index among these sites of each site, -1 for one that is left out.
+        site: site of each row.
+        event: event of each row.
+        weight: of each event.
+        u: ln(level) of each row; what is not finite is left out.
+        step: of the grid, as are `first` and `size`.
+    """
+    for row in range(u.size):
+        own = place[site[row]]
+        if own < 0 or not np.isfinite(u[row]):
+            continue
+        start, a, b, c, d = cubic_at(u[row], step, first, size)
+        w = weight[event[row]]
+        for node, part in ((0, a), (1, b), (2, c), (3, d)):
+            mass[0, own, start + node] += part * w
+            mass[1, own, start + node] += part * w * w
+
+
+@inner_kernel
+def cubic_at(
+    u: float, step: float, first: int, size: int
+) -> tuple[int, float, float, float, float]:
+    """Return the first of four nodes about u and their weights; see :meth:`Grid.cubic`."""
+    x = u / step - first
+    start = min(max(int(np.floor(x)) - 1, 0), size - 4)
+    a = min(max(x, 0.0), size - 1.0) - start
+    b, c, d = a - 1.0, a - 2.0, a - 3.0
+    return start, -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
 
 
 def of_sites(mass: SiteMass, sites: slice) -> SiteMass:

@@ -199,6 +199,16 @@ class Portfolio:
         """The models, ready to answer."""
         return tuple(FragilityModel.from_row(row) for row in self.models)
 
+    def numbers_of(self, model: FragilityModel, some: NDArray[np.intp]) -> dict[str, FloatArray]:
+        """Return what a model reads of some blocks, with its standard deviations, shape (m,)."""
+        block = model.method.block
+        read = {*self.numbers} & {*block.names, *block.options}
+        numbers = {name: self.numbers[name][some] for name in read}
+        for name, sigma in ((block.size, self.size_sigma), (block.strength, self.strength_sigma)):
+            if name is not None and sigma.any():
+                numbers[f"{name}_sigma"] = sigma[some]
+        return numbers
+
     def probability(
         self,
         some: NDArray[np.intp],

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import normal_steps
-from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
+from rbfrag.hazards.conversions import CONVERSIONS, Component, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 from rbfrag.solver.results import FloatArray
@@ -61,11 +61,28 @@ class LevelShaking:
             )
         else:
             warnings.append(meaning.in_words("the curve is"))
-        scatter = math.hypot(meaning.scatter, spread)
+        return cls.about(name, meaning, factor, spread, tuple(warnings))
+
+    @classmethod
+    def about(
+        cls,
+        name: str,
+        component: Component,
+        factor: float = 1.0,
+        spread: float = 0.0,
+        warnings: tuple[str, ...] = (),
+    ) -> LevelShaking:
+        """Return what a measure of a component is to a model.
+
+        Args:
+            factor: what it is multiplied by.
+            spread: standard deviation of the logarithm of what results, beside the component's.
+        """
+        scatter = math.hypot(component.scatter, spread)
         steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
         xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
-        median = factor / meaning.ratio
-        return cls(name, median * np.exp(scatter * xi), weight, median, tuple(warnings))
+        median = factor / component.ratio
+        return cls(name, median * np.exp(scatter * xi), weight, median, warnings)
 
 
 def _measure(

@@ -1,0 +1,173 @@
+"""What the earthquakes of an event set are expected to fail, by tables of P of each site.
+
+A site has a few sums over its blocks on the nodes of a grid, Σ w P, Σ loss P, Σ ln(1 - P) and the
+greatest P, which are interpolated at the shaking of each earthquake: no pair of block and
+earthquake is visited. The rate of a block is its P against the mass of the site's earthquakes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from rbfrag.fragility.intervals import ParameterErrors
+from rbfrag.hazards.event_set import EventSet, IntArray
+from rbfrag.hazards.kernel import KernelBlocks, half_width, sums_of, table_of
+from rbfrag.hazards.mass import Indices, cubic_at, event_mass
+from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.results import FloatArray
+
+_BLOCKS_AT_ONCE = 256
+_SURE = 1.0 - 1e-16
+_MUCH = 1e3
+
+
+class EventMeans(NamedTuple):
+    """What is expected of n events.
+
+    Args:
+        failures: expected failures, shape (n,).
+        loss: expected loss, shape (n,).
+        bounds: probability of any failure under full dependence and independence, shape (2, n).
+        blocks: annual rate of failure of one block of each row, the sum of squares of its
+            contributions, and the part of it from outside the ranges that the model was fitted on,
+            shape (3, rows).
+        block_half: what the interval of each of these rates reaches to by the parameters, (rows,).
+        failures_half: the same of the rate of all failures.
+        loss_half: the same of the average loss.
+    """
+
+    failures: FloatArray
+    loss: FloatArray
+    bounds: FloatArray
+    blocks: FloatArray
+    block_half: FloatArray
+    failures_half: float
+    loss_half: float
+
+
+def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMeans:
+    """Return what the events are expected to fail; each model reads the one measure.
+
+    Args:
+        level: confidence level of the intervals.
+    """
+    (name,) = portfolio.measures
+    shaking = LevelShaking.about(name, portfolio.component)
+    sites, site = np.unique(portfolio.site, return_inverse=True)
+    mass, squared, u = event_mass(events, name, sites, shaking)
+    order = np.argsort(events.site, kind="stable")
+    starts = np.searchsorted(events.site[order], np.append(sites, len(events.site_ids)))
+    n = events.event_id.size
+    sums, blocks, half = np.zeros((4, n)), np.zeros((3, portfolio.size)), np.zeros(portfolio.size)
+    place = np.full(len(events.site_ids), -1)
+    place[sites] = np.arange(sites.size)
+    counted = portfolio.weight > 0.0
+    waiting = portfolio.count * counted
+    number = portfolio.count * portfolio.weight
+    cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
+    cost = portfolio.count * cost
+    totals: dict[str, tuple[ParameterErrors, FloatArray]] = {}
+    for first, last in _groups(site, sites.size):
+        tables = np.zeros((4, last - first, mass.grid.size))
+        for places, own in _blocks_of(portfolio, np.flatnonzero((site >= first) & (site < last)),
+                                      site, shaking):  # fmt: skip
+            allowed = own.allowed_from(mass.grid)
+            table = table_of(own, mass.grid, 0, allowed)
+            p = np.clip(mass.smoothing.of(table.probability), 0.0, 1.0)
+            rate, _, outside, *gradient = sums_of(own, table, mass, 0)
+            blocks[0, places], blocks[2, places] = rate, outside
+            blocks[1, places] = np.einsum("mn,mn->m", p * p, squared[own.site])
+            half[places] = half_width(own.model.errors, np.stack(gradient), level)
+            before = totals.get(own.model.name, (None, np.zeros((2, len(gradient)))))[1]
+            by = np.stack([number[places], cost[places]])
+            totals[own.model.name] = own.model.errors, before + by @ np.stack(gradient).T
+            here = own.site - first
+            stands = -np.log1p(-np.minimum(p, _SURE))
+            for part, values, factor in (
+                (0, p, number), (1, p, cost), (2, stands, waiting)
+            ):  # fmt: skip
+                np.add.at(tables[part], here, values * factor[places, None])
+            np.maximum.at(tables[3], here, p * counted[places, None])
+        with np.errstate(divide="ignore"):
+            logs = np.log(tables)
+        rows = order[starts[first] : starts[last]]
+        _add_rows(sums, tables, logs, rows, place - first, events.site, events.event, u, *mass.grid)
+    halves = np.array([half_width(errors, sums.T, level) for errors, sums in totals.values()])
+    whole = np.sqrt((halves**2).sum(axis=0))
+    failures, loss, stand, greatest = sums
+    dependent = np.minimum(greatest, 1.0)
+    bounds = np.stack([dependent, np.maximum(-np.expm1(-stand), dependent)])
+    return EventMeans(
+        failures, loss, bounds, blocks, half, float(whole[0]), float(whole[1])
+    )  # fmt: skip
+
+
+def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:
+    """Yield ranges of sites with some hundred blocks together, or of one with more."""
+    number = np.bincount(site, minlength=sites)
+    first, total = 0, 0
+    for last, own in enumerate(number.tolist()):
+        if total and total + own > _BLOCKS_AT_ONCE:
+            yield first, last
+            first, total = last, 0
+        total += own
+    yield first, sites
+
+
+def _blocks_of(
+    portfolio: Portfolio, rows: Indices, site: Indices, shaking: LevelShaking
+) -> Iterator[tuple[Indices, KernelBlocks]]:
+    """Yield some rows of the portfolio by the models that answer for them, a few at a time."""
+    for number, model in enumerate(portfolio.answering):
+        own = rows[portfolio.model[rows] == number]
+        for start in range(0, own.size, _BLOCKS_AT_ONCE):
+            some = own[start : start + _BLOCKS_AT_ONCE]
+            numbers = portfolio.numbers_of(model, some)
+            for places, blocks in KernelBlocks.of(model, shaking.median, numbers, site[some]):
+                # of an uncertain block the draws are many
+                step = max(1, _BLOCKS_AT_ONCE // blocks.weight.size)
+                for first in range(0, places.size, step):
+                    part = np.arange(first, min(first + step, places.size))
+                    yield some[places[part]], blocks.only(part)
+
+
+@kernel
+def _add_rows(
+    sums: FloatArray,
+    tables: FloatArray,
+    logs: FloatArray,
+    rows: Indices,
+    place: Indices,
+    site: IntArray,
+    event: IntArray,
+    u: FloatArray,
+    step: float,
+    first: int,
+    size: int,
+) -> None:
+    """Add the values of tables at the shaking of some rows to their events; of the last the most.
+
+    Cubic in their logarithms, that small values are as right as great ones, and in the values
+    themselves where these change much from node to node, as where P jumps.
+    """
+    for row in rows:
+        own = place[site[row]]
+        if own < 0 or own >= tables.shape[1] or not np.isfinite(u[row]):
+            continue
+        start, a, b, c, d = cubic_at(u[row], step, first, size)
+        for k in range(tables.shape[0]):
+            four = tables[k, own, start : start + 4]
+            if four.max() < _MUCH * four.min():
+                log = logs[k, own, start : start + 4]
+                value = np.exp(a * log[0] + b * log[1] + c * log[2] + d * log[3])
+            else:
+                value = max(a * four[0] + b * four[1] + c * four[2] + d * four[3], 0.0)
+            if k < tables.shape[0] - 1:
+                sums[k, event[row]] += value
+            else:
+                sums[k, event[row]] = max(sums[k, event[row]], value)
