@@ -110,24 +110,44 @@ def _condition(answer: SurvivalAnswer) -> str:
 
 
 def losses_in_words(answer: LossAnswer) -> Iterator[str]:
-    """Yield how many blocks fail, how often one does, and what it costs."""
-    failures = with_error(answer.average_annual_failures, answer.error(answer.failures))
-    blocks, rate = several(int(answer.portfolio.count.sum()), "block"), answer.annual_rate_any
+    """Yield how many blocks fail, how often one does, what it costs, and what is not known."""
+    failures, rate = answer.average_annual_failures, answer.annual_rate_any
+    blocks = several(int(answer.portfolio.count.sum()), "block")
     if answer.events.is_scenario:
-        yield f"{failures} of {blocks} are expected to fail."
+        yield f"{rounded(failures)} of {blocks} are expected to fail."
         if rate is not None:
             yield f"At least one fails with a probability of {percent(rate)}."
-        return
-    yield (
-        f"{failures} failures a year are expected of {blocks}; the events cover "
-        f"{answer.events.effective_years:,.0f} years."
-    )
-    if rate is not None:
-        often = f"{once_in(rate)} on average" if rate > 0.0 else "never"
-        yield f"An earthquake fails at least one of them {often}."
-    if answer.average_annual_loss is not None:
-        loss = with_error(answer.average_annual_loss, answer.error(answer.loss))
-        yield f"The average annual loss is {loss}."
+    else:
+        yield (
+            f"{rounded(failures)} failures a year are expected of {blocks}; the events cover "
+            f"{answer.events.effective_years:,.0f} years."
+        )
+        if rate is not None:
+            often = f"{once_in(rate)} on average" if rate > 0.0 else "never"
+            yield f"An earthquake fails at least one of them {often}."
+        if answer.average_annual_loss is not None:
+            yield f"The average annual loss is {rounded(answer.average_annual_loss)}."
+    yield from _not_known(answer)
+
+
+def _not_known(answer: LossAnswer) -> Iterator[str]:
+    """Yield what is not known of the failures expected, a sentence each: they do not add up."""
+    of, level = answer.uncertainty["average_annual_failures"], f"{100.0 * answer.level:g} %"
+
+    def ends(interval: tuple[float, float]) -> str:
+        return f"{rounded(interval[0])} to {rounded(interval[1])}"
+
+    another = "other ground motions of it" if answer.events.is_scenario else "another event set"
+    yield f"Counting: {another} as long would give {ends(of.counting)} ({level})."
+    if of.knowledge is not None:
+        yield f"Knowledge: the data leave the model open between {ends(of.knowledge)} ({level})."
+    if of.branches is not None:
+        yield f"Branches: 90 % of the logic tree lies between {ends(of.branches)}."
+    elif len(answer.events.realization_weights) > 1:
+        yield (
+            "Branches: counting makes most of what the realizations differ by; hazard curves of "
+            "them tell more."
+        )
 
 
 def campaign_in_words(report: Mapping[str, Any]) -> str:

@@ -9,7 +9,6 @@ from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
 
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.unusable import (
@@ -25,6 +24,7 @@ from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
     curve_name,
+    mixture_quantiles,
     quantile_warning,
     weighted_quantiles,
 )
@@ -436,31 +436,6 @@ def _probability(result: _Rates, weight: FloatArray, years: float) -> FloatArray
     if not result.branches.size:
         return probability_in(years, result.rate)
     return np.asarray(weight @ probability_in(years, result.branches))
-
-
-def mixture_quantiles(
-    rates_of: FloatArray, weight: FloatArray, log_sd: FloatArray, q: Sequence[float]
-) -> FloatArray:
-    """Return quantiles of rates over branches, each lognormal about its rate, (len(q), m).
-
-    Args:
-        rates_of: rate in each branch, branches x m.
-        weight: weights of the branches, which sum to 1.
-        log_sd: standard deviation of the logarithm, common to all branches, shape (m,).
-    """
-    with np.errstate(divide="ignore"):
-        logs = np.log(rates_of)
-    sd = np.maximum(log_sd, 1e-9)
-    finite = np.where(np.isfinite(logs), logs, -700.0)
-    result = []
-    for level in q:
-        low, high = (finite.min(axis=0) - 10.0 * sd, finite.max(axis=0) + 10.0 * sd)
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            below = weight @ ndtr((middle - logs) / sd) < level
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
-        result.append(np.exp(high))
-    return np.stack(result)
 
 
 def _quantiles(

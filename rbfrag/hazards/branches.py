@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text
@@ -115,6 +116,31 @@ def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[floa
     ordered = np.take_along_axis(values, order, axis=0)
     first = [(below >= level - 1e-9).argmax(axis=0) for level in q]
     return np.stack([np.take_along_axis(ordered, at[None], axis=0)[0] for at in first])
+
+
+def mixture_quantiles(
+    rates_of: FloatArray, weight: FloatArray, log_sd: FloatArray, q: Sequence[float]
+) -> FloatArray:
+    """Return quantiles of rates over branches, each lognormal about its rate, (len(q), m).
+
+    Args:
+        rates_of: rate in each branch, branches x m.
+        weight: weights of the branches, which sum to 1.
+        log_sd: standard deviation of the logarithm, common to all branches, shape (m,).
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(rates_of)
+    sd = np.maximum(log_sd, 1e-9)
+    finite = np.where(np.isfinite(logs), logs, -700.0)
+    result = []
+    for level in q:
+        low, high = (finite.min(axis=0) - 10.0 * sd, finite.max(axis=0) + 10.0 * sd)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            below = weight @ ndtr((middle - logs) / sd) < level
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        result.append(np.exp(high))
+    return np.stack(result)
 
 
 def realization_weights(

@@ -70,17 +70,20 @@ class Curves(NamedTuple):
     """How often numbers are reached: sums of weights, and of their squares.
 
     The rows are rates of events, years whose largest event, and years whose sum reaches a number,
-    each of shape (laws, k), the laws of shifted portfolios after those of the portfolio itself.
+    each of shape (laws, k), the laws of shifted portfolios after those of the portfolio itself; and
+    rates of the events of each realization by the first law, (realizations, k).
     """
 
     events: FloatArray
     largest: FloatArray
     sum: FloatArray
+    realizations: FloatArray
 
     @classmethod
-    def empty(cls, laws: int, k: int) -> Curves:
+    def empty(cls, laws: int, k: int, realizations: int) -> Curves:
         """Return curves of nothing."""
-        return cls(*(np.zeros((2, laws, k)) for _ in range(3)))
+        nothing = np.zeros((2, laws, k))
+        return cls(nothing, nothing, nothing, np.zeros((2, realizations, k)))
 
     def plus(self, other: Curves) -> Curves:
         """Return the curves of both."""
@@ -527,6 +530,12 @@ def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:
         parts = own[None, :, None] * share if ends.size else np.zeros((*share.shape[:2], 0))
         return np.stack([parts.sum(axis=1), (parts * parts).sum(axis=1)])
 
+    realizations = Curves.empty(0, ends.size, len(events.realization_weights)).realizations
     if not ends.size:
-        return Curves.empty(drawn.shape[0], 0)
-    return Curves(reached(drawn, weight), reached(largest, of_year), reached(total, of_year))
+        return Curves.empty(drawn.shape[0], 0, realizations.shape[1])
+    own = weight[:, None] * np.stack([(drawn[0] >= end).mean(axis=-1) for end in ends], axis=-1)
+    for power in (1, 2):
+        np.add.at(realizations[power - 1], events.branch, own**power)
+    return Curves(
+        reached(drawn, weight), reached(largest, of_year), reached(total, of_year), realizations
+    )

@@ -74,6 +74,13 @@ class EventSet:
     warnings: tuple[str, ...] = ()
 
     @property
+    def branch(self) -> IntArray:
+        """Place of the realization of each event among `realization_weights`, shape (n,)."""
+        numbers = np.array(list(self.realization_weights))
+        order = np.argsort(numbers)
+        return np.asarray(order[np.searchsorted(numbers[order], self.realization)])
+
+    @property
     def is_scenario(self) -> bool:
         """Whether the events are realisations of one, without a rate."""
         return self.duration is None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import normal_quantile
+from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
@@ -22,12 +22,24 @@ from rbfrag.hazards.event_counts import (
     PartCounts,
     count_part,
     laws_of,
+    shift_error,
 )
+from rbfrag.hazards.event_means import EventMeans, event_means
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
+from rbfrag.hazards.kernel import interval_end
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.report import or_null
 from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
+from rbfrag.hazards.uncertainty import (
+    Ends,
+    Uncertainty,
+    branch_ends,
+    ends_by_name,
+    rate_interval,
+    share_interval,
+)
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
@@ -50,9 +62,11 @@ class Exceedance:
     Args:
         value: the number of failures, or the loss.
         annual_rate: rate of events that reach it [1/a]; of a scenario its probability.
-        ci_low: lower end of its interval by the counting error of the event set (`rate_interval`,
+        counting: both ends of its interval by the counting error of the event set (`rate_interval`,
             of a scenario `share_interval`).
-        ci_high: upper end.
+        knowledge: both ends of that by the uncertain parameters of the model.
+        branches: rates that 5 and 95 % of the realizations do not exceed; None where that cannot
+            be told (:class:`~rbfrag.hazards.uncertainty.Uncertainty`).
         largest_of_year: probability that the largest event of a year reaches it; None of a
             scenario.
         sum_of_year: probability that the sum over a year does; None of a scenario.
@@ -62,8 +76,9 @@ class Exceedance:
 
     value: float
     annual_rate: float
-    ci_low: float
-    ci_high: float
+    counting: Ends
+    knowledge: Ends
+    branches: Ends | None
     largest_of_year: float | None
     sum_of_year: float | None
     beyond_effective_time: bool
@@ -75,7 +90,9 @@ class Exceedance:
 
     def as_dict(self, name: str, *, scenario: bool) -> dict[str, Any]:
         """Return the numbers under the keys of the JSON contract."""
-        ends = {"ci_low": self.ci_low, "ci_high": self.ci_high}
+        ends = ends_by_name(
+            counting=self.counting, knowledge=self.knowledge, branches=self.branches
+        )
         if scenario:
             return {name: self.value, "probability": self.annual_rate, **ends}
         return {
@@ -111,8 +128,10 @@ class LossAnswer(Tabular):
         loss_variance: its variance, shape (laws, n); NaN where it was not computed.
         any_fails: probability of any failure, shape (laws, n); NaN likewise.
         bounds: the same under full dependence and independence, shape (2, n).
-        block_rates: rate of each row of the table that can be used, its standard error, and its
-            loss, NaN where it states none, shape (3, rows).
+        block_rates: rate of each row of the table that can be used, its standard error, its
+            loss, NaN where it states none, and what the interval of the rate reaches to by the
+            parameters of the model, NaN where that is not known, shape (4, rows).
+        uncertainty: of each number of the whole portfolio what is not known of it.
         exceedance: how often numbers of failures are reached, by law.
         loss_exceedance: how often losses are.
         quantiles: of failures and of the loss of a scenario at 5, 50 and 95 %, by law, shape
@@ -134,6 +153,7 @@ class LossAnswer(Tabular):
     any_fails: FloatArray
     bounds: FloatArray
     block_rates: FloatArray
+    uncertainty: Mapping[str, Uncertainty]
     exceedance: Mapping[str, tuple[Exceedance, ...]]
     loss_exceedance: Mapping[str, tuple[Exceedance, ...]]
     quantiles: FloatArray
@@ -203,6 +223,7 @@ class LossAnswer(Tabular):
                 means |= {given_event: mean, f"{given_event}_error": error}
         if scenario:
             means |= self._quantiles()
+        means["uncertainty"] = {name: one.as_dict() for name, one in self.uncertainty.items()}
         what = "probability_any" if scenario else "annual_rate_any"
         bounds = {
             name.replace(" ", "_"): {what: self.mean(values)}
@@ -266,10 +287,15 @@ class LossAnswer(Tabular):
             if self.events.is_scenario
             else ("average_annual_failures", "average_annual_loss")
         )
-        names = ("block_id", "site_id", failures, f"{failures}_error", loss, "reason")
+        names = (
+            "block_id", "site_id", failures, f"{failures}_error", loss, "knowledge_low",
+            "knowledge_high", "reason",
+        )  # fmt: skip
+        rate, error, cost, half = self.block_rates
+        ends = (interval_end(rate, half, side) for side in (-1.0, 1.0))
         answered = zip(
-            self.portfolio.block_ids, self.portfolio.site_ids, *self.block_rates.tolist(),
-            strict=True,
+            self.portfolio.block_ids, self.portfolio.site_ids,
+            *(or_null(values) for values in (rate, error, cost, *ends)), strict=True,
         )  # fmt: skip
         rows: list[dict[str, Any]] = [
             {**dict.fromkeys(names), **self.refused[i]}
@@ -280,8 +306,6 @@ class LossAnswer(Tabular):
         for row in rows:
             if not self.has_losses:
                 del row[loss]
-            elif row[loss] != row[loss]:  # none is stated
-                row[loss] = None
         return rows
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
@@ -340,22 +364,23 @@ def event_losses(
         raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if not 0.0 < level < 1.0:
         raise InputError(f"level = {level:g}: give a level above 0 and below 1, such as 0.95")
-    groups = _groups(events, portfolio, samples)
+    means = event_means(events, portfolio, level) if len(portfolio.measures) == 1 else None
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
-    laws = laws_of(portfolio)
+    shifted = shifted_portfolios(portfolio) if samples else ()
+    groups = _groups(events, portfolio, samples) if samples or means is None else []
     parts = (
-        EventYears(number, portfolio, _only(events, group), *ends, samples, seed)
+        EventYears(number, portfolio, _only(events, group), *ends, samples, seed, shifted)
         for number, group in enumerate(groups)
     )
     do: Run = run or (lambda work, _: map(count_part, work))
     done = 0
     results: dict[int, PartCounts] = {}
-    for result in do(parts, len(groups)):
+    for result in do(parts, len(groups)) if groups else ():
         results[result.number] = result
         done += groups[result.number].size
         if on_progress is not None:
             on_progress(done, sum(group.size for group in groups))
-    return _answer(events, portfolio, laws, ends, groups, results, samples, seed, level)
+    return _answer(events, portfolio, ends, groups, results, means, samples, seed, level)
 
 
 def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
@@ -416,15 +441,19 @@ def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
 def _answer(
     events: EventSet,
     portfolio: Portfolio,
-    laws: tuple[str, ...],
     ends: tuple[FloatArray, FloatArray],
     groups: Sequence[NDArray[np.intp]],
     results: Mapping[int, PartCounts],
+    means: EventMeans | None,
     samples: int,
     seed: int,
     level: float,
 ) -> LossAnswer:
-    n, order = events.event_id.size, [results[i] for i in range(len(groups))]
+    n, laws, order = (
+        events.event_id.size,
+        laws_of(portfolio),
+        [results[i] for i in range(len(groups))],
+    )
 
     def whole(name: str, *shape: int) -> FloatArray:
         values = np.zeros((*shape, n))
@@ -432,110 +461,124 @@ def _answer(
             values[..., group] = getattr(part, name)
         return values
 
-    blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
+    if means is None:
+        blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
+        unknown = np.full(portfolio.size, np.nan)
+        means = EventMeans(
+            whole("failures"), whole("loss"), whole("bounds", 2), blocks, unknown, np.nan, np.nan
+        )
+    any_fails = whole("any_fails", len(laws))
+    variance = whole("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
+    if not order:  # known without samples alone where no law matters, as of single blocks
+        one = np.where(np.ptp(means.bounds, axis=0) <= 0.0, means.bounds[0], np.nan)
+        any_fails = means.bounds if len(laws) > 1 else one[None]
+    axes = sum(len(row.coefficients) for row in portfolio.models) if samples else 0
+    rows, branches = len(laws) * (1 + 2 * axes), len(events.realization_weights)
     curves = [
-        reduce(Curves.plus, (part[i] for part in pairs), Curves.empty(len(laws), end.size))
+        reduce(Curves.plus, (part[i] for part in pairs), Curves.empty(rows, end.size, branches))
         for i, end in enumerate(ends)
         for pairs in [[(part.counts, part.losses) for part in order]]
     ]
     exceedance, loss_exceedance = (
-        {law: _curve(events, curve, end, i, level) for i, law in enumerate(laws)} if samples else {}
+        {law: _curve(events, curve, end, i, len(laws), level) for i, law in enumerate(laws)}
+        if samples
+        else {}
         for curve, end in zip(curves, ends, strict=True)
     )
-    any_fails = whole("any_fails", len(laws))
+    of_any = sum((part.any_shifted for part in order), np.zeros((rows // len(laws) - 1, len(laws))))
+    stated = {
+        "average_annual_failures": (means.failures, means.failures_half),
+        "average_annual_loss": (means.loss, means.loss_half),
+        "annual_rate_any": (any_fails[0], _half_of(events.weight @ any_fails[0], of_any, level)),
+    }
+    if portfolio.loss is None:
+        del stated["average_annual_loss"]
     return LossAnswer(
         events, portfolio, samples, seed, level, laws,
-        failures=whole("failures"),
-        loss=whole("loss"),
-        loss_variance=whole("loss_variance", len(laws)),
+        failures=means.failures,
+        loss=means.loss,
+        loss_variance=variance,
         any_fails=any_fails,
-        bounds=whole("bounds", 2),
-        block_rates=_of_rows(events, portfolio, blocks),
+        bounds=means.bounds,
+        block_rates=_of_rows(events, portfolio, means),
+        uncertainty={
+            name: Uncertainty.of(events, values, half, level)
+            for name, (values, half) in stated.items()
+            if name != "annual_rate_any" or (len(laws) == 1 and not np.isnan(values).any())
+        },
         exceedance=exceedance,
         loss_exceedance=loss_exceedance,
         quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
-        warnings=_warnings(events, portfolio, laws, blocks, any_fails),
+        warnings=_warnings(events, portfolio, laws, means.blocks, any_fails),
     )  # fmt: skip
 
 
+def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
+    """Return the portfolio by models one standard deviation away along each axis of their errors.
+
+    Two of each principal axis of each model's covariance, to either side.
+    """
+    result = []
+    for number, row in enumerate(portfolio.models):
+        variances, axes = np.linalg.eigh(np.array(row.covariance))
+        for step in (np.sqrt(np.maximum(variances, 0.0)) * axes).T:
+            for side in (1.0, -1.0):
+                values = np.array(list(row.coefficients.values())) + side * step
+                moved = replace(
+                    row, coefficients=dict(zip(row.coefficients, values.tolist(), strict=True))
+                )
+                models = (*portfolio.models[:number], moved, *portfolio.models[number + 1 :])
+                result.append(replace(portfolio, models=models))
+    return tuple(result)
+
+
+def _half_of(rate: float, shifted: FloatArray, level: float) -> float:
+    """Return what the interval of a rate reaches to by those of shifted portfolios, (2 axes, 1)."""
+    if not shifted.size or shifted.shape[1] > 1:
+        return np.nan
+    error = shift_error(np.concatenate([[rate], shifted[:, 0]]))
+    return float(rate * error * quantiles_of(level).normal)
+
+
 def _curve(
-    events: EventSet, curve: Curves, ends: FloatArray, law: int, level: float
+    events: EventSet, curve: Curves, ends: FloatArray, law: int, laws: int, level: float
 ) -> tuple[Exceedance, ...]:
-    """Return the numbers that are reached at all, each with its interval."""
+    """Return the numbers that are reached at all, each with its intervals."""
     widest = float(events.weight.max())
     effective, alike = events.effective_years, float((events.weight**2).sum())
+    errors = shift_error(curve.events[0, law::laws]) * quantiles_of(level).normal
     rows = []
     for k, end in enumerate(ends.tolist()):
         rate, squares = curve.events[:, law, k].tolist()
         if rate <= 0.0:
             break
+        known = (rate * math.exp(-errors[k]), rate * math.exp(errors[k]))
         if effective is None:
-            ends_of_share = share_interval(rate, squares - rate * rate * alike, alike, level)
-            rows.append(Exceedance(end, rate, *ends_of_share, None, None, False))
+            counting = share_interval(rate, squares - rate * rate * alike, alike, level)
+            known = known[0], min(known[1], 1.0)
+            rows.append(Exceedance(end, rate, counting, known, None, None, None, False))
             continue
-        low, high = rate_interval(rate, squares, widest, level)
+        counting = rate_interval(rate, squares, widest, level)
         largest, total = (float(years[0, law, k]) for years in (curve.largest, curve.sum))
-        rows.append(Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0))
+        over = branch_ends(events, curve.realizations[..., k]) if law == 0 else None
+        rare = rate * effective < 1.0
+        rows.append(Exceedance(end, rate, counting, known, over, largest, total, rare))
     return tuple(rows)
 
 
-def rate_interval(rate: float, squares: float, widest: float, level: float) -> tuple[float, float]:
-    """Return both ends of the interval of a weighted sum of Poisson counts.
-
-    Fay and Feuer (1997): the gamma interval, which is the exact one (Garwood 1936) where all
-    weights are equal. Confidence intervals for directly standardized rates: a method based on the
-    gamma distribution. Statistics in Medicine 16, 791-801.
-
-    Args:
-        rate: the sum of weights.
-        squares: sum of their squares, the variance.
-        widest: greatest weight that one more count may have.
-    """
-    from scipy.stats import chi2
-
-    tail = 0.5 * (1.0 - level)
-    low = 0.0
-    if rate > 0.0:
-        low = squares / (2.0 * rate) * float(chi2.ppf(tail, 2.0 * rate * rate / squares))
-    more, wider = rate + widest, squares + widest * widest
-    high = wider / (2.0 * more) * float(chi2.ppf(1.0 - tail, 2.0 * more * more / wider))
-    return low, high
-
-
-def share_interval(
-    share: float, variance: float, least: float, level: float
-) -> tuple[float, float]:
-    """Return both ends of the interval of a mean probability over realisations.
-
-    Wilson (1927), with as many realisations as give the variance. Probable inference, the law of
-    succession, and statistical inference. Journal of the American Statistical Association 22(158),
-    209-212.
-
-    Args:
-        least: sum of the squared weights of the realisations, one over their number.
-    """
-    z = -normal_quantile(0.5 - 0.5 * level)
-    alone = share * (1.0 - share)
-    n = alone / variance if variance > 1e-12 * alone > 0.0 else 1.0 / least
-    middle, width = share + 0.5 * z * z / n, z * math.sqrt(alone / n + 0.25 * (z / n) ** 2)
-    low, high = ((middle + side * width) / (1.0 + z * z / n) for side in (-1.0, 1.0))
-    return max(low, 0.0), min(high, 1.0)
-
-
-def _of_rows(events: EventSet, portfolio: Portfolio, blocks: FloatArray) -> FloatArray:
-    """Return the rate of each row of the table, its error, and its loss.
-
-    Like blocks of one row have one P in each event.
-    """
+def _of_rows(events: EventSet, portfolio: Portfolio, means: EventMeans) -> FloatArray:
+    """Return the rate of each row of the table, its error, its loss, and its interval's half."""
+    blocks, number = means.blocks, portfolio.count * portfolio.weight
     cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
-    weight = portfolio.count * portfolio.weight
-    parts = (weight * blocks[0], weight * np.sqrt(blocks[1]), portfolio.count * cost * blocks[0])
-    rate, error, loss = (
-        np.bincount(portfolio.row, part, minlength=len(portfolio.block_ids)) for part in parts
-    )
+    result = np.empty((4, portfolio.size))
+    result[:, portfolio.row] = (
+        number * blocks[0], number * np.sqrt(blocks[1]), portfolio.count * cost * blocks[0],
+        number * means.block_half,
+    )  # fmt: skip
     if events.is_scenario:  # the scatter about the mean, of events that weigh alike
-        error = np.sqrt(np.maximum(error**2 - rate**2 / events.event_id.size, 0.0))
-    return np.stack([rate, error, loss])
+        spread = result[1] ** 2 - result[0] ** 2 / events.event_id.size
+        result[1] = np.sqrt(np.maximum(spread, 0.0))
+    return result
 
 
 def _scenario_quantiles(

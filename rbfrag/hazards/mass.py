@@ -159,7 +159,7 @@ def smoothing_of(shaking: LevelShaking) -> tuple[float, Smoothing]:
     return apart / NODES_A_SHIFT, Smoothing(NODES_A_SHIFT, shaking.weight)
 
 
-STEP = 0.01
+STEP = 0.005
 """Step of the grid where nothing scatters about the levels."""
 
 NODES_A_SHIFT = 8

@@ -33,7 +33,7 @@ def as_dict(
         {"site": places[site], "block_id": name, **dict(zip(columns, values, strict=True))}
         for site, name, *values in zip(
             answer.site.tolist(), names,
-            *(_or_null(column) for column in columns.values()),
+            *(or_null(column) for column in columns.values()),
             strict=True,
         )
     ]  # fmt: skip
@@ -83,7 +83,8 @@ def rate_columns(answer: HazardAnswer) -> dict[str, Any]:
     return columns
 
 
-def _or_null(column: Any) -> list[float | None]:
+def or_null(column: Any) -> list[float | None]:
+    """Return the values of an array, None for NaN."""
     return [None if math.isnan(value) else value for value in column.tolist()]
 
 

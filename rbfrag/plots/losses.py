@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.losses import Exceedance, LossAnswer
@@ -49,6 +50,14 @@ def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     return canvas.save_figure(figure, out)
 
 
+_BANDS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("knowledge", "by the model's parameters", {"color": "#2b6cac", "alpha": 0.18}),
+    ("counting", "by the number of events", {"fc": "none", "ec": "#555555", "hatch": "////"}),
+    ("branches", "over the logic tree", {"color": "#c2410c", "alpha": 0.16}),
+)
+"""What is not known: its name, its words, and how its band is drawn."""
+
+
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
     axes.set_yscale("log")
     drawn = [curve for curve in curves.values() if curve]
@@ -66,11 +75,18 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
             continue
         x = [one.value for one in curve]
         of = f" ({law})" if several else ""
-        low, high = ([getattr(one, end) for one in curve] for end in ("ci_low", "ci_high"))
-        axes.fill_between(x, low, high, color=colour, alpha=0.18, lw=0.0)
+        for what, words, style in _BANDS:
+            ends = [getattr(one, what) or (math.nan, math.nan) for one in curve]
+            low, high = zip(*ends, strict=True)
+            if not math.isnan(low[0]):
+                percent = 90.0 if what == "branches" else 100.0 * answer.level
+                axes.fill_between(
+                    x, low, high, lw=0.9, **style,
+                    label=f"{percent:g} % {words}" if first and law == next(iter(curves)) else None,
+                )  # fmt: skip
         axes.plot(
             x, [one.annual_rate for one in curve], "o-", color=colour, ms=3.0, lw=1.5,
-            label=f"events{of}, {100 * answer.level:g} % band" if first else None,
+            label=f"events{of}" if first else None,
         )  # fmt: skip
         sums = [one.sum_of_year for one in curve if one.sum_of_year is not None]
         if sums:
@@ -82,7 +98,7 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
     if drawn and effective is not None:
         years = f"{effective:,.0f}" if effective >= 100.0 else f"{effective:.3g}"
         lowest = 0.3 * min(curve[-1].annual_rate for curve in drawn)
-        highest = 2.0 * max(curve[0].ci_high for curve in drawn)
+        highest = 2.0 * max(max(curve[0].counting[1], curve[0].knowledge[1]) for curve in drawn)
         axes.set_ylim(min(max(lowest, _LOWEST / effective), 0.5 / effective), highest)
         axes.axhspan(
             axes.get_ylim()[0], 1.0 / effective, color="#dddddd", alpha=0.6, lw=0.0,

@@ -15,7 +15,8 @@ from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards import joint_rate
 from rbfrag.hazards.annual_rate import failure_rate
-from rbfrag.hazards.answer import HazardAnswer, hazard, hazard_at_sites, mixture_quantiles
+from rbfrag.hazards.answer import HazardAnswer, hazard, hazard_at_sites
+from rbfrag.hazards.branches import mixture_quantiles
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.report import as_dict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2

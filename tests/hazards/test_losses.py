@@ -24,7 +24,8 @@ from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import EventYears, count_part
-from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
+from rbfrag.hazards.losses import LossAnswer
+from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.question import predict
 from tests.exchange.openquake_job import write_job
