@@ -20,13 +20,13 @@ from rbfrag.solver.results import FloatArray
 NODES = 25
 """Nodes of E over ln p."""
 
-_CELL = 0.15
-"""Width of Φ⁻¹(P) of blocks that are taken together."""
+_CELL, _WIDEST = 0.2, 40
+"""Width of Φ⁻¹(P) of blocks that are taken together, and how many of it there are to both sides."""
 
 _PAIRS, _LEVELS = 256, np.array([-1.7, 0.0, 1.7])
 """Pairs of one site that stand for all, and the values of E at which they are taken."""
 
-_LEAST = 1e-12
+_LEAST, _LITTLE = 1e-12, 1e-7
 
 
 class LatentEvent(NamedTuple):
@@ -87,10 +87,16 @@ class LargeCounts:
         """
         p, rho = ndtr(bound), self._law.rho_e * (1.0 - common)
         number = self._count * p
-        key = self._node * 1000 + np.clip(np.floor(bound / _CELL), -400, 400).astype(np.intp)
-        _, first, cell = np.unique(key, return_index=True, return_inverse=True)
-        many, mean = np.bincount(cell, self._count), np.bincount(cell, number)
-        a, node = ndtri(mean / many), self._node[first]
+        cells = np.clip(np.rint(bound / _CELL), -_WIDEST, _WIDEST).astype(np.intp) + _WIDEST
+        cells = cells * NODES + self._node
+
+        def summed(values: FloatArray) -> FloatArray:
+            return np.bincount(cells, values, minlength=NODES * (2 * _WIDEST + 1))
+
+        mean = summed(number)
+        used = np.flatnonzero(mean > _LITTLE * mean.sum())
+        many, mean, node = summed(self._count)[used], mean[used], used % NODES
+        a = ndtri(mean / many)
 
         def given(value: FloatArray) -> FloatArray:
             return np.asarray(ndtr((a - np.sqrt(rho) * value) / np.sqrt(1.0 - rho)))
@@ -107,8 +113,10 @@ class LargeCounts:
         failures, none = _number(mean_of, variance, generator)
         result = np.empty((len(marks), failures.size))
         for row, (mark, square) in zip(result, marks, strict=True):
-            cells = (np.bincount(cell, number * each) / mean for each in (mark, square))
-            one, squares = ((q * many) @ each / mean_of for each in cells)
+            one, squares = (
+                q @ (many * summed(number * each)[used] / mean) / mean_of
+                for each in (mark, square)
+            )
             row[:] = failures * one
             scatter = np.maximum(squares - one * one, 0.0)
             some = (failures > 0) & (scatter > _LEAST * one * one)
@@ -129,7 +137,7 @@ class LargeCounts:
         i = np.searchsorted(below, below[-1] * (np.arange(_PAIRS) + 0.5) / _PAIRS)
         others = self._of_site[i] - 1
         own = self._last[i] - 1 - self._from[i]
-        other = np.floor(generator.random(_PAIRS) * others).astype(np.int64)
+        other = np.floor((generator.permutation(_PAIRS) + 0.5) / _PAIRS * others).astype(np.int64)
         other += other >= own
         j = np.searchsorted(self._last, self._from[i] + np.minimum(other, others), side="right")
         apart, _, (opposite, same) = pair_correlations(blocks, i, j, law)

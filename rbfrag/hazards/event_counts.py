@@ -487,9 +487,10 @@ def _common(part: EventYears, shaken: Shaken) -> float:
         return 0.0
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
     ends = (portfolio.probability(own, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
-    high, low = (np.clip(ndtri(p), -_FARTHEST, _FARTHEST) for p in ends)
-    slope = 0.5 * float(np.average(high - low, weights=shaken.probability))
-    return slope * slope / (1.0 + slope * slope)
+    high, low = (np.clip(ndtri(p), -_REACH, _REACH) for p in ends)
+    square, p = 0.25 * (high - low) ** 2, shaken.probability
+    weight = portfolio.count[own] * p * (1.0 - p) + NOTHING
+    return float(np.average(square / (1.0 + square), weights=weight))
 
 
 def _of_many(
