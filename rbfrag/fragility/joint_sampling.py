@@ -90,27 +90,6 @@ class JointSampler:
         p, _ = checked(probability, self._blocks, None)
         return np.asarray(self.normals(draws, generator) <= ndtri(p))
 
-    def counts(
-        self,
-        probability: ArrayLike,
-        draws: int,
-        generator: np.random.Generator,
-        weights: ArrayLike | None = None,
-    ) -> FloatArray:
-        """Return the weighted number of failures, shape (draws,), in bounded memory.
-
-        Args:
-            probability: P of each block, shape (n,).
-            weights: weight or loss of each block, shape (n,); None for 1.
-        """
-        p, w = checked(probability, self._blocks, weights)
-        at_once = max(1, _VALUES_AT_ONCE // max(1, p.size))
-        counts = np.empty(draws)
-        for start in range(0, draws, at_once):
-            part = counts[start : start + at_once]
-            part[:] = self.failures(p, part.size, generator) @ w
-        return counts
-
 
 def _cholesky(r: FloatArray) -> FloatArray:
     n = r.shape[-1]

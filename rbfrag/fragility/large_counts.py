@@ -114,8 +114,7 @@ class LargeCounts:
         result = np.empty((len(marks), failures.size))
         for row, (mark, square) in zip(result, marks, strict=True):
             one, squares = (
-                q @ (many * summed(number * each)[used] / mean) / mean_of
-                for each in (mark, square)
+                q @ (many * summed(number * each)[used] / mean) / mean_of for each in (mark, square)
             )
             row[:] = failures * one
             scatter = np.maximum(squares - one * one, 0.0)

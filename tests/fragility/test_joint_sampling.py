@@ -82,14 +82,7 @@ def test_unknown_azimuths_are_drawn_in_every_sample() -> None:
 def test_a_seed_gives_the_same_samples(way: str) -> None:
     blocks, p = anywhere(30, 6), np.full(30, 0.3)
     one, same, other = (
-        JointSampler(LAW, blocks).counts(p, 50, np.random.default_rng(seed)) for seed in (1, 1, 2)
+        JointSampler(LAW, blocks).failures(p, 50, np.random.default_rng(seed)) for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(one, same)
     assert (one != other).any()
-
-
-def test_counts_are_drawn_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joint_sampling, "_VALUES_AT_ONCE", 100)
-    blocks, p, w = anywhere(30, 6), np.full(30, 0.3), np.arange(30.0)
-    counts = JointSampler(LAW, blocks).counts(p, 4000, np.random.default_rng(1), w)
-    assert counts.mean() == pytest.approx(float(w @ p), rel=0.05)
