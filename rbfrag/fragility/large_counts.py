@@ -90,8 +90,9 @@ class LargeCounts:
         cells = np.clip(np.rint(bound / _CELL), -_WIDEST, _WIDEST).astype(np.intp) + _WIDEST
         cells = cells * NODES + self._node
 
-        def summed(values: FloatArray) -> FloatArray:
-            return np.bincount(cells, values, minlength=NODES * (2 * _WIDEST + 1))
+        def summed(values: FloatArray | IntArray) -> FloatArray:
+            total = np.bincount(cells, values, minlength=NODES * (2 * _WIDEST + 1))
+            return total.astype(np.float64)
 
         mean = summed(number)
         used = np.flatnonzero(mean > _LITTLE * mean.sum())

@@ -32,6 +32,9 @@ _EDGE_EVERY = 10
 """Nodes between two edges of what the parts of a rate are given for."""
 
 _BLOCKS_OF_A_PART = 4096
+_FARTHEST = 50.0
+"""Logarithm of the factor beyond which an end of an interval says nothing."""
+
 _HALVINGS = 48
 _EVERY = 8
 """Nodes of which one tells whether they are in the ranges that a model was fitted on."""
@@ -354,7 +357,8 @@ def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> Flo
         side: -1 or 1.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(rate > 0.0, rate * np.exp(side * np.divide(half, rate)), rate)
+        reach = np.minimum(np.divide(half, rate), _FARTHEST)
+        return np.where(rate > 0.0, rate * np.exp(side * reach), rate)
 
 
 def error_step(model: FragilityModel, gradient: FloatArray, level: float) -> FloatArray:
@@ -437,6 +441,8 @@ def _off_by(values: FloatArray) -> FloatArray:
     That is the error of a grid of twice the step.
     """
     result = np.zeros(values.shape)
+    if values.shape[1] < 7:
+        return result
     a, b, c, d = (values[:, i : values.shape[1] - 6 + i : 2] for i in (0, 2, 4, 6))
     result[:, 3:-3:2] = values[:, 3:-3:2] - (9.0 * (b + c) - a - d) / 16.0
     return result

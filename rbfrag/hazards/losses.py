@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -470,8 +469,8 @@ def _answer(
     any_fails = whole("any_fails", len(laws))
     variance = whole("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
     if not order:  # known without samples alone where no law matters, as of single blocks
-        one = np.where(np.ptp(means.bounds, axis=0) <= 0.0, means.bounds[0], np.nan)
-        any_fails = means.bounds if len(laws) > 1 else one[None]
+        one = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
+        any_fails = means.bounds if len(laws) > 1 else one
     axes = sum(len(row.coefficients) for row in portfolio.models) if samples else 0
     rows, branches = len(laws) * (1 + 2 * axes), len(events.realization_weights)
     curves = [
@@ -552,7 +551,8 @@ def _curve(
         rate, squares = curve.events[:, law, k].tolist()
         if rate <= 0.0:
             break
-        known = (rate * math.exp(-errors[k]), rate * math.exp(errors[k]))
+        low, high = (interval_end(np.array(rate), rate * errors[k], side) for side in (-1.0, 1.0))
+        known = float(low), float(high)
         if effective is None:
             counting = share_interval(rate, squares - rate * rate * alike, alike, level)
             known = known[0], min(known[1], 1.0)
