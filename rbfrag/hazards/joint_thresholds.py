@@ -31,7 +31,7 @@ _STEPS, _REACH = 64, 8.0
 """Steps of Z to one standard deviation, and how far they reach, where λ of a block is tabled."""
 
 _LEVELS = ndtr(np.arange(-_REACH * _STEPS, _REACH * _STEPS + 1) / _STEPS)
-_VALUES, _SAME, _MOST_PAIRED = 1 << 17, 1e-9, 1000
+_VALUES, _SAME, _MOST_PAIRED = 1 << 19, 1e-9, 1000
 
 
 class JointRates(NamedTuple):
