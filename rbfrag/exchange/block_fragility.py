@@ -109,7 +109,7 @@ class Curve(NamedTuple):
         grid = first + (last - first) * _TOWARDS_THE_FIRST
         return Curve(grid, self.at(grid), self.lowest)
 
-    def at(self, u: FloatArray) -> FloatArray:
+    def at(self, u: FloatArray | float) -> FloatArray:
         """Return P between the levels, where its logarithm is nearly straight."""
         return np.asarray(np.exp(np.interp(u, self.u, np.log(np.maximum(self.p, _NOTHING)))))
 
@@ -158,15 +158,15 @@ def block_functions(
             yield curve.smoothed(meaning)
 
     top, state = CREDIBLE[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
-    kept = iter([_mean(shown(), top)]) if one_class else (each.between(top) for each in shown())
+    each = iter([_mean(shown(), top)]) if one_class else shown()
     functions: list[FragilityFunction] = []
     weak: list[str] = []
     of = iter(names)
-    while some := list(islice(kept, _CHUNK)):
+    while some := list(islice(each, _CHUNK)):
         named = list(zip(of, some, strict=False))
-        weak += [name for name, curve in named if curve.p[-1] < FLOOR]
+        weak += [name for name, curve in named if curve.at(math.log(top)) < FLOOR]
         if not weak:
-            functions += _functions(named, FragilityFunction("", state, measured), levels)
+            functions += _functions(named, FragilityFunction("", state, measured), levels, top)
     if weak:
         raise InputError(
             f"{len(weak)} of {len(names)} blocks, first {weak[0]!r}, have no fragility: P stays "
@@ -275,13 +275,15 @@ def _mean(curves: Iterable[Curve], top: float) -> Curve:
 
 
 def _functions(
-    named: Sequence[tuple[str, Curve]], empty: FragilityFunction, levels: int
+    named: Sequence[tuple[str, Curve]], empty: FragilityFunction, levels: int, top: float
 ) -> Iterator[FragilityFunction]:
-    """Yield the functions of some curves, of one size each."""
-    u, p = (np.stack([getattr(curve, axis) for _, curve in named]) for axis in ("u", "p"))
-    straight = [_lognormal(*each) for each in zip(u, p, strict=True)]
-    curved = np.array([each is None for each in straight])
-    discrete = chords(np.exp(u[curved]), p[curved, None], levels, FLOOR)
+    """Yield the functions of some curves, up to the level `top`."""
+    straight = [_lognormal(curve, top) for _, curve in named]
+    curved = [c.between(top) for (_, c), line in zip(named, straight, strict=True) if line is None]
+    discrete: Iterator[tuple[FloatArray, FloatArray, float]] = iter(())
+    if curved:
+        u, p = (np.stack([getattr(curve, axis) for curve in curved]) for axis in ("u", "p"))
+        discrete = chords(np.exp(u), p[:, None], levels, FLOOR)
     for (name, _), line in zip(named, straight, strict=True):
         if line is None:
             x, (probability,), error = next(discrete)
@@ -290,11 +292,13 @@ def _functions(
             yield replace(empty, name=name, median=line[0], beta=line[1])
 
 
-def _lognormal(u: FloatArray, p: FloatArray) -> tuple[float, float] | None:
+def _lognormal(curve: Curve, top: float) -> tuple[float, float] | None:
     """Return median and standard deviation of ln of a lognormal function; None for any other.
 
     Its normal score is straight in ln x; near 1 scores have few digits.
     """
+    covered = (curve.p >= LEAST) & (curve.u <= math.log(top))
+    u, p = curve.u[covered], curve.p[covered]
     middle = p < 1.0 - 1e-5
     if middle.sum() < 3:
         return None
