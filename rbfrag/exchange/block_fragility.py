@@ -68,7 +68,7 @@ class BlockFunctions(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-class Curve(NamedTuple):
+class BlockCurve(NamedTuple):
     """P at levels close enough to be joined by chords; 0 below the first of them.
 
     Args:
@@ -81,7 +81,7 @@ class Curve(NamedTuple):
     p: FloatArray
     lowest: float | None = None
 
-    def smoothed(self, meaning: Component) -> Curve:
+    def smoothed(self, meaning: Component) -> BlockCurve:
         """Return P over another definition of the component, whose scatter is integrated.
 
         The steps of u must be equal. A single component is definition/ratio · exp(scatter ξ), ξ
@@ -97,9 +97,9 @@ class Curve(NamedTuple):
         rest = np.convolve(np.pad(beyond, (2 * reach, 0)), weight / weight.sum(), mode="valid")
         u = self.u[0] + step * np.arange(-reach, self.u.size + reach)
         p = rest + self.p[0] * ndtr((u - self.u[0]) / meaning.scatter)
-        return Curve(u + math.log(meaning.ratio), p, self.lowest)
+        return BlockCurve(u + math.log(meaning.ratio), p, self.lowest)
 
-    def between(self, top: float) -> Curve:
+    def between(self, top: float) -> BlockCurve:
         """Return the part from P = `LEAST` to a level, or to where P is all but 1."""
         if self.p[0] >= LEAST and self.u[-1] <= math.log(top):
             return self
@@ -107,7 +107,7 @@ class Curve(NamedTuple):
         first = self.u[min(begins, self.u.size - 1)]
         last = min(self.u[min(ends, self.u.size - 1)], math.log(top))
         grid = first + (last - first) * _TOWARDS_THE_FIRST
-        return Curve(grid, self.at(grid), self.lowest)
+        return BlockCurve(grid, self.at(grid), self.lowest)
 
     def at(self, u: FloatArray | float) -> FloatArray:
         """Return P between the levels, where its logarithm is nearly straight."""
@@ -152,7 +152,7 @@ def block_functions(
     measured, curves = curves_of(numbers, measure, model, names, meaning.scatter)
     begun: list[float] = []
 
-    def shown() -> Iterator[Curve]:
+    def shown() -> Iterator[BlockCurve]:
         for curve in curves:
             begun.extend([] if curve.lowest is None else [curve.lowest])
             yield curve.smoothed(meaning)
@@ -194,7 +194,7 @@ def curves_of(
     model: FragilityModel,
     names: Sequence[str],
     scatter: float = 0.0,
-) -> tuple[IntensityType, Iterator[Curve]]:
+) -> tuple[IntensityType, Iterator[BlockCurve]]:
     """Return what the levels measure, and the curve of each block over a single component.
 
     Args:
@@ -205,7 +205,7 @@ def curves_of(
         raise InputError(f"measure = {measure!r}: use one of {', '.join(CREDIBLE)}")
     columns = model.method.block.filled(numbers)
 
-    def curves() -> Iterator[Curve]:
+    def curves() -> Iterator[BlockCurve]:
         for start in range(0, next(iter(columns.values())).size, _CHUNK):
             some = slice(start, start + _CHUNK)
             of_blocks = {name: column[some, None] for name, column in columns.items()}
@@ -220,7 +220,7 @@ def _some_curves(
     model: FragilityModel,
     names: Sequence[str],
     scatter: float,
-) -> Iterator[Curve]:
+) -> Iterator[BlockCurve]:
     def probability(u: FloatArray) -> FloatArray:
         return array_answer(model, {**blocks, measure: np.exp(u)}, interval=False).probability
 
@@ -249,10 +249,10 @@ def _some_curves(
     rising = np.maximum.accumulate(probability(grid), axis=1)
     lowest = np.where(p[:, 0] - p.min(axis=1) > FLOOR, np.exp(high[:, 0]), np.nan)
     for each, row, begins in zip(grid, rising, lowest.tolist(), strict=True):
-        yield Curve(each, row, None if begins != begins else begins)
+        yield BlockCurve(each, row, None if begins != begins else begins)
 
 
-def _mean(curves: Iterable[Curve], top: float) -> Curve:
+def _mean(curves: Iterable[BlockCurve], top: float) -> BlockCurve:
     """Return the mean of curves; of those that jump where they begin, the first keep their jump."""
     grid = np.linspace(math.log(_WEAKEST), math.log(top), 16 * _SCANNED)
     total, jumps = np.zeros(grid.size), []
@@ -271,11 +271,11 @@ def _mean(curves: Iterable[Curve], top: float) -> Curve:
     u = np.unique(
         np.concatenate([ends[0] + np.ptp(ends) * _TOWARDS_THE_FIRST, shown - JUMP, shown])
     )
-    return Curve(u, mean(u))
+    return BlockCurve(u, mean(u))
 
 
 def _functions(
-    named: Sequence[tuple[str, Curve]], empty: FragilityFunction, levels: int, top: float
+    named: Sequence[tuple[str, BlockCurve]], empty: FragilityFunction, levels: int, top: float
 ) -> Iterator[FragilityFunction]:
     """Yield the functions of some curves, up to the level `top`."""
     straight = [_lognormal(curve, top) for _, curve in named]
@@ -292,7 +292,7 @@ def _functions(
             yield replace(empty, name=name, median=line[0], beta=line[1])
 
 
-def _lognormal(curve: Curve, top: float) -> tuple[float, float] | None:
+def _lognormal(curve: BlockCurve, top: float) -> tuple[float, float] | None:
     """Return median and standard deviation of ln of a lognormal function; None for any other.
 
     Its normal score is straight in ln x; near 1 scores have few digits.

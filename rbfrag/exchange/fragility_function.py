@@ -177,14 +177,14 @@ def renamed(
         why: what is wrong with them.
     """
     to = str.maketrans(dict.fromkeys(refused, by))
-    named = [replace(each, name=each.name.translate(to)) for each in functions]
+    named = [replace(each, name=each.name.strip().translate(to)) for each in functions]
     before = list(dict.fromkeys(each.name for each in functions))
-    changed = [name for name in before if name != name.translate(to)]
+    changed = [name for name in before if name.strip() != name.strip().translate(to)]
     if not changed:
         return named, []
     return named, [
         f"{len(changed)} of {len(before)} IDs have {by!r} for what {why}: {changed[0]!r} is "
-        f"written as {changed[0].translate(to)!r}; name it so in the exposure"
+        f"written as {changed[0].strip().translate(to)!r}; name it so in the exposure"
     ]
 
 

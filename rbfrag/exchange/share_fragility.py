@@ -13,12 +13,12 @@ from scipy.special import ndtri
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import (
     CREDIBLE,
+    BlockCurve,
     BlockFunctions,
-    Curve,
     about_model,
     curves_of,
 )
-from rbfrag.exchange.fragility_function import chords, discrete_function
+from rbfrag.exchange.fragility_function import FragilityFunction, chords
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards.conversions import component as component_named
@@ -104,14 +104,17 @@ def share_functions(
     u = np.linspace(ends.min() - 1e-9, ends.max() + 1e-9, _FINE)
     ordered = np.sort(reached, axis=1)
     of_shares = [
-        Curve(u, np.searchsorted(row, u, side="right") / DRAWS).smoothed(meaning) for row in ordered
+        BlockCurve(u, np.searchsorted(row, u, side="right") / DRAWS).smoothed(meaning)
+        for row in ordered
     ]
     covered = of_shares[0].u
     covered = covered[(covered <= top) & (of_shares[0].p >= 0.5 / DRAWS)]
     p = np.array([np.interp(covered, *each[:2]) for each in of_shares])
-    ((x, rows, _),) = chords(np.exp(covered)[None], p[None], levels, _FLOOR)
+    ((x, rows, error),) = chords(np.exp(covered)[None], p[None], levels, _FLOOR)
     functions = [
-        discrete_function(name, f"failed_{share:g}_percent", kind, x, row, name)
+        FragilityFunction(
+            name, f"failed_{share:g}_percent", kind, levels=x, probability=row, grid_error=error
+        )
         for share, row in zip(shares, rows, strict=True)
     ]
     warnings = [
