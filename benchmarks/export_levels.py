@@ -89,14 +89,14 @@ def draw(drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
     axes = figure.add_subplot()
     for i, (exported, equal) in enumerate(drawn.values()):
         for values, colour, at in ((equal, "0.55", i - 0.12), (exported, "C0", i + 0.12)):
-            axes.plot(np.full(values.size, at), values, ".", color=colour, ms=3)
+            axes.plot([at, at], np.quantile(values, (0.0, 1.0)), color=colour, lw=5)
     axes.axhline(0.01, color="C3", lw=0.8)
     axes.text(len(drawn) - 0.55, 0.0108, "1 %", color="C3", ha="right", va="bottom")
-    axes.plot([], [], ".", color="0.55", label="levels of equal ratio")
-    axes.plot([], [], ".", color="C0", label="as exported")
+    axes.plot([], [], lw=5, color="0.55", label="levels of equal ratio")
+    axes.plot([], [], lw=5, color="C0", label="as exported")
     axes.set(yscale="log", ylabel="largest relative error", xlim=(-0.5, len(drawn) - 0.5))
     axes.set_xticks(range(len(drawn)), list(drawn), rotation=30, ha="right", fontsize=8)
-    axes.legend(fontsize=8, loc="center right")
+    axes.legend(fontsize=8, loc="upper right")
     save_figure(figure, FIGURE)
 
 
