@@ -89,7 +89,9 @@ def draw(drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
     axes = figure.add_subplot()
     for i, (exported, equal) in enumerate(drawn.values()):
         for values, colour, at in ((equal, "0.55", i - 0.12), (exported, "C0", i + 0.12)):
-            axes.plot([at, at], np.quantile(values, (0.0, 1.0)), color=colour, lw=5)
+            axes.plot(
+                [at, at], np.quantile(values, (0.0, 1.0)), color=colour, lw=5, solid_capstyle="butt"
+            )
     axes.axhline(0.01, color="C3", lw=0.8)
     axes.text(len(drawn) - 0.55, 0.0108, "1 %", color="C3", ha="right", va="bottom")
     axes.plot([], [], lw=5, color="0.55", label="levels of equal ratio")
