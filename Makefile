@@ -6,6 +6,7 @@ VENV ?= .venv
 
 FLOORS ?= .venv-floors
 RELEASE ?= .venv-release
+TOOLS ?= .venv-tools
 CORE := tests/cli tests/db tests/exchange tests/fragility tests/hazards tests/motions tests/plots \
   tests/rockmasses tests/solver
 
@@ -15,7 +16,7 @@ PIP := $(RUN) pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types docs unit floors release-check format cli-reference wheel clean
+.PHONY: help demo test lint types docs unit floors release-check interoperability format cli-reference wheel clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
@@ -62,6 +63,16 @@ release-check:  ## is the last commit fit for a package index: distributions, fi
 	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check $$($(PYTHON) -c \
 	  "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['release'])")
 	$(RELEASE)/bin/python -m benchmarks.release_check --python $(PYTHON)
+
+# Nor part of .ci/run: it installs other people's programs. The engine asks for GDAL, which needs a compiler and its
+# library, and does without it in these jobs: all else that it asks for is installed.
+interoperability: $(VENV)/.installed-dev  ## the OpenQuake engine and pelicun run on exports: their failures beside our own
+	$(PYTHON) -m venv --clear $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps openquake-engine
+	$(TOOLS)/bin/python -c "from importlib.metadata import requires; print(*(each for each in \
+	  requires('openquake-engine') if not each.startswith('gdal')), 'pelicun', sep='\n')" > $(TOOLS)/needed.txt
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(TOOLS)/needed.txt
+	$(RUN) benchmarks.interoperability $(TOOLS)/bin/python
 
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .

@@ -4,7 +4,8 @@
     python examples/pelicun_damage.py block.csv 0.6
 
 pelicun (3.10 or newer) may live in an environment of its own: this script needs nothing of rbfrag.
-It prints the share of realisations in which the block has toppled at the given PGV [m/s].
+It prints, for the first block of the table, the share of realisations in which each limit state is
+reached at the given level of the table's measure [m/s, g].
 """
 
 from __future__ import annotations
@@ -13,28 +14,34 @@ import sys
 
 import pandas as pd
 from pelicun.assessment import Assessment
+from pelicun.base import EDP_to_demand_type
 
-REALISATIONS = 20_000
+REALISATIONS = 200_000
 
 
-def damage_share(table: str, pgv_m_s: float, seed: int = 7) -> float:
-    """Return the share of realisations with the block toppled."""
-    # the demand is a single component's; pelicun would multiply it by 1.2, as for the larger of two
-    options = {"PrintLog": False, "Seed": seed, "NonDirectionalMultipliers": {"ALL": 1.0}}
-    run = Assessment(options)
-    place = pd.MultiIndex.from_tuples([("PGV", "0", "1")])
-    demand = pd.DataFrame([["mps"]] + [[pgv_m_s]] * REALISATIONS, columns=place)
-    demand.index = ["Units", *map(str, range(REALISATIONS))]
-    run.demand.load_sample(demand)
+def damage_shares(table: str, level: float, seed: int = 7) -> list[float]:
+    """Return the shares of realisations that reach each limit state."""
+    row = pd.read_csv(table, dtype={"ID": str}).iloc[0]
+    demand, _, period = row["Demand-Type"].partition("|")
+    name = EDP_to_demand_type[demand] + (f"_{period}" if period else "")
+    run = Assessment({"PrintLog": False, "Seed": seed})
+    place = pd.MultiIndex.from_tuples([(name, "0", "1")])
+    sample = pd.DataFrame([[row["Demand-Unit"]]] + [[level]] * REALISATIONS, columns=place)
+    sample.index = ["Units", *map(str, range(REALISATIONS))]
+    run.demand.load_sample(sample)
     run.stories = 1
     block = {"Units": ["ea"], "Location": ["0"], "Direction": ["1"], "Theta_0": ["1"],
              "Family": [""], "Blocks": [1]}  # fmt: skip
-    run.asset.load_cmp_model({"marginals": pd.DataFrame(block, index=["block"])})
+    run.asset.load_cmp_model({"marginals": pd.DataFrame(block, index=[row["ID"]])})
     run.asset.generate_cmp_sample(REALISATIONS)
-    run.damage.load_model_parameters([table], {"block"})
+    run.damage.load_model_parameters([table], {row["ID"]})
     run.damage.calculate()
-    return float(run.damage.save_sample().xs("1", level="ds", axis=1).mean().iloc[0])
+    reached = run.damage.save_sample()
+    states = sorted(set(reached.columns.get_level_values("ds")) - {"0"})
+    # a damage state is the last limit state that is reached
+    each = [float(reached.xs(state, level="ds", axis=1).mean().iloc[0]) for state in states]
+    return [sum(each[i:]) for i in range(len(each))]
 
 
 if __name__ == "__main__":
-    print(damage_share(sys.argv[1], float(sys.argv[2])))
+    print(*damage_shares(sys.argv[1], float(sys.argv[2])))

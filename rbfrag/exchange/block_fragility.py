@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import NamedTuple, Unpack
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import FragilityFunction
+from rbfrag.exchange.fragility_function import JUMP, FragilityFunction, chords
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
+from rbfrag.hazards.conversions import Component
+from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
@@ -23,14 +27,11 @@ from rbfrag.solver.results import FloatArray
 FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_topple": "toppled"}
 """The limit state of a block by its mode."""
 
-"""What becomes of such models."""
+LEAST, FLOOR = 5e-6, 1e-5
+"""P where a function begins, and the least P to which errors are relative."""
 
-SMALLEST = 1e-7
-"""Probabilities from this to one minus this are covered by a discrete function."""
-
-_LOWEST, _HIGHEST, _SCANNED = 1e-5, 1e3, 4001
-_STRAIGHT = 1e-9
-_CHUNK = 256
+CREDIBLE = {"pgv_m_s": 5.0, "pga_g": 5.0, **dict.fromkeys(SPECTRAL.values(), 10.0)}
+"""The strongest shaking [m/s or g] that a function covers, by the measure's name in `predict`."""
 
 _TYPES = {
     "pgv_m_s": IntensityType("pgv_m_s", 0.01),
@@ -38,6 +39,19 @@ _TYPES = {
     **{name: IntensityType("sa_g", 1.0, period) for period, name in SPECTRAL.items()},
 }
 """What the levels of a function measure, by the measure's name in `predict`."""
+
+_WEAKEST, _SCANNED, _FINE, _HALVINGS = 1e-5, 1001, 1201, 40
+_TOWARDS_THE_FIRST = np.linspace(0.0, 1.0, _FINE) ** 2
+"""Places of levels, close where P is least and often steepest, as parts of the range."""
+_NOTHING, _UNSEEN, _SURE = 1e-300, 1e-12, 1.0 - 1e-7
+_REACH = 7.0
+"""Standard deviations of a component's scatter that are integrated over, to both sides."""
+_STRAIGHT = 1e-9
+_CHUNK = 256
+_NARROWEST = 0.2
+"""Least range of ln of the levels: a block that never fails has one too."""
+_BEGINNINGS = 500
+"""So many weakest blocks of a class keep the jump at which each begins."""
 
 
 class BlockFunctions(NamedTuple):
@@ -54,6 +68,52 @@ class BlockFunctions(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
+class BlockCurve(NamedTuple):
+    """P at levels close enough to be joined by chords; 0 below the first of them.
+
+    Args:
+        u: ln of the levels, shape (n,).
+        p: P at them, never falling, shape (n,).
+        lowest: level [m/s or g] below which P rises again, which is cut off there, or None.
+    """
+
+    u: FloatArray
+    p: FloatArray
+    lowest: float | None = None
+
+    def smoothed(self, meaning: Component) -> BlockCurve:
+        """Return P over another definition of the component, whose scatter is integrated.
+
+        The steps of u must be equal. A single component is definition/ratio · exp(scatter ξ), ξ
+        standard normal. What P jumps by where it begins is integrated in closed form.
+        """
+        if meaning.scatter == 0.0:
+            return self
+        step = self.u[1] - self.u[0]
+        reach = math.ceil(_REACH * meaning.scatter / step)
+        xi = step / meaning.scatter * np.arange(-reach, reach + 1)
+        weight = np.exp(-0.5 * xi**2)
+        beyond = np.pad(self.p - self.p[0], (0, 2 * reach), mode="edge")
+        rest = np.convolve(np.pad(beyond, (2 * reach, 0)), weight / weight.sum(), mode="valid")
+        u = self.u[0] + step * np.arange(-reach, self.u.size + reach)
+        p = rest + self.p[0] * ndtr((u - self.u[0]) / meaning.scatter)
+        return BlockCurve(u + math.log(meaning.ratio), p, self.lowest)
+
+    def between(self, top: float) -> BlockCurve:
+        """Return the part from P = `LEAST` to a level, or to where P is all but 1."""
+        if self.p[0] >= LEAST and self.u[-1] <= math.log(top):
+            return self
+        begins, ends = np.searchsorted(self.p, (LEAST, _SURE))
+        first = self.u[min(begins, self.u.size - 1)]
+        last = min(self.u[min(ends, self.u.size - 1)], math.log(top))
+        grid = first + (last - first) * _TOWARDS_THE_FIRST
+        return BlockCurve(grid, self.at(grid), self.lowest)
+
+    def at(self, u: FloatArray | float) -> FloatArray:
+        """Return P between the levels, where its logarithm is nearly straight."""
+        return np.asarray(np.exp(np.interp(u, self.u, np.log(np.maximum(self.p, _NOTHING)))))
+
+
 def block_functions(
     names: Sequence[str],
     numbers: Mapping[str, FloatArray],
@@ -62,14 +122,15 @@ def block_functions(
     *,
     one_class: bool = False,
     levels: int = 80,
+    component: str = "single",
     **answering: Unpack[AnsweringFields],
 ) -> BlockFunctions:
     """Return the fragility of each block over one measure.
 
     A fragility that is lognormal to 1e-9 is returned as such, every other
-    on a grid of levels with equal ratios between `SMALLEST` and one minus it, together with the
-    largest error of linear interpolation on that grid. One that rises again towards weak shaking
-    begins at its lowest.
+    on levels from where P reaches `LEAST`, or jumps above it, to credible shaking, such that the
+    error of chords between them is the least, relative to P or to `FLOOR`. One that rises again
+    towards weak shaking begins at its lowest.
 
     Args:
         numbers: what a model reads of them, by field, shape (m,) each; NaN of an option for the
@@ -77,25 +138,40 @@ def block_functions(
         measure: ``pgv_m_s``, ``pga_g`` or ``sa10_g``, which a model reads alone.
         kind: how they fail; None for what they are given by.
         one_class: the blocks stand for one class: one function, their mean, of one name.
+        levels: greatest number of levels of a function.
+        component: definition of the horizontal component, as :func:`rbfrag.hazard` has it.
         answering: model and db, as in :func:`rbfrag.predict`.
 
     Raises:
-        InputError: a block or a measure that no model can work with, or too few levels.
+        InputError: a block or a measure that no model can work with, one that credible shaking
+            does not fail, or too few levels.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    x, model = scanned_levels(), model_for(answering, (*numbers, measure), kind)
-    measured, parts = probabilities_over(x, numbers, measure, levels, model)
-    state = FAILED.get(mode_of_kind(model.row.kind), "failed")
-    rows: Iterator[FloatArray] = (row for part in parts for row in part)
-    if one_class:
-        size = next(iter(numbers.values())).size
-        rows = iter([sum(part.sum(axis=0) for part in parts) / size])
-    functions = [
-        _function(FragilityFunction(name, state, measured), x, row, levels)
-        for name, row in zip(names, rows, strict=True)
-    ]
-    begun = [each.no_damage_limit for each in functions if each.no_damage_limit is not None]
+    model, meaning = model_for(answering, (*numbers, measure), kind), component_named(component)
+    measured, curves = curves_of(numbers, measure, model, names, meaning.scatter)
+    begun: list[float] = []
+
+    def shown() -> Iterator[BlockCurve]:
+        for curve in curves:
+            begun.extend([] if curve.lowest is None else [curve.lowest])
+            yield curve.smoothed(meaning)
+
+    top, state = CREDIBLE[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
+    each = iter([_mean(shown(), top)]) if one_class else shown()
+    functions: list[FragilityFunction] = []
+    weak: list[str] = []
+    of = iter(names)
+    while some := list(islice(each, _CHUNK)):
+        named = list(zip(of, some, strict=False))
+        weak += [name for name, curve in named if curve.at(math.log(top)) < FLOOR]
+        if not weak:
+            functions += _functions(named, FragilityFunction("", state, measured), levels, top)
+    if weak:
+        raise InputError(
+            f"{len(weak)} of {len(names)} blocks, first {weak[0]!r}, have no fragility: P stays "
+            f"below {FLOOR:g} up to {measure} = {top:g}; leave them out"
+        )
     warnings = (
         (
             f"P of model {model.name} rises again below {measure} = {max(begun):.2g}, where it was "
@@ -112,64 +188,121 @@ def about_model(model: FragilityModel) -> tuple[str, str, str]:
     return model.name, model.term.name, model.row.method
 
 
-def scanned_levels() -> FloatArray:
-    """Return the levels [m/s or g] that fragilities are looked for on, of equal ratios."""
-    return np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
-
-
-def probabilities_over(
-    x: FloatArray,
+def curves_of(
     numbers: Mapping[str, FloatArray],
     measure: str,
-    levels: int,
     model: FragilityModel,
-) -> tuple[IntensityType, Iterator[FloatArray]]:
-    """Return the meaning of the levels, and probabilities at them, some blocks at a time."""
-    if levels < 10:
-        raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
-    if measure not in _TYPES:
-        raise InputError(f"measure = {measure!r}: use one of {', '.join(_TYPES)}")
+    names: Sequence[str],
+    scatter: float = 0.0,
+) -> tuple[IntensityType, Iterator[BlockCurve]]:
+    """Return what the levels measure, and the curve of each block over a single component.
+
+    Args:
+        scatter: standard deviation of ln of the shaking that is to be integrated: curves reach as
+            much farther to both sides.
+    """
+    if measure not in CREDIBLE:
+        raise InputError(f"measure = {measure!r}: use one of {', '.join(CREDIBLE)}")
     columns = model.method.block.filled(numbers)
 
-    def rows() -> Iterator[FloatArray]:
+    def curves() -> Iterator[BlockCurve]:
         for start in range(0, next(iter(columns.values())).size, _CHUNK):
             some = slice(start, start + _CHUNK)
             of_blocks = {name: column[some, None] for name, column in columns.items()}
-            yield array_answer(model, {**of_blocks, measure: x}, interval=False).probability
+            yield from _some_curves(of_blocks, measure, model, names[start:] or names, scatter)
 
-    return _TYPES[measure], rows()
+    return _TYPES[measure], curves()
 
 
-def _function(
-    empty: FragilityFunction, x: FloatArray, p: FloatArray, levels: int
-) -> FragilityFunction:
-    """Return a function with the probabilities p at the levels x."""
-    if np.isnan(p).any():
+def _some_curves(
+    blocks: Mapping[str, FloatArray],
+    measure: str,
+    model: FragilityModel,
+    names: Sequence[str],
+    scatter: float,
+) -> Iterator[BlockCurve]:
+    def probability(u: FloatArray) -> FloatArray:
+        return array_answer(model, {**blocks, measure: np.exp(u)}, interval=False).probability
+
+    least = LEAST if scatter == 0.0 else _UNSEEN
+    highest = math.log(CREDIBLE[measure]) + _REACH * scatter
+    u = np.linspace(math.log(_WEAKEST), highest, _SCANNED)
+    p = probability(u)
+    for row in np.flatnonzero(np.isnan(p).any(axis=1))[:1]:
         raise InputError(
-            f"block {empty.name!r} has no fragility: its numbers must be above zero and finite"
+            f"block {names[min(row, len(names) - 1)]!r} has no fragility: its numbers must be "
+            "above zero and finite"
         )
-    # A normal score straight in ln x is a lognormal function; near 1 scores have few digits.
-    middle = (p > 1e-9) & (p < 1.0 - 1e-5)
-    if middle.sum() > 2:
-        slope, intercept = np.polyfit(np.log(x[middle]), ndtri(p[middle]), 1)
-        if slope > 0.0 and np.abs(ndtr(intercept + slope * np.log(x)) - p).max() < _STRAIGHT:
-            return replace(empty, median=float(np.exp(-intercept / slope)), beta=float(1.0 / slope))
-    lowest = int(np.argmin(p))
-    begins = float(x[lowest]) if p[0] - p[lowest] > SMALLEST else None
-    if begins is not None:
-        x, p = x[lowest:], p[lowest:]
-    rising = np.maximum.accumulate(p)
-    inside = np.flatnonzero((rising > SMALLEST) & (rising < 1.0 - SMALLEST))
-    if inside.size < 2:
-        raise InputError(
-            f"block {empty.name!r}: the probability jumps from 0 to 1 between {x[0]:g} and "
-            f"{x[-1]:g}, which a fragility function cannot show"
-        )
-    low, high = max(inside[0] - 1, 0), min(inside[-1] + 1, x.size - 1)
-    grid = np.geomspace(x[low], x[high], levels)
-    on_grid = np.interp(grid, x, rising)
-    error = np.abs(np.interp(x[low : high + 1], grid, on_grid) - rising[low : high + 1]).max()
-    return replace(
-        empty, levels=grid, probability=np.clip(on_grid, 0.0, 1.0), no_damage_limit=begins,
-        grid_error=float(error),
-    )  # fmt: skip
+    safe = p < least
+    last = np.where(safe.any(axis=1), u.size - 1 - safe[:, ::-1].argmax(axis=1), p.argmin(axis=1))
+    low = u[np.minimum(last, u.size - 2), None]
+    high = low + (u[1] - u[0]) * safe.any(axis=1, keepdims=True)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = probability(middle) < least
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    sure = p > _SURE
+    end = np.where(sure.any(axis=1), u[sure.argmax(axis=1)], highest)[:, None]
+    end = np.maximum(end, high + _NARROWEST)
+    even = np.linspace(0.0, 1.0, _FINE)
+    grid = high + (end - high) * (even if scatter else _TOWARDS_THE_FIRST)
+    rising = np.maximum.accumulate(probability(grid), axis=1)
+    lowest = np.where(p[:, 0] - p.min(axis=1) > FLOOR, np.exp(high[:, 0]), np.nan)
+    for each, row, begins in zip(grid, rising, lowest.tolist(), strict=True):
+        yield BlockCurve(each, row, None if begins != begins else begins)
+
+
+def _mean(curves: Iterable[BlockCurve], top: float) -> BlockCurve:
+    """Return the mean of curves; of those that jump where they begin, the first keep their jump."""
+    grid = np.linspace(math.log(_WEAKEST), math.log(top), 16 * _SCANNED)
+    total, jumps = np.zeros(grid.size), []
+    for curve in curves:
+        total += curve.at(grid) - curve.p[0]
+        jumps.append((curve.u[0], curve.p[0]))
+    at, height = np.array(sorted(jumps)).T
+    sums = np.concatenate([[0.0], np.cumsum(height)])
+
+    def mean(u: FloatArray) -> FloatArray:
+        within = sums[np.searchsorted(at, u, side="right")]
+        return np.asarray((np.interp(u, grid, total) + within) / at.size)
+
+    ends = grid[np.minimum(np.searchsorted(mean(grid), (LEAST, _SURE)), grid.size - 1)]
+    shown = at[(height > FLOOR) & (at >= ends[0]) & (at <= ends[1])][:_BEGINNINGS]
+    u = np.unique(
+        np.concatenate([ends[0] + np.ptp(ends) * _TOWARDS_THE_FIRST, shown - JUMP, shown])
+    )
+    return BlockCurve(u, mean(u))
+
+
+def _functions(
+    named: Sequence[tuple[str, BlockCurve]], empty: FragilityFunction, levels: int, top: float
+) -> Iterator[FragilityFunction]:
+    """Yield the functions of some curves, up to the level `top`."""
+    straight = [_lognormal(curve, top) for _, curve in named]
+    curved = [c.between(top) for (_, c), line in zip(named, straight, strict=True) if line is None]
+    discrete: Iterator[tuple[FloatArray, FloatArray, float]] = iter(())
+    if curved:
+        u, p = (np.stack([getattr(curve, axis) for curve in curved]) for axis in ("u", "p"))
+        discrete = chords(np.exp(u), p[:, None], levels, FLOOR)
+    for (name, _), line in zip(named, straight, strict=True):
+        if line is None:
+            x, (probability,), error = next(discrete)
+            yield replace(empty, name=name, levels=x, probability=probability, grid_error=error)
+        else:
+            yield replace(empty, name=name, median=line[0], beta=line[1])
+
+
+def _lognormal(curve: BlockCurve, top: float) -> tuple[float, float] | None:
+    """Return median and standard deviation of ln of a lognormal function; None for any other.
+
+    Its normal score is straight in ln x; near 1 scores have few digits.
+    """
+    covered = (curve.p >= LEAST) & (curve.u <= math.log(top))
+    u, p = curve.u[covered], curve.p[covered]
+    middle = p < 1.0 - 1e-5
+    if middle.sum() < 3:
+        return None
+    slope, intercept = np.polyfit(u[middle], ndtri(p[middle]), 1)
+    if slope <= 0.0 or np.abs(ndtr(intercept + slope * u) - p).max() >= _STRAIGHT:
+        return None
+    return float(np.exp(-intercept / slope)), float(1.0 / slope)

@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import BlockFunctions, block_functions
 from rbfrag.exchange.block_rows import Blocks
+from rbfrag.exchange.fragility_function import renamed
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.nrml import nrml_text
-from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
+from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.frames import Tabular
+from rbfrag.hazards.conversions import Component, component
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
@@ -39,7 +41,9 @@ class ExportAnswer(Tabular):
         description: the file beside it that describes them; None where there is none.
         functions: number of functions.
         lognormal: how many of them are lognormal.
-        largest_grid_error: largest error of linear interpolation between their levels.
+        largest_relative_error: largest error of linear interpolation between their levels, as
+            a fraction of P.
+        component: what the measure's horizontal component means.
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
@@ -50,7 +54,8 @@ class ExportAnswer(Tabular):
     description: str | None
     functions: int
     lognormal: int
-    largest_grid_error: float
+    largest_relative_error: float
+    component: str
     model: str
     term: str
     method: str
@@ -70,6 +75,8 @@ class _Functions(TypedDict, total=False):
     one_class: bool
     name: str
     levels: int
+    component: str
+    shares: Sequence[float] | None
 
 
 class FunctionKeywords(BlockKeywords[V], AnsweringFields, _Functions, total=False):
@@ -79,7 +86,6 @@ class FunctionKeywords(BlockKeywords[V], AnsweringFields, _Functions, total=Fals
 def nrml(
     out: str | PathLike[str],
     *numbers: ArrayLike | None,
-    shares: Sequence[float] | None = None,
     **question: Unpack[FunctionKeywords[ArrayLike | None]],
 ) -> ExportAnswer:
     """Write an OpenQuake fragility model, NRML 0.5; PGV is in cm/s there.
@@ -92,14 +98,16 @@ def nrml(
     - ``imt``: measure of the functions: PGV (the default), PGA, or SA at 1 s.
     - ``one_class``: one function, the mean over the blocks.
     - ``name``: identifier of a single block, or of the class; ``block`` if not given.
-    - ``levels``: number of levels of a function that is not lognormal; 80 if not given.
+    - ``levels``: greatest number of levels of a function that is not lognormal; 80 if not given.
+    - ``component``: what the measure's horizontal component means: ``single`` (the default),
+      ``geometric_mean``, ``rotd50`` or ``larger``; P is integrated over its scatter.
+    - ``shares``: shares of the blocks [%]: a limit state each, that at least so many fail; one
+      function of each block if not given.
     - ``model``, ``db``: as in :func:`rbfrag.predict`.
 
     Args:
         out: file to write (.xml).
         numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.
-        shares: shares of the blocks [%]: a limit state each, that at least so many fail; None for
-            a function of each block.
         question: the keywords above.
 
     Raises:
@@ -110,22 +118,14 @@ def nrml(
     """
     target = output_path(out, (".xml",), "NRML file")
     request = _Request.of(numbers, question)
-    if shares is None:
-        result = request.functions()
-    elif request.facts.free_standing or {*TOPPLING_BLOCK.names} - {*request.numbers}:
-        raise InputError(
-            "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
-            "shares or the kind out"
-        )
-    else:
-        p2, kr = (request.numbers[name] for name in TOPPLING_BLOCK.names)
-        result = share_functions(
-            request.names[0], p2, kr, request.measure, list(shares), **request.how
-        )
+    result, renames = request.functions(_NOT_IN_NRML)
     model, term, method = result.about
-    text = f"{request.failing} rock blocks, model {model} ({method} on {term})"
+    text = (
+        f"{request.failing} rock blocks, model {model} ({method} on {term}), shaking of "
+        f"{request.component.title}"
+    )
     write_text(nrml_text(result.functions, description=text), target)
-    return _answer(str(target), None, result, request.remarks)
+    return request.answer(str(target), None, result, renames)
 
 
 def pelicun(
@@ -151,13 +151,19 @@ def pelicun(
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
     request = _Request.of(numbers, question)
-    result = request.functions()
-    functions, renamed = without_dashes(result.functions)
-    content = pelicun_text(functions)
-    write_text(metadata_text(functions, request.descriptions(), result.about), beside)
+    result, renames = request.functions(_NOT_IN_TABLES)
+    content = pelicun_text(result.functions)
+    description = metadata_text(
+        result.functions, request.descriptions(), result.about, request.component.title
+    )
+    write_text(description, beside)
     write_text(content, target)
-    return _answer(str(target), str(beside), result, (*request.remarks, *renamed))
+    return request.answer(str(target), str(beside), result, renames)
 
+
+_NOT_IN_NRML = "#'\"", "_", "the OpenQuake engine refuses in an ID"
+_NOT_IN_TABLES = "-", ".", "the loader splits an ID at"
+"""Characters that an ID cannot have, what stands for them, and why."""
 
 _FAILING = {
     "topple": "Toppling of", "slide": "Sliding of", "slump": "Slumping of",
@@ -174,6 +180,8 @@ class _Request(NamedTuple):
         names: identifiers of the functions.
         measure: what they run over, as `predict` calls it.
         one_class: whether one function stands for all.
+        shares: shares of them [%] that are limit states of all, or None.
+        component: what the measure's horizontal component means.
         how: number of levels, model and database.
         remarks: what is to be said of the blocks.
     """
@@ -183,6 +191,8 @@ class _Request(NamedTuple):
     names: list[str]
     measure: str
     one_class: bool
+    shares: Sequence[float] | None
+    component: Component
     how: dict[str, Any]
     remarks: tuple[str, ...]
 
@@ -198,14 +208,28 @@ class _Request(NamedTuple):
         names = [str(each) for each in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):
             names = [request.get("name", "block")]
-        how = {"levels": request.get("levels", 80), **answering}
+        meaning = component(request.get("component", "single"))
+        how = {"levels": request.get("levels", 80), "component": meaning.name, **answering}
         remarks = (*rows.remarks, *medians)
-        return cls(facts_of(kind), read, names, measure, one_class, how, remarks)
+        shares = request.get("shares")
+        return cls(facts_of(kind), read, names, measure, one_class, shares, meaning, how, remarks)
 
-    def functions(self) -> BlockFunctions:
-        """Return the function of each block, or their mean."""
-        of = self.names, self.numbers, self.measure, self.facts.kind
-        return block_functions(*of, one_class=self.one_class, **self.how)
+    def functions(self, refused: tuple[str, str, str]) -> tuple[BlockFunctions, list[str]]:
+        """Return the function of each block, their mean or their shares, and names that changed."""
+        if self.shares is None:
+            of = self.names, self.numbers, self.measure, self.facts.kind
+            result = block_functions(*of, one_class=self.one_class, **self.how)
+        elif self.facts.free_standing or {*TOPPLING_BLOCK.names} - {*self.numbers}:
+            raise InputError(
+                "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
+                "shares or the kind out"
+            )
+        else:
+            p2, kr = (self.numbers[name] for name in TOPPLING_BLOCK.names)
+            of_all = self.names[0], p2, kr, self.measure, list(self.shares)
+            result = share_functions(*of_all, **self.how)
+        functions, renames = renamed(result.functions, *refused)
+        return result._replace(functions=functions), renames
 
     @property
     def failing(self) -> str:
@@ -217,11 +241,12 @@ class _Request(NamedTuple):
     def descriptions(self) -> list[str]:
         """Return a sentence on each block, or on all of a class."""
         free, topples = self.facts.free_standing, self.facts.mode == "topple"
-        if self.one_class:
+        if self.one_class or self.shares is not None:
             size = next(iter(self.numbers.values())).size
             backed = "toppling blocks of a rock mass, backed by a slope"
             mean = "free-standing blocks" if free else backed if topples else "blocks of a slope"
-            return [f"Mean over {size} stable {mean}."]
+            of = "Mean over" if self.shares is None else "Shares of"
+            return [f"{of} {size} stable {mean}."]
         stands = "that stands free" if free else "backed by a slope" if topples else "on a slope"
         rows = zip(*(values.tolist() for values in self.numbers.values()), strict=True)
         return [
@@ -230,14 +255,16 @@ class _Request(NamedTuple):
             for known in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
         ]
 
-
-def _answer(
-    file: str, description: str | None, result: BlockFunctions, warnings: Sequence[str]
-) -> ExportAnswer:
-    errors = [each.grid_error for each in result.functions if each.grid_error is not None]
-    lognormal = sum(each.is_lognormal for each in result.functions)
-    return ExportAnswer(
-        file, description, len(result.functions), lognormal, max(errors, default=0.0),
-        *result.about,
-        warnings=(*warnings, *result.warnings),
-    )  # fmt: skip
+    def answer(
+        self, file: str, description: str | None, result: BlockFunctions, renames: list[str]
+    ) -> ExportAnswer:
+        """Return the answer on what was written."""
+        functions = result.functions
+        errors = [each.grid_error for each in functions if each.grid_error is not None]
+        lognormal = sum(each.is_lognormal for each in functions)
+        meant = [] if self.component.scatter == 0.0 else [self.component.in_words("shaking is")]
+        return ExportAnswer(
+            file, description, len(functions), lognormal, max(errors, default=0.0),
+            self.component.name, *result.about,
+            warnings=(*self.remarks, *renames, *meant, *result.warnings),
+        )  # fmt: skip

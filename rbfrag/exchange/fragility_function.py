@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.solver.results import FloatArray
+
+JUMP = 1e-5
+"""Ratio, less 1, of the two levels that a jump of P stands between: all that six digits tell."""
+
+_ROUNDS, _TRIED = 4, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +35,8 @@ class FragilityFunction:
         levels: levels of a discrete function, rising, shape (n,), or None.
         probability: probabilities at them, never falling, shape (n,), or None.
         no_damage_limit: level below which the probability is zero, or None.
-        grid_error: largest error of linear interpolation between the levels, if known.
+        grid_error: largest error of linear interpolation between the levels, relative to P, if
+            known.
     """
 
     name: str
@@ -105,3 +113,93 @@ def lognormal_function(
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{where}: the {what} is {value:g}: it must be above zero")
     return FragilityFunction(name, limit_state, kind, median, beta, no_damage_limit=no_damage_limit)
+
+
+def chords(
+    x: FloatArray, p: FloatArray, levels: int, floor: float
+) -> Iterator[tuple[FloatArray, FloatArray, float]]:
+    """Yield levels of discrete functions, probabilities at them, and their largest relative error.
+
+    Each chord is the longest whose error stays within ε max(P, floor); the least ε for which the
+    levels suffice is sought. P is 0 below the first level, which a pair of levels shows.
+
+    Args:
+        x: levels, rising, of m assets, shape (m, n).
+        p: probabilities at them of s limit states, never falling, shape (m, s, n).
+        levels: greatest number of levels.
+        floor: the least P to which errors are relative.
+    """
+    if levels < 10:
+        raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
+    every = np.arange(len(x))
+    low, high = np.full(len(x), 1e-7), np.full(len(x), 1.0 / floor)
+    for _ in range(_ROUNDS):
+        error = np.geomspace(low, high, _TRIED, axis=1)
+        kept = _longest(x, p, error, floor)
+        # with the last level and the one where P is still 0
+        enough = np.argmax(kept.sum(axis=0) + 2 <= levels, axis=1)
+        low, high = error[every, np.maximum(enough - 1, 0)], error[every, enough]
+    for i in every:
+        at = np.append(np.flatnonzero(kept[:, i, enough[i]]), x.shape[1] - 1)
+        shown = np.concatenate([x[i, :1] * (1.0 - JUMP), x[i, at]])
+        yield shown, np.pad(p[i][:, at], ((0, 0), (1, 0))), float(high[i])
+
+
+def _longest(x: FloatArray, p: FloatArray, error: FloatArray, floor: float) -> NDArray[np.bool_]:
+    """Return which levels begin a chord, shape (n - 1, m, e), for errors of shape (m, e)."""
+    kept = np.zeros((x.shape[1] - 1, *error.shape), dtype=bool)
+    kept[0] = True
+    steepest = np.full(p.shape[:2] + error.shape[1:], np.inf)
+    gentlest = -steepest
+    x0, p0 = x[:, 0, None], p[:, :, 0, None]
+    for k in range(1, x.shape[1]):
+        at, value = x[:, k, None], p[:, :, k, None]
+        slope = (value - p0) / (at - x0)[:, None]
+        ends = ((slope > steepest) | (slope < gentlest)).any(axis=1)
+        kept[k - 1] |= ends
+        x0, off = np.where(ends, x[:, k - 1, None], x0), np.expand_dims(ends, 1)
+        p0 = np.where(off, p[:, :, k - 1, None], p0)
+        run = (at - x0)[:, None]
+        slope, play = (value - p0) / run, error[:, None] * np.maximum(value, floor) / run
+        steepest = np.minimum(np.where(off, np.inf, steepest), slope + play)
+        gentlest = np.maximum(np.where(off, -np.inf, gentlest), slope - play)
+    return kept
+
+
+def renamed(
+    functions: Sequence[FragilityFunction], refused: str, by: str, why: str
+) -> tuple[list[FragilityFunction], list[str]]:
+    """Return the functions with other characters in their names, and a warning where it is so.
+
+    Args:
+        refused: characters that a name cannot have.
+        by: what stands for each of them.
+        why: what is wrong with them.
+    """
+    to = str.maketrans(dict.fromkeys(refused, by))
+    named = [replace(each, name=each.name.strip().translate(to)) for each in functions]
+    before = list(dict.fromkeys(each.name for each in functions))
+    changed = [name for name in before if name.strip() != name.strip().translate(to)]
+    if not changed:
+        return named, []
+    return named, [
+        f"{len(changed)} of {len(before)} IDs have {by!r} for what {why}: {changed[0]!r} is "
+        f"written as {changed[0].strip().translate(to)!r}; name it so in the exposure"
+    ]
+
+
+def assets_of(functions: Sequence[FragilityFunction]) -> dict[str, list[FragilityFunction]]:
+    """Return the functions of each asset, which stand one after the other; refuse what is amiss."""
+    if not functions:
+        raise InputError("there is no fragility function to write")
+    assets: dict[str, list[FragilityFunction]] = {}
+    for name, group in groupby(functions, key=lambda each: each.name):
+        limit_states = list(group)
+        if name in assets or len({each.limit_state for each in limit_states}) < len(limit_states):
+            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
+        assets[name] = limit_states
+    first, states = functions[0].name, [each.limit_state for each in assets[functions[0].name]]
+    for name, limit_states in assets.items():
+        if [each.limit_state for each in limit_states] != states:
+            raise InputError(f"block {name!r} has other limit states than {first!r}")
+    return assets

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from itertools import groupby
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
+    assets_of,
     discrete_function,
     lognormal_function,
 )
@@ -146,17 +146,8 @@ def nrml_text(functions: Sequence[FragilityFunction], *, description: str = "") 
         functions: the functions; those of one asset one after the other, the same limit states
             for every asset.
     """
-    if not functions:
-        raise InputError("there is no fragility function to write")
-    assets = [(name, list(group)) for name, group in groupby(functions, key=lambda f: f.name)]
-    names = [name for name, _ in assets]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"asset {twice[0]!r} is there twice: give every block its own block_id")
-    states = [function.limit_state for function in assets[0][1]]
-    for name, group in assets:
-        if [function.limit_state for function in group] != states:
-            raise InputError(f"asset {name!r} has other limit states than {assets[0][0]!r}")
+    assets = assets_of(functions)
+    states = [function.limit_state for function in functions[: len(next(iter(assets.values())))]]
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<nrml xmlns="http://openquake.org/xmlns/nrml/0.5">',
@@ -164,7 +155,7 @@ def nrml_text(functions: Sequence[FragilityFunction], *, description: str = "") 
         f"<description>{escape(description)}</description>",
         f"<limitStates>{escape(' '.join(states))}</limitStates>",
     ]
-    for name, group in assets:
+    for name, group in assets.items():
         lines += _asset(name, group)
     lines += ["</fragilityModel>", "</nrml>", ""]
     return "\n".join(lines)

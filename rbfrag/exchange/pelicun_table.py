@@ -8,7 +8,6 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
+    assets_of,
     discrete_function,
     lognormal_function,
 )
@@ -24,15 +24,12 @@ from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.version import __version__
 
-_DEMANDS = {"pga_g": ("Peak Ground Acceleration", "g"), "pgv_m_s": ("Peak Ground Velocity", "mps")}
-
 _UNITS = {
-    ("Peak Ground Acceleration", "g"): IntensityType("pga_g", 1.0),
-    ("Peak Ground Acceleration", "mps2"): IntensityType("pga_g", 1.0 / STANDARD_GRAVITY_M_S2),
-    ("Peak Ground Velocity", "mps"): IntensityType("pgv_m_s", 1.0),
-    ("Peak Ground Velocity", "cmps"): IntensityType("pgv_m_s", 0.01),
-    ("Peak Ground Velocity", "inps"): IntensityType("pgv_m_s", 0.0254),
+    "Peak Ground Acceleration": ("pga_g", {"g": 1.0, "mps2": 1.0 / STANDARD_GRAVITY_M_S2}),
+    "Peak Ground Velocity": ("pgv_m_s", {"mps": 1.0, "cmps": 0.01, "inps": 0.0254}),
+    "Spectral Acceleration": ("sa_g", {"g": 1.0, "mps2": 1.0 / STANDARD_GRAVITY_M_S2}),
 }
+"""The measure of a demand, and its units; a period follows the name of the last, behind a bar."""
 
 _HEAD = ("ID", "Incomplete", "Demand-Type", "Demand-Unit", "Demand-Offset", "Demand-Directional")
 _APART = 1.5e-8
@@ -40,57 +37,50 @@ _LIMIT = ("Family", "Theta_0", "Theta_1", "DamageStateWeights")
 
 
 def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
-    """Return the table as CSV: PGA in g, PGV in mps, one limit state a function.
+    """Return the table as CSV: PGA and SA in g, PGV in mps, a row for each asset.
 
     A lognormal function keeps median and standard deviation of the logarithm; any other is a
     ``multilinear_CDF`` through its levels, completed to run from 0 to 1 and rounded to the six
     digits that pelicun keeps.
+
+    Args:
+        functions: the functions; those of one asset one after the other, each a limit state.
     """
-    if not functions:
-        raise InputError("there is no fragility function to write")
-    _check_names([function.name for function in functions])
+    assets = assets_of(functions)
+    states = range(1, 1 + max(len(group) for group in assets.values()))
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
-    table.writerow([*_HEAD, *(f"LS1-{name}" for name in _LIMIT)])
-    for function in functions:
-        if function.kind.measure not in _DEMANDS:
+    table.writerow([*_HEAD, *(f"LS{state}-{name}" for state in states for name in _LIMIT)])
+    for name, group in assets.items():
+        if not name.strip() or "-" in name or name.startswith("_") or name == "References":
             raise InputError(
-                f"{function.name}: pelicun has no demand for {function.kind.imt}: export PGV or PGA"
+                f"block {name!r}: an ID of a fragility table has no dash, does not begin with _ "
+                "and is neither empty nor References: give the block another block_id"
             )
-        demand, unit = _DEMANDS[function.kind.measure]
-        # offset 0, not directional: as the rows of PGV in SimCenter's library are
-        row: list[object] = [function.name, 0, demand, unit, 0, 0]
-        if function.is_lognormal:
-            row += ["lognormal", _text(function.median), _text(function.beta), ""]
-        else:
-            levels, probability = _whole(function)
-            theta = f"{_list(levels)}|{_list(probability)}"
-            row += ["multilinear_CDF", theta, "", ""]
+        kind = group[0].kind
+        demand, (unit, *_) = next(
+            (demand, units)
+            for demand, (measure, units) in _UNITS.items()
+            if measure == kind.measure
+        )
+        demand += "" if kind.period_s is None else f"|{kind.period_s}"
+        # directional: the demand is taken as it is given, where pelicun would multiply it by 1.2
+        row: list[object] = [name, 0, demand, unit, 0, 1]
+        for function in group:
+            if function.is_lognormal:
+                row += ["lognormal", _text(function.median), _text(function.beta), ""]
+            else:
+                levels, probability = _whole(function)
+                row += ["multilinear_CDF", f"{_list(levels)}|{_list(probability)}", "", ""]
         table.writerow(row)
     return out.getvalue()
-
-
-def without_dashes(
-    functions: Sequence[FragilityFunction],
-) -> tuple[list[FragilityFunction], list[str]]:
-    """Return the functions with dots for dashes in their names, and a warning where there are any.
-
-    Loaders of these tables split an ID at its dashes into the levels of an index.
-    """
-    dashed = [function.name for function in functions if "-" in function.name]
-    named = [replace(function, name=function.name.replace("-", ".")) for function in functions]
-    if not dashed:
-        return named, []
-    return named, [
-        f"{len(dashed)} of {len(functions)} IDs have dots for dashes, at which the loader splits "
-        f"an ID: {dashed[0]!r} is written as {dashed[0].replace('-', '.')!r}"
-    ]
 
 
 def metadata_text(
     functions: Sequence[FragilityFunction],
     descriptions: Sequence[str],
     about: tuple[str, ...],
+    shaking: str,
 ) -> str:
     """Return what goes beside the table as ``fragility.json``, as simcenter-dlml 3 has it."""
     model, term, method = about
@@ -98,8 +88,8 @@ def metadata_text(
         "_GeneralInformation": {
             "ShortName": "Rock blocks in earthquakes",
             "Description": "Probability that rock blocks which rest on a slope fail in an "
-            "earthquake. Peak ground velocity and acceleration are those of one horizontal "
-            "component of any direction: run pelicun with NonDirectionalMultipliers ALL = 1.0.",
+            f"earthquake. The demand is that of {shaking}, and is taken as it is given in the "
+            "direction of the component (Demand-Directional = 1).",
             "Version": __version__,
             "ComponentGroups": ["Rock blocks"],
         },
@@ -108,34 +98,25 @@ def metadata_text(
             f"{__version__}. Software.",
         },
     }
-    for function, description in zip(functions, descriptions, strict=True):
-        document[function.name] = {
+    assets = assets_of(functions)
+    for (name, group), description in zip(assets.items(), descriptions, strict=True):
+        states = {
+            f"LS{i}": {f"DS{i}": {"Description": f"What has failed: {function.limit_state}."}}
+            for i, function in enumerate(group, start=1)
+        }
+        document[name] = {
             "Description": description,
             "Comments": f"Model {model}: method {method}, intensity term {term}.",
             "SuggestedComponentBlockSize": "1 EA",
             "RoundUpToIntegerQuantity": "True",
             "Reference": ["rbfrag"],
-            "LimitStates": {
-                "LS1": {"DS1": {"Description": f"The block has failed ({function.limit_state})."}}
-            },
+            "LimitStates": states,
         }
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def _check_names(names: list[str]) -> None:
-    """Refuse IDs that a table of the library cannot have."""
-    for name in names:
-        if not name.strip() or "-" in name or name.startswith("_") or name == "References":
-            raise InputError(
-                f"block {name!r}: an ID of a fragility table has no dash, does not begin with _ "
-                "and is neither empty nor References: give the block another block_id"
-            )
-        if names.count(name) > 1:
-            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
-
-
 def read_pelicun(path: str | os.PathLike[str]) -> list[FragilityFunction]:
-    """Return the functions of peak ground acceleration and velocity of a table.
+    """Return the functions of PGA, PGV and SA of a table.
 
     Rows of other demands (floor acceleration, drift …) are passed over, and those that are marked
     incomplete or hold no parameters.
@@ -162,20 +143,28 @@ def read_pelicun(path: str | os.PathLike[str]) -> list[FragilityFunction]:
             for name in header
             if name.endswith("-Family") and row[name]
         ]
-        kind = _UNITS.get((row["Demand-Type"], row["Demand-Unit"]))
         if row.get("Incomplete", "0") not in ("", "0") or not states:
             continue
-        of_ground = row["Demand-Type"] in ("Peak Ground Acceleration", "Peak Ground Velocity")
-        if of_ground and kind is None:
-            raise InputError(
-                f"{path}, line {line}: {row['Demand-Type']} in {row['Demand-Unit']!r} is not "
-                "known: g, mps2; mps, cmps, inps"
-            )
+        kind = _kind(row["Demand-Type"], row["Demand-Unit"], f"{path}, line {line}")
         if kind is not None:
             functions += [
                 _function(row, state, kind, f"{path}, line {line}, {state}") for state in states
             ]
     return functions
+
+
+def _kind(demand: str, unit: str, where: str) -> IntensityType | None:
+    """Return what a demand measures; None for what is no measure of the ground."""
+    name, _, period = (
+        demand.removeprefix("Peak ").partition("|") if "Spectral" in demand else (demand, "", "")
+    )
+    if name not in _UNITS:
+        return None
+    measure, units = _UNITS[name]
+    if unit not in units:
+        raise InputError(f"{where}: {demand} in {unit!r} is not known: {', '.join(units)}")
+    period_s = _number(period, where) if measure == "sa_g" else None
+    return IntensityType(measure, units[unit], period_s)
 
 
 def _function(
@@ -213,10 +202,13 @@ def _whole(function: FragilityFunction) -> tuple[list[float], list[float]]:
     assert function.probability is not None
     x: NDArray[np.float64] = function.levels
     p: NDArray[np.float64] = function.probability
+    begins = int(np.searchsorted(p, _APART)) - 1  # chords from the last level that is safe
+    x, p = (x[begins:], p[begins:]) if begins > 0 else (x, p)
     if p[0] > 0.0:
         x, p = np.concatenate([[0.0], x]), np.concatenate([[0.0], p])
     if p[-1] < 1.0:
-        last = (1.0 - p[-1]) / max((p[-1] - p[-2]) / (x[-1] - x[-2]), 1e-3)
+        slope = (p[-1] - p[-2]) / (x[-1] - x[-2]) if p.size > 1 else 0.0
+        last = (1.0 - p[-1]) / max(slope, 1e-3)
         x, p = np.append(x, x[-1] + min(last, x[-1])), np.append(p, 1.0)
     # pelicun keeps six digits and refuses neighbours that are then equal
     x, p = _rounded(x), _rounded(p)

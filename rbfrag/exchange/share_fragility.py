@@ -12,14 +12,16 @@ from scipy.special import ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import (
+    CREDIBLE,
+    BlockCurve,
     BlockFunctions,
     about_model,
-    probabilities_over,
-    scanned_levels,
+    curves_of,
 )
-from rbfrag.exchange.fragility_function import discrete_function
+from rbfrag.exchange.fragility_function import FragilityFunction, chords
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
+from rbfrag.hazards.conversions import component as component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.results import FloatArray
@@ -28,8 +30,9 @@ DRAWS = 20_000
 """Draws of what the blocks share: probabilities have a standard error of at most 0.0035."""
 
 _VALUES_AT_ONCE = 2**22
-_FARTHEST = 38.0
-_EVERY = 4  # levels: between them a score is straight in ln x
+_FINE = 1001
+_FLOOR = 0.01
+"""The least P to which errors of chords are relative: below it draws tell little."""
 
 
 def share_functions(
@@ -40,6 +43,7 @@ def share_functions(
     shares: Sequence[float],
     *,
     levels: int = 80,
+    component: str = "single",
     **answering: Unpack[AnsweringFields],
 ) -> BlockFunctions:
     """Return the probabilities that at least some shares of a rock mass's blocks fail.
@@ -73,10 +77,10 @@ def share_functions(
             "many of a rock mass fail together is not known: fit it on more earthquakes, or name "
             "another model"
         )
-    x = scanned_levels()[::_EVERY]
     numbers = {"p2": p2, "kr": kr}
-    kind, parts = probabilities_over(x, numbers, measure, levels, chosen)
-    scores = np.concatenate([_scores(part) for part in parts])
+    meaning = component_named(component)
+    kind, curves = curves_of(numbers, measure, chosen, [name], meaning.scatter)
+    curve_of_each = [(ndtri(curve.p), curve.u) for curve in curves]
     blocks = Placement.of_numbers(chosen.method.block, numbers)
     assert blocks is not None
     sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(0)
@@ -85,19 +89,34 @@ def share_functions(
     at_once = max(1, _VALUES_AT_ONCE // p2.size)
     for start in range(0, DRAWS, at_once):
         z = sampler.normals(min(at_once, DRAWS - start), generator)
-        own = np.stack([_level_of(z[:, i], scores[i], np.log(x)) for i in range(p2.size)], axis=1)
+        own = np.stack(
+            [np.interp(z[:, i], *each, right=np.inf) for i, each in enumerate(curve_of_each)],
+            axis=1,
+        )
         own.partition([count - 1 for count in counts], axis=1)
         reached[:, start : start + at_once] = own[:, [count - 1 for count in counts]].T
     ends = reached[np.isfinite(reached)]
-    if ends.size == 0 or np.ptp(ends) == 0.0:
-        raise InputError(f"{name}: no share of its blocks fails at any level of {measure}")
-    grid = np.geomspace(np.exp(ends.min()), np.exp(ends.max()), levels)
-    grid[[0, -1]] *= 1.0 - 1e-9, 1.0 + 1e-9
-    functions = []
-    for share, row in zip(shares, np.sort(reached, axis=1), strict=True):
-        probability = np.searchsorted(row, np.log(grid), side="right") / DRAWS
-        state = f"failed_{share:g}_percent"
-        functions.append(discrete_function(name, state, kind, grid, probability, name))
+    top = math.log(CREDIBLE[measure])
+    if ends.size == 0 or ends.min() >= top:
+        raise InputError(
+            f"{name}: no share of its blocks fails up to {measure} = {math.exp(top):g}"
+        )
+    u = np.linspace(ends.min() - 1e-9, ends.max() + 1e-9, _FINE)
+    ordered = np.sort(reached, axis=1)
+    of_shares = [
+        BlockCurve(u, np.searchsorted(row, u, side="right") / DRAWS).smoothed(meaning)
+        for row in ordered
+    ]
+    covered = of_shares[0].u
+    covered = covered[(covered <= top) & (of_shares[0].p >= 0.5 / DRAWS)]
+    p = np.array([np.interp(covered, *each[:2]) for each in of_shares])
+    ((x, rows, error),) = chords(np.exp(covered)[None], p[None], levels, _FLOOR)
+    functions = [
+        FragilityFunction(
+            name, f"failed_{share:g}_percent", kind, levels=x, probability=row, grid_error=error
+        )
+        for share, row in zip(shares, rows, strict=True)
+    ]
     warnings = [
         f"all {p2.size} blocks are taken to stand at one site and to face one way; probabilities "
         f"are frequencies of {DRAWS} draws, with a standard error of at most 0.0035"
@@ -109,16 +128,3 @@ def share_functions(
             "give the rock mass more realisations"
         )
     return BlockFunctions(functions, about_model(chosen), tuple(warnings))
-
-
-def _scores(probability: FloatArray) -> FloatArray:
-    """Return Φ⁻¹ of P of some blocks over rising levels, which never falls."""
-    rising = np.maximum.accumulate(probability, axis=-1)
-    return np.asarray(np.clip(ndtri(rising), -_FARTHEST, _FARTHEST))
-
-
-def _level_of(z: FloatArray, score: FloatArray, ln_x: FloatArray) -> FloatArray:
-    """Return ln of the level at which a block's score reaches Z; infinite beyond the last."""
-    first = int(np.searchsorted(score, score[0], side="right")) - 1
-    part = slice(max(first, 0), None)
-    return np.asarray(np.where(z > score[-1], np.inf, np.interp(z, score[part], ln_x[part])))

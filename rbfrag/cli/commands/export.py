@@ -32,7 +32,16 @@ class FunctionOptions(BlocksOptions):
 
     name: str = option("Identifier of the one block or of the rock mass.", "block")
     imt: str = option("Measure of the function: PGV, PGA, or SA at 1 s.", "PGV")
-    levels: int = option("Number of levels of a function that is not lognormal.", 80)
+    levels: int = option("Greatest number of levels of a function that is not lognormal.", 80)
+    component: str = option(
+        "What the measure's horizontal component means: single, geometric_mean, rotd50 or larger.",
+        "single",
+    )
+    shares: str | None = option(
+        "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
+        "Example: 1,10,50.",
+        metavar="LIST",
+    )
 
     def keywords(self, given: Given, answering: Given) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
@@ -41,7 +50,9 @@ class FunctionOptions(BlocksOptions):
         keywords = {
             **({"blocks": several.question} if of_many else several.numbers),
             "one_class": several.is_class, "imt": self.imt, "name": self.name,
-            "levels": self.levels, "kind": str(several.columns["kind"][0]), **answering,
+            "levels": self.levels, "component": self.component,
+            "shares": None if self.shares is None else options.number_list(self.shares, "--shares"),
+            "kind": str(several.columns["kind"][0]), **answering,
         }  # fmt: skip
         return keywords, several.remarks
 
@@ -53,19 +64,13 @@ def nrml(
     given: options.Block,
     blocks: FunctionOptions,
     answering: Answering,
-    shares: str | None = option(
-        "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
-        "Example: 1,10,50.",
-        metavar="LIST",
-    ),
     json: options.Json = False,
 ) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.export import nrml as written
 
     keywords, remarks = blocks.keywords(given, answering)
-    wanted = None if shares is None else options.number_list(shares, "--shares")
-    _print(written(out, **keywords, shares=wanted), remarks, json=json)
+    _print(written(out, **keywords), remarks, json=json)
 
 
 @app.command(

@@ -1,0 +1,174 @@
+"""Levels of exported functions: what other tools read off them is what `predict` answers."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import rbfrag
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import read_models
+from rbfrag.errors import InputError
+from rbfrag.exchange.block_fragility import CREDIBLE, FLOOR, block_functions
+from rbfrag.exchange.fragility_function import FragilityFunction, chords, renamed
+from rbfrag.fragility.measures import ALONE, TERMS
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.hazards.conversions import COMPONENTS, Component
+from tests.fragility.conftest import model_row
+
+ALLOWED = 0.01
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(300)
+RANDOM = np.random.default_rng(8)
+NUMBERS: dict[str, Any] = {
+    "p2": 10.0 ** RANDOM.uniform(-0.5, 1.3, 40),
+    "kr": 10.0 ** RANDOM.uniform(-1.5, -0.5, 40),
+    "ky": 10.0 ** RANDOM.uniform(-1.5, -0.5, 40),
+    "beta_deg": RANDOM.uniform(0.0, 30.0, 40),
+    "displacement_m": 10.0 ** RANDOM.uniform(-2.0, 0.0, 40),
+}
+"""Blocks as any model of one measure reads them, but such as credible shaking fails."""
+EXPORTED = [
+    (row, TERMS[row.term].inputs[0])
+    for row in read_models(REFERENCE)
+    if len(TERMS[row.term].inputs) == 1 and TERMS[row.term].inputs[0] in ALONE
+]
+
+
+def numbers_of(model: FragilityModel) -> dict[str, Any]:
+    return {name: NUMBERS[name] for name in model.method.block.names if name in NUMBERS}
+
+
+def functions_of(model: FragilityModel, measure: str, **how: Any) -> list[FragilityFunction]:
+    names = [f"b{i}" for i in range(40)]
+    numbers = numbers_of(model)
+    return block_functions(names, numbers, measure, model.row.kind, model=model, **how).functions
+
+
+def probability(model: FragilityModel, i: int, measure: str, x: Any) -> Any:
+    block = {name: values[i] for name, values in numbers_of(model).items()}
+    return rbfrag.predict(
+        **block, kind=model.row.kind, model=model, interval=False, **{measure: x}
+    ).probability
+
+
+def relative_error(function: FragilityFunction, x: Any, p: Any) -> float:
+    seen = p > FLOOR
+    return float(np.abs(function.at(x[seen]) / p[seen] - 1.0).max())
+
+
+@pytest.mark.parametrize(("row", "measure"), EXPORTED, ids=[row.name for row, _ in EXPORTED])
+def test_chords_of_every_model_stay_within_one_percent(row: Any, measure: str) -> None:
+    model = FragilityModel.from_row(row)
+    for i, function in enumerate(functions_of(model, measure)):
+        assert function.levels is not None
+        assert function.levels.size <= 80
+        x = np.geomspace(function.levels[1], min(function.levels[-1], CREDIBLE[measure]), 3000)
+        error = relative_error(function, x, probability(model, i, measure, x))
+        assert error < ALLOWED
+        assert function.grid_error is not None
+        assert error < 1.2 * function.grid_error + 2e-4  # what is told of them
+
+
+@pytest.mark.parametrize(("row", "measure"), EXPORTED, ids=[row.name for row, _ in EXPORTED])
+@pytest.mark.parametrize("meaning", [COMPONENTS["rotd50"], COMPONENTS["larger"]])
+def test_so_do_those_of_another_component(row: Any, measure: str, meaning: Component) -> None:
+    model = FragilityModel.from_row(row)
+    for i, function in enumerate(functions_of(model, measure, component=meaning.name)[:10]):
+        assert function.levels is not None
+        x = np.geomspace(function.levels[1], function.levels[-1], 40)[:-1]
+        # Gauss's points on both sides of where PGA lifts the block
+        lifts = np.log(NUMBERS["kr"][i] * meaning.ratio / x) / meaning.scatter
+        ends = [np.full(x.size, -8.0), np.clip(lifts, -8.0, 8.0), np.full(x.size, 8.0)]
+        smoothed = np.zeros(x.size)
+        for low, high in pairwise(ends):
+            half = 0.5 * (high - low)[:, None]
+            xi = low[:, None] + half * (1.0 + NODES)
+            p = probability(
+                model, i, measure, x[:, None] / meaning.ratio * np.exp(meaning.scatter * xi)
+            )
+            smoothed += (half * WEIGHTS * norm.pdf(xi) * p).sum(axis=1)
+        assert relative_error(function, x, smoothed) < ALLOWED
+
+
+@pytest.mark.parametrize("meaning", COMPONENTS.values(), ids=list(COMPONENTS))
+def test_a_lognormal_function_stays_one(meaning: Component) -> None:
+    row = model_row(
+        "pgv", name="lognormal-pgv", method="lognormal",
+        coefficients={"ln_median": -0.41, "slope": 0.95, "ln_sigma": -1.25},
+        covariance=tuple(tuple(1e-3 * (i == j) for j in range(3)) for i in range(3)),
+    )  # fmt: skip
+    model = FragilityModel.from_row(row)
+    single, other = (
+        functions_of(model, "pgv_m_s", component=name)[0] for name in ("single", meaning.name)
+    )
+    assert single.median is not None
+    assert single.beta is not None
+    assert other.median == pytest.approx(single.median * meaning.ratio, rel=1e-6)
+    assert other.beta == pytest.approx(np.hypot(single.beta, meaning.scatter), rel=1e-6)
+
+
+def pga_model() -> FragilityModel:
+    return next(FragilityModel.from_row(row) for row, measure in EXPORTED if measure == "pga_g")
+
+
+def test_a_pair_of_levels_shows_where_the_ground_begins_to_lift() -> None:
+    # flat in k_r/PGA: P is far from 0 as soon as PGA exceeds k_r
+    p2, kr = np.array([60.0]), np.array([0.3])
+    model = pga_model()
+    (function,) = block_functions(["b"], {"p2": p2, "kr": kr}, "pga_g", model=model).functions
+    assert function.levels is not None
+    assert function.probability is not None
+    assert function.levels[:2] == pytest.approx([0.3 * (1.0 - 1e-5), 0.3], rel=1e-9)
+    jump = rbfrag.predict(60.0, 0.3, pga_g=0.3 * (1.0 + 1e-9), model=model).probability
+    assert jump > 3.0 * FLOOR
+    assert function.probability[:2] == pytest.approx([0.0, jump], rel=1e-5)
+    assert function.at([0.1, 0.299]).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("component", ["single", "rotd50"])
+def test_the_mean_of_blocks_has_the_jump_of_each(component: str) -> None:
+    model, few = pga_model(), slice(0, 5)
+    numbers = {"p2": np.full(5, 50.0), "kr": np.linspace(0.1, 0.3, 5)}
+    each = block_functions(
+        list("abcde"), numbers, "pga_g", model=model, component=component, levels=400
+    ).functions
+    (mean,) = block_functions(
+        ["class"], numbers, "pga_g", model=model, component=component, one_class=True
+    ).functions
+    assert mean.levels is not None
+    x = np.geomspace(mean.levels[1], 5.0, 2000)
+    near = np.abs(x[:, None] / numbers["kr"][few] - 1.0).min(axis=1) < 1e-4
+    p = np.mean([function.at(x) for function in each], axis=0)
+    assert relative_error(mean, x[~near], p[~near]) < ALLOWED
+
+
+def test_the_fewest_chords_of_a_parabola() -> None:
+    # a chord of x² over h is off by h²/4: n equal chords of 0 to 1 by 1/(4 n²)
+    x = np.linspace(0.0, 1.0, 4001)[None]
+    ((levels, probability, error),) = chords(1.0 + x, x[:, None] ** 2, 42, 1.0)
+    assert error == pytest.approx(1.0 / (4.0 * 40**2), rel=0.02)
+    assert levels.size == 42
+    middle = 0.5 * (levels[1:-1] + levels[2:])
+    straight = 0.5 * (probability[0, 1:-1] + probability[0, 2:])
+    assert np.abs(straight - (middle - 1.0) ** 2).max() <= error * (1.0 + 1e-9)
+
+
+def test_a_block_that_credible_shaking_does_not_fail_has_none() -> None:
+    numbers = {"p2": np.array([3.0, 0.1]), "kr": np.array([0.1, 3.0])}
+    with pytest.raises(InputError, match=r"1 of 2 blocks, first 'b', have no fragility"):
+        block_functions(["a", "b"], numbers, "pgv_m_s")
+    with pytest.raises(InputError, match="levels = 9: a discrete fragility needs at least 10"):
+        block_functions(["a"], {"p2": np.array([3.0]), "kr": np.array([0.1])}, "pgv_m_s", levels=9)
+
+
+def test_names_that_a_tool_refuses_are_written_otherwise() -> None:
+    kind = functions_of(pga_model(), "pga_g")[0].kind
+    functions = [FragilityFunction(name, "toppled", kind) for name in ("a#1", "b", "c'd\"")]
+    named, (warning,) = renamed(functions, "#'\"", "_", "the engine refuses")
+    assert [each.name for each in named] == ["a_1", "b", "c_d_"]
+    assert "2 of 3 IDs" in warning
+    assert "'a#1' is written as 'a_1'" in warning
