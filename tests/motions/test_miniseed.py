@@ -70,6 +70,13 @@ def test_channels_go_together_and_have_gains_of_their_own(tmp_path: Path) -> Non
         read_motions(path, gain={0: 1000.0, 1: 2000.0})
 
 
+def test_several_stations_are_remarked_upon(tmp_path: Path) -> None:
+    path = written(tmp_path, miniseed(COUNTS), miniseed(COUNTS[::2], station="OTHER"))
+    motions = read_motions(path, gain=GAIN)
+    assert {motion.station for motion in motions} == {"CE.79435", "CE.OTHER"}
+    assert all("several stations" in motion.remarks[-1] for motion in motions)
+
+
 @pytest.mark.parametrize("channel", ["BHZ", "HHE", "EHZ", "LDO"])
 def test_channels_of_other_quantities(tmp_path: Path, channel: str) -> None:
     path = written(tmp_path, miniseed(COUNTS, channel=channel))
@@ -102,10 +109,12 @@ def test_a_file_that_was_cut(tmp_path: Path) -> None:
 
 
 def test_a_damaged_record(tmp_path: Path) -> None:
-    whole = bytearray(miniseed(COUNTS, record_bytes=512, version=3))
-    whole[700] ^= 0xFF
-    with pytest.raises(MotionFileError, match="truncated or damaged"):
-        read_motions(written(tmp_path, bytes(whole)), gain=GAIN)
+    # version 3 has a checksum; in version 2 the differences must lead to the last sample
+    for version, encoding in ((3, "INT32"), (2, "STEIM1"), (2, "STEIM2")):
+        whole = bytearray(miniseed(COUNTS, record_bytes=512, version=version, encoding=encoding))
+        whole[700] ^= 0x01
+        with pytest.raises(MotionFileError, match="truncated or damaged"):
+            read_motions(written(tmp_path, bytes(whole)), gain=GAIN)
 
 
 def test_what_is_stated_must_fit(tmp_path: Path) -> None:

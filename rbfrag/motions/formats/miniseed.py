@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,12 +42,24 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         traces = pymseed.MS3TraceList.from_buffer(raw, unpack_data=True)
     except pymseed.MiniSEEDError as error:
         raise _damaged(file, error) from None
+    # libmseed only warns where the last sample is not the one that its record states
+    warnings = pymseed.get_error_messages()
+    if any("integrity" in each for each in warnings):
+        raise _damaged(file, warnings[0])
     channels = [(each.sourceid, list(each)) for each in traces]
     if not channels:
         raise file.error("the file holds no samples: request the record again")
     start = min(segments[0].starttime_str() for _, segments in channels)
+    stations = sorted({".".join(source.split("_")[:2]) for source, _ in channels})
+    several = f"the file holds channels of several stations: {', '.join(stations[:5])}"
     for index, (source, segments) in enumerate(channels):
-        yield _channel(file, index, source, segments, (start[:19], remark))
+        trace = _channel(file, index, source, segments, start[:19])
+        yield replace(
+            trace,
+            is_partial=bool(remark),
+            remark_if_partial=remark,
+            remarks=(*trace.remarks, several) if len(stations) > 1 else trace.remarks,
+        )
 
 
 def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, str]:
@@ -67,13 +80,13 @@ def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, s
 
 
 def _channel(
-    file: RecordFile, index: int, source: str, segments: list[Any], of_file: tuple[str, str]
+    file: RecordFile, index: int, source: str, segments: list[Any], start: str
 ) -> ParsedTrace:
     codes = _SOURCE.fullmatch(source)
     if codes is None:
         raise file.error(f"the source {source!r} is no channel: request the record again")
     network, station, location, *channel = codes.groups()
-    name, start = "".join(channel), of_file[0]
+    name = "".join(channel)
     if channel[1] not in ACCELEROMETERS:
         raise file.error(
             f"{name} is no accelerometer's channel but, by its {channel[1]}, one of velocity or "
@@ -102,8 +115,6 @@ def _channel(
             f"the mean of {offset:.6g} counts, the offset of the instrument, was subtracted; this "
             "is no baseline correction",
         ),
-        is_partial=bool(of_file[1]),
-        remark_if_partial=of_file[1],
     )
 
 
