@@ -1,5 +1,6 @@
 # make demo and make test start from nothing but git, make, python3 and python3-venv.
-# PYTHON=python3.12 and VENV=somewhere choose another interpreter and another folder.
+# PYTHON=python3.12 and VENV=somewhere choose another interpreter and another folder. What is installed
+# are the versions of constraints.txt; CONSTRAINTS= takes the newest.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -7,16 +8,19 @@ VENV ?= .venv
 FLOORS ?= .venv-floors
 RELEASE ?= .venv-release
 TOOLS ?= .venv-tools
+NEWEST ?= .venv-newest
+RESOLVED ?= .venv-resolved
+CONSTRAINTS ?= constraints.txt
 CORE := tests/cli tests/db tests/exchange tests/fragility tests/hazards tests/motions tests/plots \
   tests/rockmasses tests/solver
 
 BIN := $(VENV)/bin
 RUN := $(BIN)/python -m
-PIP := $(RUN) pip install --quiet --disable-pip-version-check
+PIP := $(RUN) pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types docs unit floors release-check interoperability format cli-reference wheel clean
+.PHONY: help demo test lint types docs unit newest constraints floors release-check interoperability format cli-reference wheel clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
@@ -26,9 +30,10 @@ demo: $(VENV)/.installed-demo  ## from recorded earthquakes to a failure probabi
 
 test: lint types docs unit  ## every check: style, types, documentation, tests
 
-lint: $(VENV)/.installed-dev  ## style
+lint: $(VENV)/.installed-dev  ## style, and the workflow of continuous integration
 	$(RUN) ruff check .
 	$(RUN) ruff format --check .
+	$(BIN)/zizmor --offline --quiet --no-progress .github/workflows
 
 types: $(VENV)/.installed-dev  ## static types
 	$(RUN) mypy
@@ -47,17 +52,32 @@ docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 unit: $(VENV)/.installed-dev  ## the tests alone, one process a core
 	MPLCONFIGDIR="$$(cd $(VENV) && pwd)/matplotlib" $(RUN) pytest -n auto
 
+# To be run now and then, say once a week: a failure is a release of a dependency that breaks something.
+newest:  ## every check with the newest versions instead of those of constraints.txt
+	test ! -f $(NEWEST)/pyvenv.cfg || rm -rf $(NEWEST)
+	$(MAKE) --no-print-directory VENV=$(NEWEST) CONSTRAINTS= test
+
+# Resolved with the oldest Python that is supported, as what runs there runs on the newer ones, too.
+constraints:  ## write constraints.txt anew: the newest versions on Python 3.11, PYTHON=python3.11
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { \
+	  echo "constraints.txt is resolved with Python 3.11:  make PYTHON=python3.11 constraints" >&2; exit 1; }
+	$(PYTHON) -m venv --clear $(RESOLVED)
+	$(RESOLVED)/bin/python -m pip install --quiet --disable-pip-version-check '.[dev,samples]'
+	{ echo "# Written by: make constraints"; $(RESOLVED)/bin/python -m pip list \
+	  --disable-pip-version-check --format freeze --exclude rbfrag --exclude pip --exclude setuptools; \
+	  } > constraints.txt
+
 # Not part of .ci/run, which stays below 25 minutes. Warnings of old libraries about each other are none of ours.
 floors:  ## the core of the tests with the lowest versions that are allowed
 	$(PYTHON) -m venv --clear $(FLOORS)
 	$(PYTHON) benchmarks/floors.py > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --constraint $(FLOORS)/floors.txt \
-	  '.[plot,postgres,parquet,gis,excel,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
+	  '.[plot,postgres,parquet,gis,excel,mseed,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
 	MPLCONFIGDIR="$$(cd $(FLOORS) && pwd)/matplotlib" $(FLOORS)/bin/python -m pytest \
 	  -o filterwarnings=default --disable-warnings -n auto $(CORE)
 
-# Not part of .ci/run either: ten minutes of installing. Uploading is then one command: twine upload dist/*
+# Not part of .ci/run either: ten minutes of installing. Uploading is then one command: twine upload dist/*.whl dist/*.tar.gz
 release-check:  ## is the last commit fit for a package index: distributions, files, versions, licences, bare environments
 	$(PYTHON) -m venv --clear $(RELEASE)
 	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check $$($(PYTHON) -c \
@@ -93,12 +113,12 @@ clean:  ## remove what make made
 	rm -rf docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find rbfrag tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(VENV)/.installed-demo: pyproject.toml | $(VENV)/.made
+$(VENV)/.installed-demo: pyproject.toml $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing rbfrag[plot,samples] into $(VENV) ..."
 	@$(PIP) --editable '.[plot,samples]'
 	@touch $@
 
-$(VENV)/.installed-dev: pyproject.toml | $(VENV)/.made
+$(VENV)/.installed-dev: pyproject.toml $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing rbfrag[dev,samples] into $(VENV) ..."
 	@$(PIP) --editable '.[dev,samples]'
 	@touch $@

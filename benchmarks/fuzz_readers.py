@@ -40,7 +40,8 @@ from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.recognise import read_motions
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
-from tests.motions.written_by_networks import csmip_v1, knet
+from tests.motions.written_by_networks import AFAD_PREAMBLE, csmip_v1, knet, scec_bbp
+from tests.motions.written_miniseed import COUNTS, miniseed
 from tests.synthetic import shaking
 
 SLOW_S = 2.0
@@ -62,6 +63,9 @@ NEEDS: dict[str, tuple[str, float | None]] = {
     "real: geonet_ucgmsim_text": ("g", None),
 }
 """Unit and interval that must be stated for a format."""
+
+GAINS = {"miniSEED": 1000.0}
+"""Gain [counts/(m/s²)] that must be."""
 
 TOKENS = [f"{value:.5E}" for value in shaking(1, 60)]
 DECIMALS = [f"{100.0 * value:.3f}" for value in shaking(2, 40)]
@@ -95,6 +99,16 @@ def bases(records: Path | None) -> dict[str, list[bytes]]:
         ("\n".join(TOKENS) + "\n").encode(),
     ]
     found["rbfrag CSV"] = [own.encode()]
+    found["ESM ASC"].append(AFAD_PREAMBLE.encode() + found["ESM ASC"][0])
+    table = [[f"{value * f:.6e}" for f in (100, 60, -30)] for value in shaking(6, 60)]
+    found["SCEC broadband platform"] = [
+        scec_bbp(table, 0.02, columns=form).encode() for form in ("names", "lines", "units")
+    ]
+    found["miniSEED"] = [
+        miniseed(COUNTS[:400], version=version, record_bytes=512)
+        + miniseed(2 * COUNTS[:400], version=version, channel="HNZ")
+        for version in (2, 3)
+    ]
     if records is not None:
         for name, files in real_files(records).items():
             found[f"real: {name}"] = files
@@ -123,7 +137,9 @@ def read_record(name: str, path: Path, random: Random, tally: Tally) -> str:
     if random.random() < 0.1:
         units, dt_s = random.choice(("g", "m/s2", None)), random.choice((None, 0.005, 1e-300))
     allow_partial = random.random() < 0.5
-    motions = read_motions(path, units=units, dt_s=dt_s, allow_partial=allow_partial)
+    motions = read_motions(
+        path, units=units, dt_s=dt_s, allow_partial=allow_partial, gain=GAINS.get(name)
+    )
     tally.partial += any(motion.is_partial for motion in motions)
     return next(filter(None, map(unfit, motions)), "" if motions else "no motion")
 
@@ -199,7 +215,7 @@ def note(silence: Silence, name: str, content: bytes, path: Path, random: Random
     """Change a number of a sound file's header, and count what became of it."""
     units, dt_s = NEEDS.get(name, (None, None))
     try:
-        became, kind, line = change(name, content, path, random, units, dt_s)
+        became, kind, line = change(name, content, path, random, units, dt_s, GAINS.get(name))
     except RbfragError:
         return  # not every file of a set needs the same unit and interval
     if not became:

@@ -7,7 +7,9 @@ its sound files, or named there with the reason why it is none.
 
 from __future__ import annotations
 
+import io
 import tempfile
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -47,6 +49,7 @@ from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
 from tests.exchange.openquake_job import write_job
 from tests.meshes import box, write_obj
+from tests.motions.written_by_networks import csmip_v2, esm_asc
 
 
 @dataclass(frozen=True)
@@ -181,6 +184,20 @@ def _meshes(suffix: str) -> tuple[bytes, ...]:
 
 
 @cache
+def _zips() -> tuple[bytes, ...]:
+    series = [f"{0.5 * (-1) ** i * i:.3f}" for i in range(60)]
+    members = {"chan001.v2": csmip_v2([("Up", series)], 0.01), "sub/b.asc": esm_asc(series, 0.01)}
+    zips = []
+    for method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w", method) as file:
+            for name, text in members.items():
+                file.writestr(zipfile.ZipInfo(name), text, method)
+        zips.append(content.getvalue())
+    return tuple(zips)
+
+
+@cache
 def _database() -> tuple[bytes, ...]:
     def write(path: Path) -> None:
         shipped = reference_file()
@@ -251,6 +268,7 @@ READERS: tuple[Reader, ...] = (
     Reader("realizations", ".csv", lambda: REALIZATIONS, _read_weights),
     Reader("metadata", ".csv", lambda: METADATA, read_metadata),
     Reader("index of intervals", INDEX, lambda: (b"list.txt 0.01\n",), _read_index),
+    Reader("zip of records", ".zip", _zips, read_motions),
     Reader("NRML", ".xml", lambda: (nrml_text(_functions()).encode(),), read_nrml),
     Reader("pelicun", ".csv", lambda: (pelicun_text(_functions()).encode(),), read_pelicun),
     Reader("ShakeMap", ".xml", lambda: SHAKEMAP, read_shakemap),

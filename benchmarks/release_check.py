@@ -3,8 +3,9 @@
 From a clean copy of the last commit, without files of git: builds the source distribution and the
 wheel, compares their files with the commit, checks metadata, version, changelog and citation,
 installs the wheel into bare environments (newest and lowest versions of its dependencies), runs
-`rbfrag demo` there without a network, and lists the licences of all that the wheel and its extras
-bring. Where nothing fails, both distributions are in dist/, for `twine upload dist/*`.
+`rbfrag demo` there without a network, lists the licences of all that the wheel and its extras
+bring, and writes its bill of materials (CycloneDX). Where nothing fails, both distributions are in
+dist/ with the bill beside them, for `twine upload dist/*.whl dist/*.tar.gz`.
 """
 
 from __future__ import annotations
@@ -45,6 +46,9 @@ LICENCES = (
 
 DATA_ONLY = ("pyslammer",)
 """Under other licences: read as data files, never imported (docs/dependencies.md)."""
+
+SHIPPED = "rbfrag/service/page/vendor/d3"
+"""Code of others that the wheel holds."""
 
 _HEADING = re.compile(r"^## \[(?P<version>[^\]]+)\](?: - (?P<day>\d{4}-\d\d-\d\d))?$", re.M)
 
@@ -97,6 +101,29 @@ def versions_agree(root: Path = ROOT) -> str:
             f"CHANGELOG.md: the heading of {version[1]} has no day (## [X.Y.Z] - YYYY-MM-DD)"
         )
     return version[1]
+
+
+def shipped_component(folder: Path) -> dict[str, object]:
+    """Return the entry of a library that is shipped, as a bill of materials has it.
+
+    Args:
+        folder: holds the library, SHA256SUMS and LICENSE; the library's first line states its
+            version.
+    """
+    checksum, name = (folder / "SHA256SUMS").read_text(encoding="utf-8").split()
+    with (folder / name).open(encoding="utf-8") as file:
+        version = re.search(r"\bv(\d+\.\d+\.\d+)\b", file.readline())
+    if version is None:
+        raise RuntimeError(f"{folder / name} states no version in its first line")
+    return {
+        "type": "library",
+        "bom-ref": f"{folder.name}=={version[1]}",
+        "name": folder.name,
+        "version": version[1],
+        "purl": f"pkg:npm/{folder.name}@{version[1]}",
+        "hashes": [{"alg": "SHA-256", "content": checksum}],
+        "licenses": [{"license": {"id": "ISC"}}],
+    }
 
 
 def differing(shipped: Iterable[str], committed: Iterable[str]) -> str:
@@ -234,6 +261,23 @@ class Check:
             raise RuntimeError("a licence that is not on the list: " + "; ".join(odd))
         return f"{len(rows)} packages"
 
+    def materials(self) -> str:
+        """Write what the wheel and its extras bring, and return how much it is."""
+        version = versions_agree(self.source)
+        bill = self.dist / f"rbfrag-{version}.cdx.json"
+        command = [Path(sys.executable).with_name("cyclonedx-py"), "environment"]
+        command += ["--output-reproducible", "--pyproject", self.source / "pyproject.toml"]
+        run([*command, "--output-file", bill, self.full / "bin/python"])
+        content = json.loads(bill.read_text(encoding="utf-8"))
+        content["metadata"]["component"]["version"] = version
+        content["components"].append(shipped_component(self.source / SHIPPED))
+        text = json.dumps(content, indent=1)
+        if str(self.work) in text or "file:" in text:
+            raise RuntimeError("the bill of materials names files of this machine")
+        bill.write_text(text, encoding="utf-8")
+        self.bill = bill
+        return f"{bill.name}, {len(content['components'])} components"
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
@@ -253,6 +297,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ("newest versions, all extras", check.newest),
             ("lowest versions", check.lowest),
             ("licences", check.licences),
+            ("bill of materials", check.materials),
         )
         for name, step in steps:
             try:
@@ -262,10 +307,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"FAILED  {name}: {error}", flush=True)
         if not failed:
             (ROOT / "dist").mkdir(exist_ok=True)
-            for file in (check.sdist, check.wheel):
+            for file in (check.sdist, check.wheel, check.bill):
                 shutil.copy(file, ROOT / "dist")
     print(
-        "fit for release; both distributions are in dist/"
+        "fit for release; both distributions are in dist/, and their bill of materials"
         if not failed
         else f"{failed} of {len(steps)} steps failed"
     )

@@ -48,7 +48,13 @@ def sound_files(name: str, found: list[bytes]) -> list[bytes]:
 
 
 def change(
-    name: str, content: bytes, path: Path, random: Random, units: str | None, dt_s: float | None
+    name: str,
+    content: bytes,
+    path: Path,
+    random: Random,
+    units: str | None,
+    dt_s: float | None,
+    gain: float | None = None,
 ) -> tuple[str, str, str]:
     """Change one number of a header, and read the file.
 
@@ -74,12 +80,12 @@ def change(
         start -= max(0, min(len(other) - len(match[0]), blanks - 1))
     damaged = content[:start] + other + content[match.end() :]
     path.write_bytes(content)
-    whole = read_motions(path, units=units, dt_s=dt_s)
+    whole = read_motions(path, units=units, dt_s=dt_s, gain=gain)
     path.write_bytes(damaged)
     at = content.count(b"\n", 0, match.start())
     line = damaged.split(b"\n")[at].decode("latin-1").strip()
     try:
-        motions = read_motions(path, units=units, dt_s=dt_s)
+        motions = read_motions(path, units=units, dt_s=dt_s, gain=gain)
     except RbfragError:
         return "refused", kind, line
     finally:

@@ -219,7 +219,7 @@ def test_package_files_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "excel", "gis", "dask", "mesh", "service")
+    runtime = ("plot", "postgres", "parquet", "excel", "gis", "mseed", "dask", "mesh", "service")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

@@ -20,6 +20,7 @@ from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError, checked_name
 from rbfrag.frames import Tabular
+from rbfrag.motions.archive import archive_of, is_archive, members_of, records_among
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
@@ -34,9 +35,6 @@ from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.text.header_check import doubts
 
 AS_SUPPLIED = "as supplied"
-
-DOCUMENTS = frozenset({".md", ".rst", ".pdf", ".htm", ".html", ".doc", ".docx"})
-"""Endings of files about records: passed over in a folder, read when named."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +125,7 @@ def add_motions(
     processing: str = "",
     raw: bool = False,
     allow_partial: bool = False,
+    gain: float | None = None,
     high_pass: HighPass = DEFAULT_HIGH_PASS,
     on_file: Callable[[int, int], None] | None = None,
 ) -> AddReport:
@@ -137,8 +136,9 @@ def add_motions(
     been read.
 
     Args:
-        paths: a file or folder, or several; folders are searched with all folders below them,
-            texts about the records (DOCUMENTS) passed over.
+        paths: a file, member of a zip (``records.zip/chan001.v2``), zip or folder, or several;
+            folders are searched with all folders and zips below them. Passed over are texts about
+            the records (archive.DOCUMENTS) and spectra (V3) beside their record (V2).
         db: the database (path, URL, or None for the default).
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
@@ -152,6 +152,7 @@ def add_motions(
         raw: store every record as its file has it; uncorrected ones are flagged.
         allow_partial: read files whose header states another number of samples than follow;
             their motions are flagged `partial`.
+        gain: counts/(m/s²) of files in counts (miniSEED) of which the metadata state none.
         high_pass: what is applied to uncorrected records.
         on_file: called after each file with (files done, files in all).
 
@@ -186,8 +187,14 @@ def add_motions(
         engine: Engine | None = None
         for number, file in enumerate(files, 1):
             try:
-                traces = read_traces(file, stated, units, dt_s, allow_partial)
+                traces = read_traces(file, stated, units, dt_s, allow_partial, gain)
                 _take_note_of_units(run, file, traces, units, alone=len(files) == 1)
+                if gain is not None and len(files) == 1 and not traces[0].by_gain:
+                    raise MotionFileError(
+                        file,
+                        "it is not in counts, or the metadata state its gain: leave gain out",
+                        fields=("gain",),
+                    )
                 if engine is None:
                     engine = stack.enter_context(opened_database(db, create=True))
                 with engine.begin() as connection:
@@ -253,24 +260,26 @@ def _files(
     any_file = False
     for path in map(Path, paths):
         if path.is_dir():
-            below = sorted(
-                file
-                for file in path.rglob("*")
-                if file.is_file()
-                and not file.name.startswith(".")
-                and file.name != INDEX
-                and file.suffix.lower() not in DOCUMENTS
-            )
-        elif path.exists():
+            inside = (file for file in path.rglob("*") if file.is_file() and file.name != INDEX)
+            below = records_among(inside)
+        elif path.exists() or archive_of(path) is not None:
             below = [path]
         else:
             raise InputError(f"there is no file or folder {path}: check the path")
         for file in below:
-            if file.resolve() != skipped:
+            for record in _records(file) if file.resolve() != skipped else ():
                 any_file = True
-                yield file
+                yield record
     if not any_file:
         raise InputError(f"there is no file in {', '.join(map(str, paths))}")
+
+
+def _records(file: Path) -> list[Path]:
+    try:
+        return members_of(file) if is_archive(file) else [file]
+    except MotionFileError:
+        # refused with the reason when it is read
+        return [file]
 
 
 def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) -> _Stored:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.archive import is_there
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata
 from rbfrag.motions.recognise import read_motions
@@ -21,11 +22,13 @@ class Trace:
     """One trace as its file has it, and what the metadata state of it, empty where nothing.
 
     `other_unit` is what file or metadata state where the caller stated another unit; else empty.
+    `by_gain`: it was in counts, and read by the gain that the caller stated.
     """
 
     motion: GroundMotion
     stated: TraceMetadata
     other_unit: str = ""
+    by_gain: bool = False
 
     @property
     def is_vertical(self) -> bool | None:
@@ -40,6 +43,7 @@ def read_traces(
     units: str | None,
     dt_s: float | None,
     allow_partial: bool = False,
+    gain: float | None = None,
 ) -> list[Trace]:
     """Return every trace of a file with its row of the metadata.
 
@@ -50,6 +54,7 @@ def read_traces(
             does state another.
         dt_s: sampling interval that the caller states [s]; likewise.
         allow_partial: as for :func:`rbfrag.motions.recognise.read_motions`.
+        gain: counts/(m/s²) of files in counts of which the table states none.
 
     Raises:
         MotionFileError: the file cannot be read, or the metadata contradict it or themselves.
@@ -59,15 +64,23 @@ def read_traces(
         _refuse_rows_apart(file, rows)
         dt_s = dt_s or rows[0].dt_s
     by_table = _known_unit(rows[0].units) if rows else None
+    read = partial(read_motions, file, dt_s=dt_s, allow_partial=allow_partial)
+    gains = {row.trace_index: row.gain for row in rows if row.gain is not None}
+    whole = gains.get(None)
+    by_index = {index: each for index, each in gains.items() if index is not None}
+    by_gain = False
     try:
-        motions = read_motions(file, units=by_table, dt_s=dt_s, allow_partial=allow_partial)
+        motions = read(units=by_table, gain=whole if whole is not None else by_index or None)
     except MotionFileError as error:
         # stated by neither, or contradicted by the samples
-        if units is None or by_table is not None or "units" not in error.fields:
+        if units is not None and by_table is None and "units" in error.fields:
+            motions = read(units=units)
+        elif by_gain := gain is not None and not gains and "gain" in error.fields:
+            motions = read(gain=gain)
+        else:
             raise
-        motions = read_motions(file, units=units, dt_s=dt_s, allow_partial=allow_partial)
-    by_index = _rows_of_traces(file, rows, motions)
-    for index, row in by_index.items():
+    rows_by_index = _rows_of_traces(file, rows, motions)
+    for index, row in rows_by_index.items():
         if index >= len(motions):
             raise MotionFileError(
                 file,
@@ -77,8 +90,9 @@ def read_traces(
     traces = [
         Trace(
             motion,
-            by_index.get(motion.trace_index, NOTHING_STATED),
+            rows_by_index.get(motion.trace_index, NOTHING_STATED),
             _other_unit(units, motion.stated_unit or by_table),
+            by_gain,
         )
         for motion in motions
     ]
@@ -101,7 +115,7 @@ def missing_files(
     for row in metadata.rows:
         named = folder / row.file
         place = named.resolve()
-        if place in seen or os.path.exists(place):  # noqa: PTH110  # no name is too long for it
+        if place in seen or is_there(place):
             continue
         seen.add(place)
         if any(place == searched or searched in place.parents for searched in places):

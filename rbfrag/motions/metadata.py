@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError, checked_name
+from rbfrag.motions.archive import archive_of
 from rbfrag.motions.processing import says_corrected
 from rbfrag.motions.text.file import read_text
 from rbfrag.motions.units import acceleration_unit
 
 COLUMNS = (
     "file", "trace_index", "event_id", "units", "file_units", "is_vertical", "companion_group",
-    "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s",
+    "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s", "gain",
 )  # fmt: skip
 """The columns that are read; only ``file`` must be there."""
 
@@ -54,6 +55,7 @@ class TraceMetadata:
         earthquake: name of the earthquake for people.
         year: year or time of the earthquake, as text.
         dt_s: sampling interval [s].
+        gain: counts/(m/s²) of a file in counts.
     """
 
     file: str
@@ -70,6 +72,7 @@ class TraceMetadata:
     station: str = ""
     component: str = ""
     dt_s: float | None = None
+    gain: float | None = None
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,14 @@ class MotionMetadata:
     _by_file: Mapping[Path, tuple[TraceMetadata, ...]] = field(repr=False, compare=False)
 
     def file(self, path: str | os.PathLike[str]) -> list[TraceMetadata]:
-        """Return the rows of a file by trace index; none when the table does not name it."""
-        return list(self._by_file.get(_place(Path(path)), ()))
+        """Return the rows of a file by trace index; none when the table does not name it.
+
+        A zip's rows are those of each of its members that has none of its own.
+        """
+        for named in (Path(path), archive_of(Path(path))):
+            if named is not None and (rows := self._by_file.get(_place(named))):
+                return list(rows)
+        return []
 
     def trace(self, path: str | os.PathLike[str], trace_index: int) -> TraceMetadata | None:
         """Return the row of one trace, or None when the table does not name it."""
@@ -249,6 +258,7 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
         magnitude=number("magnitude", lambda m: abs(m) <= most, f"a number up to {most:g}"),
         year=text("year") or None,
         dt_s=number("dt_s", lambda value: value > 0.0, "a positive number of seconds"),
+        gain=number("gain", lambda value: value > 0.0, "a positive number of counts/(m/s2)"),
         **{name: text(name) for name in ("file", "processing", *NAMES)},
     )
 

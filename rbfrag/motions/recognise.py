@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
 
-from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
+from rbfrag.errors import InputError, MissingExtraError, MotionFileError, UnknownFormatError
 from rbfrag.files import as_path
+from rbfrag.motions.archive import archive_of, is_archive, member_bytes, members_of
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.formats import (
     bhrc_v1,
     cdmg_v1,
     cosmos,
     csmip_v2,
+    csmnc,
     cwb,
     delimited_text,
     esm_asc,
     geonet_v2a,
     knet,
+    miniseed,
     nsmn,
     peer_at2,
     rbfrag_csv,
+    scec_bbp,
     simcenter_event,
     ucgmsim_text,
     unam,
     usgs_smc,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import cut_number, decoded, read_text
+from rbfrag.motions.text.file import cut_number, decoded, read_bytes
 from rbfrag.motions.text.header_check import agreed
 from rbfrag.motions.text.record_file import ParsedTrace, RecordFile
 from rbfrag.motions.text.times import first_sample_time
@@ -49,12 +55,15 @@ READERS: tuple[ModuleType, ...] = (
     bhrc_v1,
     knet,
     esm_asc,
+    csmnc,
+    scec_bbp,
     cwb,
     unam,
     nsmn,
     usgs_smc,
     simcenter_event,
     ucgmsim_text,
+    miniseed,
     delimited_text,
 )
 """One module a format, asked in this order; text without a mark of its own last.
@@ -72,11 +81,13 @@ def read_motions(
     units: str | None = None,
     dt_s: float | None = None,
     allow_partial: bool = False,
+    gain: float | Mapping[int, float] | None = None,
 ) -> list[GroundMotion]:
     """Return every acceleration trace of a file, as the file has it.
 
     Args:
-        path: a file in any of the formats of :data:`READERS`.
+        path: a file in any of the formats of :data:`READERS`; a member of a zip, as
+            ``records.zip/chan001.v2``; or a zip, for the traces of all its records.
         units: unit of acceleration, for text files that do not state it: ``g``, ``m/s2``,
             ``cm/s2`` or ``mm/s2``. Refused where the file states another, unless the file
             contradicts itself and agrees with this.
@@ -84,19 +95,34 @@ def read_motions(
         allow_partial: True to read a file whose header states another number of samples than
             follow, or that is cut off. Its motions have `is_partial` and a remark; a last line
             that is cut short is left out.
+        gain: counts/(m/s²) of a file in counts (miniSEED), of all its traces or of each by its
+            trace index. Refused for other files.
 
     Raises:
         MotionFileError: the file cannot be read; the message names the line.
         UnknownFormatError: no reader recognises its content.
-        InputError: an unknown unit, or a dt that is not positive.
+        InputError: an unknown unit, or a dt or gain that is not positive.
     """
     file = as_path(path, "path", "a file of an accelerogram")
-    _check_stated(units, dt_s)
-    return _read_whole(file, read_text(file), units, dt_s, allow_partial=allow_partial)
+    _check_stated(units, dt_s, gain)
+    archive = archive_of(file)
+    members = members_of(file) if archive is None and is_archive(file) else [file]
+    motions: list[GroundMotion] = []
+    for member in members:
+        within = archive_of(member)
+        raw = read_bytes(member) if within is None else member_bytes(within, member)
+        record = RecordFile(member, _text(member, raw), units, dt_s, allow_partial, gain)
+        motions += _read_whole(record)
+    return motions
 
 
 def motions_in(
-    raw: bytes, name: str, *, units: str | None = None, dt_s: float | None = None
+    raw: bytes,
+    name: str,
+    *,
+    units: str | None = None,
+    dt_s: float | None = None,
+    gain: float | None = None,
 ) -> list[GroundMotion]:
     """Return every acceleration trace of a file that is no file here, such as one sent.
 
@@ -104,59 +130,73 @@ def motions_in(
         raw: what the file holds.
         name: what messages call it; nothing of that name is looked for.
     """
-    _check_stated(units, dt_s)
+    _check_stated(units, dt_s, gain)
     # readers look for an index beside a file, and beside this one there is nothing
     file = Path(os.devnull) / Path(name).name
-    return _read_whole(file, decoded(file, raw), units, dt_s, allow_partial=False)
+    return _read_whole(RecordFile(file, _text(file, raw), units, dt_s, gain=gain))
 
 
-def _check_stated(units: str | None, dt_s: float | None) -> None:
+def _text(file: Path, raw: bytes) -> str:
+    # each byte of a binary file is one character
+    text = raw[:HEAD_CHARACTERS].decode("latin-1")
+    return raw.decode("latin-1") if miniseed.recognises(text) else decoded(file, raw)
+
+
+def _check_stated(
+    units: str | None, dt_s: float | None, gain: float | Mapping[int, float] | None
+) -> None:
     if units is not None:
         acceleration_unit(units)
+    for each in gain.values() if isinstance(gain, Mapping) else [gain]:
+        if each is not None and not 0.0 < each < math.inf:
+            raise InputError(
+                f"gain must be a positive number of counts/(m/s2), not {each:g}", fields=("gain",)
+            )
     if dt_s is not None and not 0.0 < dt_s < float("inf"):
         raise InputError(
             f"dt_s must be a positive number of seconds, not {dt_s:g}", fields=("dt_s",)
         )
 
 
-def _read_whole(
-    file: Path, text: str, units: str | None, dt_s: float | None, *, allow_partial: bool
-) -> list[GroundMotion]:
+def _read_whole(record: RecordFile) -> list[GroundMotion]:
+    text, whole = record.text, replace(record, allow_partial=False)
     motions: list[GroundMotion]
     try:
         if word := cut_number(text):
-            raise MotionFileError(
-                file,
+            raise record.error(
                 f"the file ends within the number {word!r}: it is truncated; export the record "
                 "again, or read what there is with allow_partial",
                 line=text.count("\n") + 1,
                 fields=("allow_partial",),
             )
-        motions = _read(file, text, units, dt_s)
+        motions = _read(whole)
     except UnknownFormatError:
         raise
     except MotionFileError:
-        if not allow_partial:
+        if not record.allow_partial:
             raise
     else:
         return motions
     remark = ""
-    whole, newline, cut = text.rpartition("\n")
-    if cut and newline and not cut.rstrip().endswith("}"):
+    lines, newline, cut = text.rpartition("\n")
+    if cut and newline and not cut.rstrip().endswith("}") and not miniseed.recognises(text):
         # its last number may lack digits
-        text = whole + newline
+        record = replace(record, text=lines + newline)
         remark = f"the file ends within a line, which is left out: {cut[:40].strip()!r}"
-    motions = _read(file, text, units, dt_s, allow_partial=True)
+    motions = _read(record)
     if remark:
         motions[-1] = replace(motions[-1], is_partial=True, remarks=(*motions[-1].remarks, remark))
     return motions
 
 
-def _read(
-    file: Path, text: str, units: str | None, dt_s: float | None, *, allow_partial: bool = False
-) -> list[GroundMotion]:
-    reader = _reader(file, text)
-    record = RecordFile(file, text, units, dt_s, allow_partial)
+def _read(record: RecordFile) -> list[GroundMotion]:
+    file = record.path
+    reader = _reader(file, record.text)
+    if record.gain is not None and reader is not miniseed:
+        raise record.error(
+            f"the file is {reader.FORMAT}, which is not in counts: leave gain out",
+            fields=("gain",),
+        )
     try:
         traces = list(reader.parse(record))
         traces = agreed(record, traces, getattr(reader, "COMPONENTS", None))
@@ -164,7 +204,7 @@ def _read(
             _motion(file, trace, file_format=reader.FORMAT, trace_index=index)
             for index, trace in enumerate(traces)
         ]
-    except MotionFileError:
+    except (MotionFileError, MissingExtraError):
         raise
     except InputError as error:
         # values that no motion can have, which the reader itself has no reason to doubt
@@ -187,10 +227,11 @@ def _motion(file: Path, trace: ParsedTrace, **place: Any) -> GroundMotion:
         "is_corrected": trace.is_corrected,
         **trace.labels,
     }
+    archive = archive_of(file)
     return GroundMotion(
         trace.values * trace.scale,
         trace.dt_s,
-        source_file=file.name,
+        source_file=file.name if archive is None else file.relative_to(archive.parent).as_posix(),
         remarks=trace.remarks,
         is_partial=trace.is_partial,
         stated_unit=trace.unit.text if trace.unit else "",
@@ -216,6 +257,7 @@ def read_motion(
     units: str | None = None,
     dt_s: float | None = None,
     allow_partial: bool = False,
+    gain: float | None = None,
 ) -> GroundMotion:
     """Return one trace, named as ``FILE`` or ``FILE#trace_index``.
 
@@ -228,7 +270,11 @@ def read_motion(
     # int() refuses thousands of digits, and exists() names that are too long
     if mark and tail.isascii() and tail.isdigit() and len(tail) < 10 and not _is_file(name):
         name, index = stem, int(tail)
-    motions = read_motions(name, units=units, dt_s=dt_s, allow_partial=allow_partial)
+    if is_archive(file := Path(name)):
+        members = members_of(file)
+        listed = ", ".join(str(each.relative_to(file.parent)) for each in members[:5])
+        raise MotionFileError(file, f"the zip holds {len(members)} records: name one, as {listed}")
+    motions = read_motions(name, units=units, dt_s=dt_s, allow_partial=allow_partial, gain=gain)
     if index is None and len(motions) == 1:
         return motions[0]
     if index is not None and index < len(motions):

@@ -159,6 +159,8 @@ class Reading(Parameters):
     """Unit of acceleration of a text file that does not state it."""
     dt: Positive | None = None
     """Sampling interval [s] of a text file that holds accelerations only."""
+    gain: Positive | None = None
+    """Gain [counts/(m/s2)] of a miniSEED file."""
 
 
 MOST_SIZES = 100

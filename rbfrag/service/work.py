@@ -164,7 +164,7 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
 
     trace = query.trace
     try:
-        traces = motions_in(body, "upload", units=query.units, dt_s=query.dt)
+        traces = motions_in(body, "upload", units=query.units, dt_s=query.dt, gain=query.gain)
     except MotionFileError as error:
         where = FILE if error.line is None else f"{FILE}, line {error.line}"
         raise InputError(f"{where}: {error.reason}") from None

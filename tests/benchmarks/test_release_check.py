@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.release_check import differing, versions_agree
+from benchmarks.release_check import SHIPPED, differing, shipped_component, versions_agree
+from tests.conftest import ROOT
 
 
 def stated(root: Path, *, package: str, cited: str, heading: str) -> Path:
@@ -40,3 +41,10 @@ def test_versions_that_differ(tmp_path: Path, cited: str, heading: str, reason: 
 def test_files_too_many_and_too_few() -> None:
     assert differing(["a", "b"], ["b", "a"]) == ""
     assert differing(["a", "cache"], ["a", "b"]) == "not in the commit: cache; missing: b"
+
+
+def test_a_shipped_library_is_in_the_bill_of_materials() -> None:
+    found = shipped_component(ROOT / SHIPPED)
+    assert found["name"] == "d3"
+    assert found["purl"] == f"pkg:npm/d3@{found['version']}"
+    assert f"| D3 {found['version']} |" in (ROOT / "docs/dependencies.md").read_text("utf-8")

@@ -55,8 +55,7 @@ def test_binary(tmp_path: Path, content: bytes) -> None:
 
 
 def test_packed(tmp_path: Path) -> None:
-    for content, name in ((b"PK\x03\x04\x14\0", "zip"), (b"\x1f\x8b\x08\0", "gzip")):
-        assert f"it is a {name} file: unpack it" in refusal(written(tmp_path, content)).reason
+    assert "it is a gzip file: unpack it" in refusal(written(tmp_path, b"\x1f\x8b\x08\0")).reason
 
 
 @pytest.mark.parametrize(

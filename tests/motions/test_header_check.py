@@ -19,6 +19,7 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.motions.text.header_check import doubts
 from tests.motions import written_by_networks as written
 from tests.motions.written import v2a
+from tests.motions.written_by_networks import Channels
 from tests.synthetic import shaking
 
 NPTS = 400
@@ -38,25 +39,32 @@ def table(values: FloatArray) -> list[list[str]]:
     return [three(np.array(row)) for row in zip(values, 0.5 * values, -0.2 * values, strict=True)]
 
 
+def each(
+    names: list[str], write: Callable[[FloatArray], list[str]], values: FloatArray
+) -> Channels:
+    """Channels that differ: equal ones would be remarked upon."""
+    return [
+        (name, write(values * factor)) for name, factor in zip(names, (1.0, 0.9, 0.8), strict=False)
+    ]
+
+
 MAKE: dict[str, Callable[[FloatArray, float], str]] = {
-    "GeoNet V2A": lambda values, dt: v2a([(n, three(values)) for n in ("N28W", "N62E", "UP")], dt),
+    "GeoNet V2A": lambda values, dt: v2a(each(["N28W", "N62E", "UP"], three, values), dt),
     "CSMIP/CDMG V2": lambda values, dt: written.csmip_v2(
-        [(n, three(values)) for n in ("H1", "H2", "Up")], dt
+        each(["H1", "H2", "Up"], three, values), dt
     ),
     "COSMOS V1c/V2c": lambda values, dt: written.cosmos(three(values), dt),
     "CDMG V1 series": lambda values, dt: written.csmip_v1(
-        [(n, six(values)) for n in ("360 Deg", "Up", "90 Deg")], dt
+        each(["360 Deg", "Up", "90 Deg"], six, values), dt
     ),
-    "CDMG V1": lambda values, dt: written.cdmg_v1(
-        [(n, three(values)) for n in ("EW", "NS", "V")], dt
-    ),
-    "BHRC V1": lambda values, dt: written.bhrc_v1(
-        [(n, six(values)) for n in ("L1", "V2", "T3")], dt
-    ),
+    "CDMG V1": lambda values, dt: written.cdmg_v1(each(["EW", "NS", "V"], three, values), dt),
+    "BHRC V1": lambda values, dt: written.bhrc_v1(each(["L1", "V2", "T3"], six, values), dt),
     "K-NET/KiK-net ASCII": lambda values, dt: written.knet(
         [int(1e4 * value) for value in values], round(1.0 / dt)
     ),
     "ESM ASC": lambda values, dt: written.esm_asc(three(values), dt),
+    "CSMNC text": lambda values, dt: written.csmnc(three(values), dt),
+    "SCEC broadband platform": lambda values, dt: written.scec_bbp(table(values), dt),
     "CWB dat": lambda values, dt: written.cwb(table(values), round(1.0 / dt)),
     "UNAM standard file": lambda values, dt: written.unam(
         table(values), dt, names=["V", "N00E", "N90E"]
@@ -110,6 +118,11 @@ MISTAKES: dict[str, list[tuple[str, str, str]]] = {
         ("duration", r"\nDURATION_S: (\S+)", "x2"),
         ("unit", r"UNITS: (\S+)", "m/s^2"),
         ("peak", r"PGA_CM/S\^2: (\S+)", "x2"),
+    ],
+    "CSMNC text": [
+        ("dt", r"INTERVALS OF:\s+(\S+)", "x10"),
+        ("duration", r"DURATION:\s+(\S+)", "x2"),
+        ("peak", r"PEAK VALUE:\s+(\S+)", "x2"),
     ],
     "CWB dat": [
         ("dt", r"SampleRate\(Hz\): (\d+)", "x10"),

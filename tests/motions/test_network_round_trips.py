@@ -352,6 +352,7 @@ WRITTEN: dict[str, Callable[[], str]] = {
     "BHRC V1": lambda: written.bhrc_v1([("L1", ["0.1"] * 12)], 0.01),
     "K-NET/KiK-net ASCII": lambda: written.knet(list(range(12)), 100),
     "ESM ASC": lambda: written.esm_asc(["1.0"] * 12, 0.01),
+    "CSMNC text": lambda: written.csmnc(["1.0"] * 12, 0.01),
     "CWB dat": lambda: written.cwb(TABLE, 100),
     "UNAM standard file": lambda: written.unam(TABLE, 0.01, names=["V", "N00E", "N90E"]),
     "AFAD NSMN text": lambda: written.nsmn(TABLE, 0.01),
@@ -364,6 +365,8 @@ STATE_NO_UNIT = {"SimCenter event JSON", "GeoNet text (.000/.090/.ver)"}
 
 def test_every_reader_has_a_writer() -> None:
     elsewhere = {"PEER AT2", "GeoNet V2A", "delimited text", "rbfrag CSV"}
+    # which state no number of samples, or are no text
+    elsewhere |= {"SCEC broadband platform", "miniSEED"}
     assert {reader.FORMAT for reader in READERS} == set(WRITTEN) | elsewhere
 
 

@@ -23,6 +23,7 @@ COUNTS: dict[str, Sequence[tuple[str, str]]] = {
     "CDMG V1": [("POINTS =     12", "POINTS =     24"), ("LENGTH =  0.120", "LENGTH =  0.240")],
     "BHRC V1": [("POINTS =     12", "POINTS =     24"), ("=   0.120", "=   0.240")],
     "K-NET/KiK-net ASCII": [("0.12\n", "0.14\n")],
+    "CSMNC text": [("POINTS:  12", "POINTS:  14")],
     "ESM ASC": [("NDATA: 12", "NDATA: 14")],
     "CWB dat": [("(sec): 0.12", "(sec): 0.15")],
     "UNAM standard file": [("/12/12/12", "/13/13/13")],

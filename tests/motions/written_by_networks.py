@@ -276,6 +276,61 @@ def esm_asc(
     )
 
 
+AFAD_PREAMBLE = (
+    "AAD_Filtered_FILE\nAAD_BASELINE_CORRECTION: BASELINE NOT REMOVED\n"
+    "AAD_FILTER_ORDER: 1\nAAD_LOW_CUT_FREQUENCY_HZ: 0.025\nAAD_HIGH_CUT_FREQUENCY_HZ: 40.0\n"
+)
+"""What AFAD writes above an ESM header."""
+
+
+def csmnc(tokens: Sequence[str], dt_s: float, *, quantity: str = "UNCORRECTED ACCELERATION") -> str:
+    return _file(
+        [
+            "012ABC120103153901",
+            "0120103153957 2012-01-03 15:39:57 BTM",
+            "SOMEWHERE EARTHQUAKE, SOMEWHERE,CHN",
+            "EPICENTER  39.939N 77.339E DEPTH 9 KM",
+            "MAGNITUDE  4.0(Ms)",
+            "STATION: 12ABC 39.700N 77.599E",
+            "SITE CONDITION: SOIL",
+            "INSTRUMENT TYPE: ETNA/ES-T",
+            "OBSERVING POINT: GROUND",
+            "COMP. EW",
+            f"{quantity}          UNIT: CM/SEC/SEC",
+            f"NO. OF POINTS:  {len(tokens)}  EQUALLY SPACED INTERVALS OF:  {dt_s:g}  SEC",
+            f"PEAK VALUE:    {peak(tokens)}   AT   27.06 SEC    "
+            f"DURATION:  {len(tokens) * dt_s:g} SEC",
+            "PRE-EVENT TIME:  20  SEC  RECORDER TIME:  2012-01-3 15:39:44.000 BTM",
+            "CSMNC",
+            "",
+            *(f"{row} " for row in rows(tokens, 8, 14)),
+        ]
+    )
+
+
+BBP_COLUMNS = {
+    "names": "#    time(sec)      N-S({unit})      E-W({unit})      U-D({unit})\n",
+    "lines": "# Station: abcd\n#    Vs30 (m/s): 450\n# Column 1: Time (s)\n"
+    "# Column 2: North-south acceleration ({unit}) (+ is northward)\n"
+    "# Column 3: East-west acceleration ({unit}) (+ is eastward)\n"
+    "# Column 4: Up-down acceleration ({unit}) (+ is upward)\n#\n",
+    "units": "# Station: abcd\n#   units= {unit}\n# Column 1: Time (s)\n"
+    "# Column 2: H1 component ground acceleration (+ is 000)\n"
+    "# Column 3: H2 component ground acceleration (+ is 090)\n"
+    "# Column 4: V component ground acceleration (+ is upward)\n",
+    "none": "# HF Sim NGAH, stat=abcd\n",
+}
+
+
+def scec_bbp(
+    table: Sequence[Sequence[str]], dt_s: float, *, columns: str = "names", unit: str = "cm/s/s"
+) -> str:
+    """`table` has a row a sample: N-S, E-W, U-D."""
+    return BBP_COLUMNS[columns].format(unit=unit) + _file(
+        ["\t".join([f"{i * dt_s:.6e}", *row]) for i, row in enumerate(table)]
+    )
+
+
 def cwb(table: Sequence[Sequence[str]], frequency_hz: int, *, names: str = "UNE") -> str:
     """`table` has a row a sample, a column a component."""
     return _file(

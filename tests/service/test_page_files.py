@@ -1,6 +1,7 @@
 """The files of the page: all there, none from elsewhere, nothing written into the document."""
 
 import re
+from hashlib import sha256
 from html.parser import HTMLParser
 
 import pytest
@@ -111,6 +112,15 @@ def test_modules_turn_no_text_into_elements():
             "Function(",
         ):
             assert word not in text, f"{path.name}: {word}"
+
+
+def test_the_checksum_stands_beside_the_library():
+    for library in (FOLDER / "vendor").iterdir():
+        stated = [line.split() for line in (library / "SHA256SUMS").read_text("utf-8").splitlines()]
+        shipped = {path.name for path in library.iterdir()} - {"LICENSE", "SHA256SUMS"}
+        assert {name for _, name in stated} == shipped
+        for checksum, name in stated:
+            assert sha256((library / name).read_bytes()).hexdigest() == checksum, name
 
 
 def test_the_licence_stands_beside_the_library():

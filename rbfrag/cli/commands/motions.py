@@ -48,7 +48,9 @@ app = command_group(
 @stacked
 def add(
     *,
-    paths: list[str] = argument("Files, or folders to search.", metavar="PATHS..."),
+    paths: list[str] = argument(
+        "Files, zips or members of one (FILE.zip/NAME), or folders to search.", metavar="PATHS..."
+    ),
     reading: options.ReadingOptions,
     suite: str | None = option("Put the motions into this suite."),
     metadata: str | None = option(
@@ -76,8 +78,9 @@ def add(
     Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records are
     stored as they are. Vertical components called DOWN are turned upward.
 
-    Formats are recognised by content. In a folder, texts about the records (.md, .pdf, .html,
-    .rst, .doc) are passed over. A file that cannot be read is listed with its reason,
+    Formats are recognised by content. In a folder or zip, texts about the records (.md, .pdf,
+    .html, .rst, .doc) are passed over, and V3 files beside the V2 of their record. A file that
+    cannot be read is listed with its reason,
     the others are added, and the exit status is 1. Without --metadata an earthquake is only a
     guess from the file's header, flagged, and never merged with one that was stated.
     """
@@ -94,6 +97,7 @@ def add(
             processing=processing,
             raw=raw,
             allow_partial=allow_partial,
+            gain=reading.gain,
             on_file=bar.show,
         )
     if json:

@@ -35,7 +35,13 @@ def find_motion(
             return load_motion(connection, int(text))
     from rbfrag.motions.recognise import read_motion
 
-    return read_motion(text, units=reading.units, dt_s=reading.dt, allow_partial=allow_partial)
+    return read_motion(
+        text,
+        units=reading.units,
+        dt_s=reading.dt,
+        allow_partial=allow_partial,
+        gain=reading.gain,
+    )
 
 
 def stored_row(text: str, *, db: str | None) -> tuple[MotionRow, VerticalPair | None] | None:

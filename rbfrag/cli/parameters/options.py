@@ -120,12 +120,15 @@ class Printing:
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions:
-    """What a text file of an accelerogram leaves open."""
+    """What the file of an accelerogram leaves open."""
 
     units: str | None = option(
         "Unit of acceleration of a text file that does not state it: g, m/s2, cm/s2 or mm/s2."
     )
     dt: float | None = option("Sampling interval [s] of a text file that holds accelerations only.")
+    gain: float | None = option(
+        "Gain [counts/(m/s2)] of a miniSEED file: the sensitivity in its station's StationXML."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

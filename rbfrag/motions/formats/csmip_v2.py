@@ -8,6 +8,8 @@ Each block: 25 text lines, numeric headers, then a line such as ::
 and the accelerations, 8 of width 10 a line, which may touch; then velocity and displacement in the
 same way. Older files are upper case and may wrap a header line, so that lines are found by what
 they say. Channels of one file may differ in length. A block ends with ``/&``.
+
+V3 files hold spectra of such a record, which are refused in words of their own.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ _HEAD = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 _RECORD = re.compile(r"^corrected accelerogram\s+(\S+)", re.IGNORECASE)
-_CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S.*)", re.IGNORECASE)
+_CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S.*?)(?:\s{2,}location:.*)?$", re.IGNORECASE)
+_LOCATION = re.compile(r"^\s*chan\s*\d+\s*:.*\blocation:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^station\s+(?:no|id)\.?\s*(\S+)", re.IGNORECASE)
 _START = re.compile(r"\b(?:start|trigger) time\s*:\s*(\S.*)", re.IGNORECASE)
 _POINTS = re.compile(r"^\s*(\S+)\s+points of accel\w*\s+data", re.IGNORECASE)
@@ -42,11 +45,18 @@ _PEAK = re.compile(r"^peak acceleration\s*=\s*(\S+\s+\S+)", re.IGNORECASE)
 _SERIES_END = re.compile(r"\s*(?:/&|\S+\s+points of )", re.IGNORECASE)
 _WIDE_GAP = re.compile(r"\s{2,}")
 
-recognises = _HEAD.match
+_SPECTRA = re.compile(r"\s*response .*\bspectra\b", re.IGNORECASE)
+
+
+def recognises(head: str) -> bool:
+    """Return whether a text is of V2, or holds the spectra of V3."""
+    return bool(_HEAD.match(head) or _SPECTRA.match(head))
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the channels of a V2 file in their order, with one recording id."""
+    if _SPECTRA.match(file.lines[0]):
+        raise file.error("this is V3, which holds spectra; take the .v2 of the same channel", 1)
     spans = file.blocks(_BLOCK)
     remarks = file.missing_channels(spans[0], len(spans))
     for index, span in enumerate(spans):
@@ -74,6 +84,8 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
     channel = file.find(header, _CHANNEL, f"line 'Chan' in {name}")
     # the line after it names the event, unless it gives no more than the time of the record
     event = file.lines[channel.line].strip() if channel.line < header.stop else ""
+    if location := file.label(range(channel.line - 1, channel.line), _LOCATION):
+        remarks = (*remarks, f"the sensor's location by the header: {location}")
     return ParsedTrace(
         values,
         dt,

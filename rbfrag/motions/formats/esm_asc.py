@@ -1,4 +1,8 @@
-"""ESM ASC (DYNA 1.2 header): lines ``KEY: value``, then one value a line, one component a file."""
+"""ESM ASC (DYNA 1.2 header): lines ``KEY: value``, then one value a line, one component a file.
+
+AFAD (Turkey) puts lines ``AAD_...`` before them. It filtered its records again after the peak of
+the header had been taken: the two are off by up to a quarter.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,8 @@ from rbfrag.motions.text.record_file import NamedFields, ParsedTrace, RecordFile
 
 FORMAT = "ESM ASC"
 
-_HEAD = re.compile(r"EVENT_NAME:(?s:.)*^SAMPLING_INTERVAL_S:", re.MULTILINE)
-_KEY = re.compile(r"[A-Z][^:\s]*:")
+_HEAD = re.compile(r"(?:AAD_.*\n)*EVENT_NAME:(?s:.)*^SAMPLING_INTERVAL_S:", re.MULTILINE)
+_KEY = re.compile(r"AAD_|[A-Z][^:\s]*:")
 
 recognises = _HEAD.match
 

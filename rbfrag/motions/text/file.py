@@ -27,6 +27,11 @@ _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 def read_text(path: Path) -> str:
     """Return the text of a file: byte-order mark removed, newlines as ``\\n``."""
+    return decoded(path, read_bytes(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file of bounded size."""
     try:
         if path.is_dir():
             raise MotionFileError(path, "this is a folder, not a file: name a file in it")
@@ -36,8 +41,9 @@ def read_text(path: Path) -> str:
         if raw is None:
             largest = LARGEST_FILE_BYTES / 1024**2
             raise MotionFileError(
-                path, f"more than {largest:.0f} MiB are too large for an accelerogram in text"
+                path, f"more than {largest:.0f} MiB are too large for an accelerogram"
             )
+        return raw
     except FileNotFoundError:
         raise MotionFileError(path, "there is no such file: check the path") from None
     except OSError as error:
@@ -47,7 +53,6 @@ def read_text(path: Path) -> str:
     except ValueError as error:
         # a name with a zero byte
         raise MotionFileError(path, f"the file cannot be read: {error}") from None
-    return decoded(path, raw)
 
 
 def decoded(path: Path, raw: bytes) -> str:
@@ -59,7 +64,8 @@ def decoded(path: Path, raw: bytes) -> str:
         raise MotionFileError(path, f"it is a {packed} file: unpack it, and name a record in it")
     if b"\0" in raw:
         raise MotionFileError(
-            path, "the file is binary, not text: export the record in one of the text formats"
+            path,
+            "the file is binary and no miniSEED: export the record in one of the text formats",
         )
     try:
         text = raw.decode("utf-8-sig")

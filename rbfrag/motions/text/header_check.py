@@ -31,6 +31,9 @@ DURATION_REFUSED, DURATION_NOTED = 0.05, 0.01
 PEAK_REFUSED, PEAK_NOTED = 1.8, 1.05
 """Factor between peaks."""
 
+FEWEST_COMPARED = 100
+"""Fewer samples may be equal by chance."""
+
 DOUBT = "header and samples: "
 """How a remark begins that says where the two disagree."""
 
@@ -52,10 +55,19 @@ def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[Par
     few = ""
     if components is not None and len(traces) < components:
         few = f"{DOUBT}the file holds {len(traces)} of the {components} components"
-    return [_agreed(file, trace, traces, few) for trace in traces]
+    return [_agreed(file, trace, traces, few or _copied(trace, traces)) for trace in traces]
 
 
-def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, few: str) -> ParsedTrace:
+def _copied(trace: ParsedTrace, traces: Traces) -> str:
+    # at rest all components are equal
+    compared = trace.values.size >= FEWEST_COMPARED and trace.values.any()
+    for other in traces if compared else ():
+        if other is not trace and np.array_equal(other.values, trace.values):
+            return f"{DOUBT}{trace.component} equals {other.component} in every sample: a copy"
+    return ""
+
+
+def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, doubt: str) -> ParsedTrace:
     dt, on_dt = _interval(file, trace, traces)
     missing = file.missing_samples(trace.count.at(dt), trace.values.size) if trace.count else ""
     if trace.times:
@@ -63,7 +75,7 @@ def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, few: str) -> P
     is_partial = trace.is_partial or bool(missing)
     # where samples are missing, the largest may be among them
     in_g, unit, on_unit = _unit(file, replace(trace, peak=None) if is_partial else trace)
-    further = (few, *on_dt, *on_unit, missing, trace.remark_if_partial if is_partial else "")
+    further = (doubt, *on_dt, *on_unit, missing, trace.remark_if_partial if is_partial else "")
     return replace(
         trace,
         dt_s=dt,

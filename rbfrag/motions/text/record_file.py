@@ -137,6 +137,7 @@ class RecordFile:
         dt_s: sampling interval that the caller states [s], or None.
         allow_partial: True to read a file whose header states another number of samples than
             follow; the motion is then marked as partial.
+        gain: counts/(m/s²) of a file in counts, of all its traces or by index; or None.
     """
 
     path: Path
@@ -144,6 +145,7 @@ class RecordFile:
     units: str | None = None
     dt_s: float | None = None
     allow_partial: bool = False
+    gain: float | Mapping[int, float] | None = None
 
     @cached_property
     def lines(self) -> list[str]:

@@ -1,0 +1,139 @@
+"""miniSEED 2 and 3: counts in binary records of one channel each, which pymseed unpacks.
+
+Neither unit nor gain is in the file: the StationXML of the station states the gain as the
+sensitivity of the channel [counts/(m/s²)]. Times of successive records prove the interval.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rbfrag.errors import MissingExtraError, UnitNotStatedError
+from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile
+
+FORMAT = "miniSEED"
+
+MOST_SAMPLES = 20_000_000
+"""Of all channels: a header may state more samples than any memory holds."""
+
+ACCELEROMETERS = "NLG"
+"""Instrument codes; L and G are those of older networks."""
+
+# sequence number, quality, station, ..., hour and minute, or the mark of version 3
+_HEAD = re.compile(r"MS\x03|[\d \0]{6}[DRQM][ \0][\w \0]{12}(?s:.{4})[\0-\x17][\0-\x3b]", re.ASCII)
+_SOURCE = re.compile(r"FDSN:(\w*)_(\w*)_(\w*)_(\w)_(\w)_(\w)", re.ASCII)
+
+recognises = _HEAD.match
+
+
+def parse(file: RecordFile) -> Iterator[ParsedTrace]:
+    """Yield the channels of a file, each in one segment; a character of the text is a byte."""
+    try:
+        import pymseed
+    except ImportError:
+        raise MissingExtraError("miniSEED needs pymseed", "mseed") from None
+    raw, remark = _whole_records(file, pymseed, file.text.encode("latin-1"))
+    try:
+        traces = pymseed.MS3TraceList.from_buffer(raw, unpack_data=True)
+    except pymseed.MiniSEEDError as error:
+        raise _damaged(file, error) from None
+    # libmseed only warns where the last sample is not the one that its record states
+    warnings = pymseed.get_error_messages()
+    if any("integrity" in each for each in warnings):
+        raise _damaged(file, warnings[0])
+    channels = [(each.sourceid, list(each)) for each in traces]
+    if not channels:
+        raise file.error("the file holds no samples: request the record again")
+    start = min(segments[0].starttime_str() for _, segments in channels)
+    stations = sorted({".".join(source.split("_")[:2]) for source, _ in channels})
+    several = f"the file holds channels of several stations: {', '.join(stations[:5])}"
+    for index, (source, segments) in enumerate(channels):
+        trace = _channel(file, index, source, segments, start[:19])
+        yield replace(
+            trace,
+            is_partial=bool(remark),
+            remark_if_partial=remark,
+            remarks=(*trace.remarks, several) if len(stations) > 1 else trace.remarks,
+        )
+
+
+def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, str]:
+    """The records that can be read, and a remark where others are left out."""
+    end = samples = 0
+    try:
+        for record in pymseed.MS3Record.from_buffer(raw):
+            end += record.reclen
+            samples += max(record.samplecnt, 0)
+            if samples > MOST_SAMPLES:
+                raise file.error(f"more than {MOST_SAMPLES} samples: request a shorter record")
+    except pymseed.MiniSEEDError as error:
+        if not (end and file.allow_partial):
+            raise _damaged(file, error) from None
+    if end < len(raw) and not file.allow_partial:
+        raise _damaged(file, f"{len(raw) - end} bytes at the end are no record")
+    return raw[:end], f"{len(raw) - end} bytes at the end are left out" if end < len(raw) else ""
+
+
+def _channel(
+    file: RecordFile, index: int, source: str, segments: list[Any], start: str
+) -> ParsedTrace:
+    codes = _SOURCE.fullmatch(source)
+    if codes is None:
+        raise file.error(f"the source {source!r} is no channel: request the record again")
+    network, station, location, *channel = codes.groups()
+    name = "".join(channel)
+    if channel[1] not in ACCELEROMETERS:
+        raise file.error(
+            f"{name} is no accelerometer's channel but, by its {channel[1]}, one of velocity or "
+            "another quantity: request the channels HN or EN of the station"
+        )
+    if len(segments) > 1:
+        gap = f"ends at {segments[0].endtime_str()} and goes on at {segments[1].starttime_str()}"
+        raise file.error(f"{name} has {len(segments)} segments: it {gap}; request it without gaps")
+    (segment,) = segments
+    if segment.sampletype not in {"i", "f", "d"} or segment.numsamples != segment.samplecnt:
+        raise file.error(f"{name} holds no samples, or not as many as its headers say")
+    counts = segment.np_datasamples.astype(np.float64)
+    offset = float(counts.mean())
+    return ParsedTrace(
+        counts - offset,
+        file.possible_dt(1.0 / segment.samprate, None),
+        HeaderField("m/s2", 1),
+        None,
+        name,
+        1.0 / _gain(file, index, name),
+        station=f"{network}.{station}",
+        recording=f"{network}.{station}.{location} {start}",
+        start=segment.starttime_str(),
+        is_corrected=False,
+        remarks=(
+            f"the mean of {offset:.6g} counts, the offset of the instrument, was subtracted; this "
+            "is no baseline correction",
+        ),
+    )
+
+
+def _gain(file: RecordFile, index: int, name: str) -> float:
+    gain = file.gain.get(index) if isinstance(file.gain, Mapping) else file.gain
+    if gain is None:
+        raise UnitNotStatedError(
+            file.path,
+            f"{name} is in counts, and its file states no gain: give it with gain, in "
+            "counts/(m/s2), the sensitivity that the StationXML of the station states",
+            fields=("gain",),
+        )
+    return gain
+
+
+def _damaged(file: RecordFile, trouble: object) -> Exception:
+    words = " ".join(str(trouble).split())[:150]
+    return file.error(
+        f"the file is truncated or damaged ({words}): request the record again, or read what "
+        "there is with allow_partial",
+        fields=("allow_partial",),
+    )
