@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
+from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
@@ -48,21 +49,24 @@ def blocks_at_sites(
     columns: Mapping[str, Any],
     *,
     site_chosen: bool = False,
+    within_km: float = WITHIN_KM,
 ) -> tuple[list[SiteBlocks], tuple[str, ...], dict[int, str]]:
     """Return the sites with their curves and blocks, what is to be said, and blocks without.
 
-    Blocks are joined by ``site_id`` where the table has it and the curves name their sites;
-    otherwise all blocks are taken at each site.
+    Blocks are joined as :func:`join_sites` does; a single one without a place is taken at each
+    site.
 
     Args:
         files: curves of each file, of one measure, one a site.
         site_chosen: one site of several was asked for: blocks of others are left out.
+        within_km: farthest distance from a block to its site [km].
 
     Returns:
         The sites, remarks, and by index the reasons of blocks of sites that have no curve.
 
     Raises:
-        InputError: files of other sites, or no block at any of them.
+        InputError: files of other sites, no block at any of them, or several blocks of which it is
+            not known at which of several sites they stand.
     """
     by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
     for curves in files:
@@ -78,37 +82,28 @@ def blocks_at_sites(
                 f"site {curves[0].place or 'without a name'} is in {len(curves)} of {len(files)} "
                 "files: give curves of the same sites"
             )
-    wanted = columns.get("site_id")
-    have = [curves[0].site for curves in by_site.values()]
-    has_ids = wanted is not None and any(wanted)
-    if wanted is None or not has_ids or not all(have):
-        everywhere = [SiteBlocks(tuple(curves), columns) for curves in by_site.values()]
-        remark = ""
-        if has_ids:
-            remark = "the curves do not name their sites: site_id of the blocks is not used"
-        elif len(columns["block_id"]) > 1 and len(have) > 1:
-            remark = (
-                "the blocks have no site_id: all of them are taken at each of the sites of the "
-                "curves"
-            )
-        return everywhere, (remark,) if remark else (), {}
-    known, shown = set(have), f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
-    missing = {
-        i: f"the block stands at site {str(name)!r}, of which there is no curve; there are {shown}"
-        for i, name in enumerate(wanted)
-        if name not in known
-    }
-    sites = []
-    for curves in by_site.values():
-        own = np.flatnonzero(wanted == curves[0].site)
-        if own.size:
-            here = {name: np.asarray(values)[own] for name, values in columns.items()}
-            sites.append(SiteBlocks(tuple(curves), here))
-    if not sites and not site_chosen and missing:
-        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
+    first = [curves[0] for curves in by_site.values()]
+    if len(columns["block_id"]) == 1 and not {"site_id", "lon"} & {*columns}:
+        # one block, or one class of blocks, is asked about at each site
+        return [SiteBlocks(tuple(curves), columns) for curves in by_site.values()], (), {}
+    places = [
+        (np.nan if c.lon is None else c.lon, np.nan if c.lat is None else c.lat) for c in first
+    ]
+    join = join_sites(columns, [c.site for c in first], places, within_km=within_km)
+    missing = join.reasons
+    order = np.argsort(join.site, kind="stable")
+    ends = np.searchsorted(join.site[order], np.arange(len(first) + 1))
+    by_order = {name: np.asarray(values)[order] for name, values in columns.items()}
+    sites = [
+        SiteBlocks(tuple(curves), {name: each[start:end] for name, each in by_order.items()})
+        for curves, start, end in zip(by_site.values(), ends[:-1], ends[1:], strict=True)
+        if end > start
+    ]
+    if not sites and site_chosen:
+        raise InputError(f"no block stands at site {', '.join(c.place for c in first)}")
     if not sites:
-        raise InputError(f"no block stands at site {', '.join(have)}")
-    remarks = ["blocks stand at the sites of the curves by their site_id"]
+        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
+    remarks = [*join.remarks]
     if missing and site_chosen:
         remarks.append(f"{len(missing)} blocks of other sites are left out")
     if len(sites) > 1:
