@@ -68,8 +68,9 @@ def losses(
             ruptures CSV), or None where `files` names them.
         blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: fields of blocks with
             ``site_id`` (text), or ``lon`` and ``lat`` [deg], and, if there are, ``block_id``,
-            ``kind``, ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a failure
-            counts, and its loss with it), ``loss`` (in the median) and ``loss_sigma`` (standard deviation of its logarithm).
+            ``kind``, ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a
+            failure counts, and its loss with it), ``loss`` (in the median) and ``loss_sigma``
+            (standard deviation of its logarithm).
         files: files by what they hold: gmf_data, events, sitemesh, realizations, ruptures.
         samples: samples of each event.
         expected: do without samples; then there are no curves of exceedance.
