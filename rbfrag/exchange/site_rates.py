@@ -50,7 +50,7 @@ def blocks_at_sites(
     *,
     site_chosen: bool = False,
     within_km: float = WITHIN_KM,
-) -> tuple[list[SiteBlocks], tuple[str, ...], dict[int, str]]:
+) -> tuple[list[SiteBlocks], tuple[str, ...], Mapping[int, str]]:
     """Return the sites with their curves and blocks, what is to be said, and blocks without.
 
     Blocks are joined as :func:`join_sites` does; a single one without a place is taken at each
