@@ -113,10 +113,10 @@ def _nearest(own: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], Floa
     """
     from scipy.spatial import cKDTree
 
-    chords, found = cKDTree(_unit_vectors(sites)).query(_unit_vectors(own), k=[1, 2])
+    chords, nearest = cKDTree(_unit_vectors(sites)).query(_unit_vectors(own), k=[1, 2])
     arcs = 2.0 * _EARTH_KM * np.arcsin(np.minimum(0.5 * chords, 1.0))
     # of one site there is no second
-    return np.asarray(found)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
+    return np.asarray(nearest)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
 
 
 def _unit_vectors(places: FloatArray) -> FloatArray:
