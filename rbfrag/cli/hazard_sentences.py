@@ -38,6 +38,11 @@ def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def place_in_words(lon: float, lat: float) -> str:
+    """Return a place of a longitude and latitude [deg] with letters in the place of signs."""
+    return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
+
+
 def most_often(names: Sequence[str | None], rates: Sequence[float], most: int = 3) -> str:
     """Return which of several blocks fail most often, the first of them, each with its rate.
 
@@ -58,7 +63,7 @@ def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:
         document: an answer of `rbfrag shakemap` under the keys of the JSON contract.
         own: blocks at places of their own, and not one at every node.
     """
-    place = f"{document['largest_at_lat']:.3f} N, {document['largest_at_lon']:.3f} E"
+    place = place_in_words(document["largest_at_lon"], document["largest_at_lat"])
     likely, places = document["places_above_1_percent"], document["places"]
     yield (
         f"{'A block' if own else 'Such a block'} topples with a probability of up to "

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows, Blocks
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
 from rbfrag.exchange.given_blocks import given_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
+from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.question.fields import AnsweringFields, V
@@ -46,6 +48,7 @@ def losses(
     seed: int = 0,
     imt: Sequence[str] = ("PGV",),
     component: str | None = None,
+    within_km: float = WITHIN_KM,
     run: Run | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     **question: Unpack[LossKeywords[ArrayLike | None]],
@@ -64,9 +67,10 @@ def losses(
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
             ruptures CSV), or None where `files` names them.
         blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: fields of blocks with
-            ``site_id`` (text), and, if there are, ``block_id``, ``kind``, ``count`` (like blocks,
-            each with an azimuth of its own), ``weight`` (what a failure counts, and its loss with
-            it), ``loss`` (in the median) and ``loss_sigma`` (standard deviation of its logarithm).
+            ``site_id`` (text), or ``lon`` and ``lat`` [deg], and, if there are, ``block_id``,
+            ``kind``, ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a
+            failure counts, and its loss with it), ``loss`` (in the median) and ``loss_sigma``
+            (standard deviation of its logarithm).
         files: files by what they hold: gmf_data, events, sitemesh, realizations, ruptures.
         samples: samples of each event.
         expected: do without samples; then there are no curves of exceedance.
@@ -75,6 +79,7 @@ def losses(
             independently by the engine, which a warning tells of.
         component: what the measures mean: single, geometric_mean, rotd50 or larger; None for
             single, with a warning. Its scatter is common to the blocks of one site and event.
+        within_km: farthest distance from a block to its site [km], where they are joined by place.
         run: does the parts of the work; None for this process.
         on_progress: called with the numbers of events done and of all.
         question: instead of a table the fields of blocks at the one site, with ``kind``, as
@@ -91,11 +96,13 @@ def losses(
         DatabaseError: the database cannot be read.
     """
     given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
-    rows = given_blocks(given, blocks, reads=PORTFOLIO, one_kind=False)
+    rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("single" if component is None else component)
     events = read_events(job, imts=imt, **lasted)
-    rows, models = _with_models(_at_sites(rows, events.site_ids), tuple(events.measures), answering)
+    rows, models = _with_models(
+        _at_sites(rows, events, within_km), tuple(events.measures), answering
+    )
     portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
         "the measures are taken as those of single components, which the models are fitted on; "
@@ -119,19 +126,17 @@ def losses(
     return replace(answer, refused=rows.refused_by_row())
 
 
-def _at_sites(rows: BlockRows, site_ids: Sequence[str]) -> BlockRows:
-    """Return the table without blocks of sites that the events do not have."""
-    if "site_id" not in rows.blocks:
-        return rows
-    names, sites = rows.blocks["site_id"], set(site_ids)
-    have = f"{', '.join(map(repr, site_ids[:5]))}{' …' if len(site_ids) > 5 else ''}"
-    return rows.without(
-        np.array([name not in sites for name in names], dtype=bool),
-        lambda i: (
-            f"the block stands at the site {names[i]!r}, which the event set does not have; its "
-            f"sites are {have} (identifiers are texts: '0012' is not 12)"
-        ),
+def _at_sites(rows: BlockRows, events: EventSet, within_km: float) -> BlockRows:
+    """Return the table with the sites of its blocks, without those that stand at none."""
+    blocks, names = rows.blocks, np.array(events.site_ids, dtype=object)
+    join = join_sites(blocks, events.site_ids, events.places, within_km=within_km, of="event")
+    ids = rows.columns.get("site_id", np.full(rows.reasons.size, "", dtype=object)).copy()
+    at_one = join.site >= 0
+    ids[blocks["row"][at_one]] = names[join.site[at_one]]
+    rows = replace(
+        rows, columns={**rows.columns, "site_id": ids}, remarks=(*rows.remarks, *join.remarks)
     )
+    return rows.without(~at_one, join.reasons.__getitem__)
 
 
 def _with_models(

@@ -299,6 +299,7 @@ def read_events(
     return EventSet(
         event_id, realization, year, event_weights(realization, weights, duration),
         sites, event, site, measures, duration, weights, tuple(remarks),
+        _places(heads["sitemesh"]),
     )  # fmt: skip
 
 
@@ -330,6 +331,14 @@ def _sites(head: _Head) -> tuple[str, ...]:
     if not ids:
         raise InputError(f"{head.path}: there is no site in the file")
     return tuple(ids)
+
+
+def _places(head: _Head) -> FloatArray | None:
+    """Return longitudes and latitudes of the sites [deg], shape (sites, 2); None without them."""
+    if not {"lon", "lat"} <= {*head.names}:
+        return None
+    columns = head.whole({"lon": float, "lat": float})
+    return np.column_stack([columns["lon"], columns["lat"]])
 
 
 def _weights(head: _Head) -> tuple[dict[int, float], list[str]]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
+from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
@@ -55,15 +56,17 @@ def blocks_at_sites(
     columns: Mapping[str, Any],
     *,
     site_chosen: bool = False,
+    within_km: float = WITHIN_KM,
 ) -> SitedBlocks:
     """Return which blocks stand at which sites of hazard curves.
 
-    Blocks are joined by ``site_id`` where the table has it and the curves name their sites. One
-    block without is asked about at each site.
+    Blocks are joined as :func:`join_sites` does; a single one without a place is asked about at
+    each site.
 
     Args:
         files: curves of each file, of one measure, one a site.
         site_chosen: one site of several was asked for: blocks of others are left out.
+        within_km: farthest distance from a block to its site [km].
 
     Raises:
         InputError: files of other sites, no block at any of them, or several blocks of which it is
@@ -84,41 +87,26 @@ def blocks_at_sites(
                 f"site {curves[0].place or 'without a name'} is in {len(curves)} of {len(files)} "
                 "files: give curves of the same sites"
             )
-    wanted, size = columns.get("site_id"), len(columns["kind"])
-    have = [curves[0].site for curves in sites]
-    has_ids = wanted is not None and any(wanted)
-    if wanted is None or not has_ids or not all(have):
-        remark = ("the curves do not name their sites: site_id of the blocks is not used",)
+    first, size = [curves[0] for curves in sites], len(columns["kind"])
+    if not {"site_id", "lon"} & {*columns}:
         if len(sites) == 1:
-            return SitedBlocks(
-                sites, columns, np.zeros(size, dtype=np.intp), remark if has_ids else ()
-            )
-        if size > 1:
-            raise InputError(
-                f"there are {size} blocks and curves of {len(sites)} sites, and it is not known "
-                f"which block stands where: give the blocks a column site_id with the names of "
-                "the curves' sites, or choose one site",
-                fields=("site",),
-            )
-        everywhere = {name: np.repeat(np.asarray(v), len(sites)) for name, v in columns.items()}
-        return SitedBlocks(sites, everywhere, np.arange(len(sites)))
-    shown = f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
-    places = {name: i for i, name in enumerate(have)}
-    site = np.array([places.get(name, -1) for name in wanted], dtype=np.intp)
-    missing = {
-        i: f"the block stands at site {str(wanted[i])!r}, of which there is no curve; there are "
-        f"{shown}"
-        for i in np.flatnonzero(site < 0).tolist()
-    }
-    own = np.flatnonzero(site >= 0)
-    if not own.size and not site_chosen:
-        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
+            return SitedBlocks(sites, columns, np.zeros(size, dtype=np.intp))
+        if size == 1:
+            everywhere = {name: np.repeat(np.asarray(v), len(sites)) for name, v in columns.items()}
+            return SitedBlocks(sites, everywhere, np.arange(len(sites)))
+    places = [
+        (np.nan if c.lon is None else c.lon, np.nan if c.lat is None else c.lat) for c in first
+    ]
+    join = join_sites(columns, [c.site for c in first], places, within_km=within_km)
+    missing, own = join.reasons, np.flatnonzero(join.site >= 0)
+    if not own.size and site_chosen:
+        raise InputError(f"no block stands at site {', '.join(c.place for c in first)}")
     if not own.size:
-        raise InputError(f"no block stands at site {', '.join(have)}")
-    remarks = ["blocks stand at the sites of the curves by their site_id"]
+        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
+    remarks = [*join.remarks]
     if missing and site_chosen:
         remarks.append(f"{len(missing)} blocks of other sites are left out")
-    used, site = np.unique(site[own], return_inverse=True)
+    used, site = np.unique(join.site[own], return_inverse=True)
     here = {name: np.asarray(values)[own] for name, values in columns.items()}
     return SitedBlocks(
         [sites[i] for i in used.tolist()], here, site, tuple(remarks),

@@ -220,6 +220,12 @@ def _numbers(value: Any, key: str, where: str) -> np.ndarray[Any, np.dtype[np.fl
 
 
 _LEVEL = re.compile(r"poe-(.+)")
+_NO_CURVES = {
+    r"[0-9.e-]+~.+": "uniform hazard spectra",
+    r"[A-Z].*-[0-9.]+(e-[0-9]+)?": "a hazard map",
+}
+"""Columns of what the engine exports beside curves: PROBABILITY~IMT and IMT-PROBABILITY."""
+
 _SITE_COLUMNS = ("lon", "lat", "depth", "custom_site_id", "site_id")
 
 
@@ -241,6 +247,8 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     """
     rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
+    if len(rows) > 1:
+        _refuse_maps([name.strip() for name in rows[1]], source)
     years = number_at(_stated("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
@@ -294,6 +302,19 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     if not curves:
         raise InputError(f"{source}: there is no site below line 2")
     return curves
+
+
+def _refuse_maps(names: Sequence[str], source: str) -> None:
+    """Refuse a hazard map and uniform hazard spectra, which have one level of each measure."""
+    if any(_LEVEL.fullmatch(name) for name in names):
+        return
+    for pattern, what in _NO_CURVES.items():
+        column = next((name for name in names if re.fullmatch(pattern, name)), None)
+        if column is not None:
+            raise InputError(
+                f"{source}, line 2: {column!r} is a column of {what}: single levels make no rate; "
+                "export the curves of that job instead:  oq export hcurves CALC_ID -e csv"
+            )
 
 
 def _stated(name: str, head: str, source: str, default: str | None = None) -> str:

@@ -59,6 +59,7 @@ class EventSet:
         duration: of each realization; None for a scenario.
         realization_weights: weights of the realizations, which sum to 1, by their numbers.
         warnings: what was noticed on reading.
+        places: longitudes and latitudes of the sites [deg], shape (sites, 2); None: not known.
     """
 
     event_id: IntArray
@@ -72,6 +73,7 @@ class EventSet:
     duration: Duration | None
     realization_weights: Mapping[int, float]
     warnings: tuple[str, ...] = ()
+    places: FloatArray | None = None
 
     @property
     def branch(self) -> IntArray:

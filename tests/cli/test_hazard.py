@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rbfrag
+from rbfrag.cli.hazard_sentences import place_in_words
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.hazards.answer import counted
@@ -173,6 +174,49 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
     assert "stands at site '12', of which there is no curve" in told
     unnamed = shell.json("hazard", curve, "--blocks", "blocks.csv")
     assert any("site_id of the blocks is not used" in text for text in unnamed["warnings"])
+
+
+def test_blocks_stand_at_the_nearest_site_by_place(
+    shell: Shell, logic_tree: Path, formats_dir: Path
+) -> None:
+    """What a place tells is what the identifier of that site tells, for curves and events alike."""
+    mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
+    events = formats_dir / "openquake_event_based" / "one_realization"
+    with (events / "sitemesh_1.csv").open() as file:
+        sites = list(csv.DictReader(list(file)[1:]))[:3]
+    by_id = [f"B{i},3,0.1,{one['custom_site_id']}" for i, one in enumerate(sites)]
+    by_place = [
+        f"B{i},3,0.1,{float(one['lon']) + 0.0004},{one['lat']}" for i, one in enumerate(sites)
+    ]
+    Path("id.csv").write_text("\n".join(["block_id,p2_1_s2,kr,site_id", *by_id]))
+    Path("place.csv").write_text(
+        "\n".join(["block_id,p2_1_s2,kr,lon,lat", *by_place, "F,3,.1,0,0"])
+    )
+    for command in (("hazard", mean), ("losses", events, "--expected")):
+        rates = []
+        for table in ("id.csv", "place.csv"):
+            found = shell.json(*command, "--blocks", table, "--component", "rotd50")
+            blocks = found.get("blocks") or found["answers"]
+            rates.append(
+                {
+                    row["block_id"]: row.get("annual_rate", row.get("average_annual_failures"))
+                    for row in blocks
+                }
+            )
+        assert any("at the nearest sites" in text for text in found["warnings"])
+        assert any("within_km is 5" in str(row.get("reason")) for row in blocks)
+        assert rates[1].pop("F") is None
+        assert rates[1] == pytest.approx(rates[0], rel=1e-12)
+        told = shell(*command, "--blocks", "place.csv", "--within-km", "0.001", expect=2).stderr
+        assert "km away" in told
+    Path("nowhere.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,3,0.1\n")
+    told = shell("hazard", mean, "--blocks", "nowhere.csv", expect=2).stderr
+    assert "nothing tells at which of them 2 of 2 blocks stand" in told
+
+
+def test_places_have_letters_for_signs() -> None:
+    assert place_in_words(-122.005, 37.1) == "37.100 N, 122.005 W"
+    assert place_in_words(174.79, -41.3) == "41.300 S, 174.790 E"
 
 
 def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree: Path) -> None:

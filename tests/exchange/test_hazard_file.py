@@ -150,3 +150,19 @@ def test_no_such_file_and_no_text(tmp_path: Path) -> None:
         read_hazard_curves(tmp_path / "b.csv")
     with pytest.raises(InputError, match="folder"):
         read_hazard_curves(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "what"),
+    [
+        ("PGA-0.1,SA(1.0)-0.02", "a hazard map"),
+        ("0.100000~PGA,0.100000~SA(1.0)", "uniform hazard spectra"),
+    ],
+)
+def test_maps_and_spectra_are_no_curves(tmp_path: Path, columns: str, what: str) -> None:
+    """The names of columns are those of the engine's `hmap_dt` and `uhs_dt`."""
+    path = tmp_path / "hazard_map-mean_7.csv"
+    head = "#,,,\"generated_by='OpenQuake engine 3.26.2', kind='mean', investigation_time=50.0\""
+    path.write_text(f"{head}\nlon,lat,{columns}\n174.0,-41.0,0.1,0.2\n")
+    with pytest.raises(InputError, match=f"is a column of {what}.*oq export hcurves"):
+        read_hazard_curves(path)

@@ -333,11 +333,11 @@ def test_blocks_that_nothing_shakes(job: Path) -> None:
 
 
 def test_blocks_that_cannot_be_placed(job: Path) -> None:
-    with pytest.raises(InputError, match=r"row 1: .* at the site '12'.*'0012' is not 12"):
+    with pytest.raises(InputError, match=r"row 1: .* at site '12'.*'0012' is not 12"):
         answered(job, table([0.4], "12"))
     blocks = table([0.4], "0012")
     del blocks["site_id"]
-    with pytest.raises(InputError, match="no column site_id, and there are 3 sites"):
+    with pytest.raises(InputError, match="there are 3 sites, and nothing tells"):
         answered(job, blocks)
     with pytest.raises(InputError, match="samples = -1"):
         answered(job, table([0.4], "0012"), samples=-1)

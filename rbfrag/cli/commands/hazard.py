@@ -57,6 +57,7 @@ class RateOptions:
     joint: bool = option(
         "Count earthquakes in which any of several blocks of a site fails, too.", False
     )
+    within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
     at_least: str | None = option(
         "Numbers of failures in one earthquake whose rates are wanted, as 1,5,20, with --joint. "
         "Default: 1, 2, 5, 10, …",
@@ -100,15 +101,16 @@ def hazard(
     """Print the annual rate at which a block topples.
 
     The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. Blocks of --blocks stand at the curves' sites by site_id. With --joint it gives how
-    often an earthquake fails at least one block of a site, or more, by what the model knows of
-    blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are answered,
-    each by a model of that very measure; another needs --convert. With --weights curves
+    follows. Blocks of --blocks stand at the curves' sites by site_id, or at the nearest by lon and
+    lat. With --joint it gives how often an earthquake fails at least one block of a site, or more,
+    by what the model knows of blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are
+    answered, each by a model of that very measure; another needs --convert. With --weights curves
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """
     import numpy as np
 
+    from rbfrag.exchange.block_rows import PLACE
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
     from rbfrag.fragility.unusable import FROM_SUMS
     from rbfrag.hazards.answer import hazard_at_sites
@@ -118,9 +120,11 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    table, is_class, remarks, rows = blocks.given_blocks(given)
+    table, is_class, remarks, rows = blocks.given_blocks(given, reads=PLACE)
     files = [suited_in(path, **vars(meaning)) for path in curve]
-    at = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
+    at = blocks_at_sites(
+        files, table, site_chosen=meaning.site is not None, within_km=wanted.within_km
+    )
     if rows is not None:
         of_none = np.isin(np.arange(rows.blocks["row"].size), [*at.missing])
         rows = rows.without(of_none, at.missing.__getitem__)

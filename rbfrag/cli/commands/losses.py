@@ -101,11 +101,12 @@ class LossTable:
 
     blocks: str = option(
         "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
-        "width_m [m], site_id, and if wanted count, weight, loss, loss_sigma, kind.",
+        "width_m [m], site_id or lon and lat, and if wanted count, weight, loss, loss_sigma, kind.",
         ...,
         metavar="FILE",
     )
     sheet: str | None = option(options.SHEET, metavar="NAME")
+    within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
 
 
 @stacked
@@ -130,25 +131,27 @@ def losses(
 ) -> None:
     """Count failures and losses in the earthquakes of an event set.
 
-    The event set is that of an OpenQuake job, event-based or scenario. Blocks join it by site_id.
+    The event set is that of an OpenQuake job, event-based or scenario. Blocks join it by site_id,
+    or by lon and lat.
     Each event counts weight(realization)/(investigation time x event sets) a year; a scenario has
     no rate, and its answer is given the event. What the blocks of one event do together is drawn
     by the model's dependence: what the earthquake shares, what a site shares, what each block has.
     The answer is the same for any number of workers.
     """
-    from rbfrag.exchange.block_rows import PORTFOLIO, read_blocks
+    from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, read_blocks
     from rbfrag.exchange.event_losses import losses as answered
     from rbfrag.hazards.event_counts import count_part
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    rows = read_blocks(table.blocks, meaning.kind, reads=PORTFOLIO, sheet=table.sheet)
+    rows = read_blocks(table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet)
     with ProgressBar("losses", "events") as bar:
         answer = answered(
             folder, rows, files=files.named(), samples=sampling.samples,
             expected=sampling.expected, seed=sampling.seed,
             investigation_time=time.investigation_time, ses=time.ses,
             imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,
-            **answering, run=workers.runner(count_part), on_progress=bar.show,
+            within_km=table.within_km, **answering, run=workers.runner(count_part),
+            on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)

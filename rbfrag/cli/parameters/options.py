@@ -146,6 +146,14 @@ class Direction:
         return "reverse" if self.reverse else "forward"
 
 
+WITHIN_KM = 5.0
+"""Default of the distance of blocks to sites [km], as `rbfrag.exchange.site_join` has it."""
+
+WITHIN_HELP = (
+    "Farthest distance from a block to the nearest site, where lon and lat join them [km]."
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Curve:
     """What a hazard curve means."""

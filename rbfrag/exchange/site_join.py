@@ -1,0 +1,148 @@
+"""Which block stands at which site of hazard curves or events: by name, or by place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.solver.results import FloatArray
+
+WITHIN_KM = 5.0
+"""Farthest distance from a block to its site [km], where nothing else is stated."""
+
+_EARTH_KM = 6371.0
+_NEARLY = 1.1
+"""A second site at up to this many times the distance of the first may be meant as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class SiteJoin:
+    """The sites of some blocks.
+
+    Args:
+        site: index of each block's site, -1 of one that stands at none, shape (n,).
+        reasons: why those stand at none, by their index.
+        remarks: how the others are joined, and what is doubtful of it.
+    """
+
+    site: NDArray[np.intp]
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def join_sites(
+    columns: Mapping[str, Any],
+    names: Sequence[str],
+    places: ArrayLike | None,
+    *,
+    within_km: float = WITHIN_KM,
+    of: str = "curve",
+) -> SiteJoin:
+    """Return at which site each block of a table stands.
+
+    A block that states ``site_id`` stands at the site of that name, where the sites have names; any
+    other at the nearest site by ``lon`` and ``lat``; blocks of which neither is known at the one
+    site there is.
+
+    Args:
+        columns: ``block_id`` of n blocks, and, if there are, ``site_id``, and ``lon`` and ``lat``
+            [deg].
+        names: names of the s sites, empty texts where they have none.
+        places: longitudes and latitudes of the sites [deg], shape (s, 2); NaN or None: not known.
+        within_km: farthest distance from a block to its site [km].
+        of: what there is of the sites, for messages.
+
+    Raises:
+        InputError: the distance is none, or there are several sites and nothing tells at which of
+            them a block stands.
+    """
+    if not 0.0 < within_km < np.inf:
+        raise InputError(f"within_km = {within_km:g}: give km above zero", fields=("within_km",))
+    n, count = len(columns["block_id"]), len(names)
+    ids = np.asarray(columns.get("site_id", [""] * n), dtype=object)
+    stated = np.array([bool(one) for one in ids.tolist()], dtype=np.bool_)
+    by_name = stated if all(names) else np.zeros(n, dtype=np.bool_)
+    site, reasons, remarks = np.zeros(n, dtype=np.intp), {}, []
+    if stated.any() and not all(names):
+        remarks.append(f"the {of}s do not name their sites: site_id of the blocks is not used")
+    if by_name.any():
+        index = {name: i for i, name in enumerate(names)}
+        site[by_name] = [index.get(str(one), -1) for one in ids[by_name].tolist()]
+        shown = f"{', '.join(map(repr, names[:5]))}{' …' if count > 5 else ''}"
+        for i in np.flatnonzero(site < 0).tolist():
+            reasons[i] = (
+                f"the block stands at site {str(ids[i])!r}, of which there is no {of}; there are "
+                f"{shown} (names are texts: '0012' is not 12)"
+            )
+        remarks.append(f"blocks stand at the sites of the {of}s by their site_id")
+    rest = np.flatnonzero(~by_name)
+    known = None if places is None else np.asarray(places, dtype=np.float64).reshape(count, 2)
+    if not rest.size:
+        return SiteJoin(site, reasons, tuple(remarks))
+    if "lon" in columns and known is not None and np.isfinite(known).all():
+        own = np.column_stack([np.asarray(columns[name])[rest] for name in ("lon", "lat")])
+        nearest, distance = _nearest(own, known)
+        far = distance[:, 0] > within_km
+        site[rest] = np.where(far, -1, nearest)
+        for k in np.flatnonzero(far).tolist():
+            i = nearest[k]
+            reasons[int(rest[k])] = (
+                f"the nearest site, {_in_words(names[i], known[i])}, is {distance[k, 0]:.3g} km "
+                f"away: within_km is {within_km:g}"
+            )
+        remarks += _of_distances(columns["block_id"], rest[~far], distance[~far])
+    elif count > 1:
+        raise InputError(
+            f"there are {count} sites, and nothing tells at which of them "
+            f"{rest.size} of {n} blocks stand: give the blocks a column site_id with the names of "
+            "sites, or columns lon and lat where the sites have places, or files of one site",
+            fields=("site_id", "lon", "lat"),
+        )
+    return SiteJoin(site, reasons, tuple(remarks))
+
+
+def _nearest(own: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the nearest site of each place, and the distances of it and of the second [km].
+
+    Chords between unit vectors order as arcs do, and know neither the date line nor the poles.
+    """
+    from scipy.spatial import cKDTree
+
+    chords, nearest = cKDTree(_unit_vectors(sites)).query(_unit_vectors(own), k=[1, 2])
+    arcs = 2.0 * _EARTH_KM * np.arcsin(np.minimum(0.5 * chords, 1.0))
+    # of one site there is no second
+    return np.asarray(nearest)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
+
+
+def _unit_vectors(places: FloatArray) -> FloatArray:
+    lon, lat = np.radians(places.T)
+    return np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+
+
+def _in_words(name: str, place: FloatArray) -> str:
+    where = f"lon {place[0]:g}, lat {place[1]:g}"
+    return f"{name!r} ({where})" if name else where
+
+
+def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) -> list[str]:
+    """Return how far blocks stand from their sites, and of which another is nearly as near."""
+    if not used.size:
+        return []
+    texts = [
+        "blocks stand at the nearest sites by their lon and lat, at most "
+        f"{distance[:, 0].max():.2g} km away"
+    ]
+    doubtful = np.flatnonzero(distance[:, 1] <= _NEARLY * distance[:, 0])
+    if doubtful.size:
+        i = int(doubtful[0])
+        first, second = distance[i].tolist()
+        texts.append(
+            f"{doubtful.size:,} of {used.size:,} blocks are nearly as near (10 %) to a second "
+            f"site, such as block {block_ids[used[i]]}: {first:.3g} and {second:.3g} km"
+        )
+    return texts
