@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
+from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.solver.kinds import mode_of_kind
@@ -160,16 +161,30 @@ def answer_given(
     if not given.keys() >= {*model.method.block.names}:
         check_numbers(model.kind, model.method.block, given)
     quantiles = quantiles_of(checked_level(level))
+    # Kept apart: most questions are about certain blocks and shaking, and need no more.
+    certain, scatter = model, None
+    if not ABOUT_SCATTER.isdisjoint(given):
+        from rbfrag.fragility.shaking import Scatter, ShakenModel
+
+        scatter, given = Scatter.of(model.term, given)
     if weights is not None:
         from rbfrag.fragility.uncertain import drawn_model
 
-        model, given = drawn_model(model, given, weights)
+        model, given = drawn_model(certain, given, weights)
     elif not model.method.block.sigmas.keys().isdisjoint(given):
-        # Kept apart: most questions are about certain blocks, and need no numpy.
         from rbfrag.fragility.uncertain import uncertain_model
 
-        model, given = uncertain_model(model, given)
+        model, given = uncertain_model(certain, given)
     singles = single_numbers(given)
+    if scatter is not None:
+        if model is certain and singles is not None and scatter.single:
+            model = ShakenModel.over(certain, scatter)
+        else:
+            from rbfrag.fragility.shaking_points import ShakingPoints
+            from rbfrag.fragility.uncertain import UncertainModel
+
+            points = ShakingPoints(certain, scatter)
+            model = UncertainModel.over(certain, getattr(model, "possible", None), points)
     if singles is not None:
         return _answer_single(model, singles, quantiles)
     # Kept apart so that single numbers do not load numpy.

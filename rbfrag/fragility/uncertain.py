@@ -1,6 +1,6 @@
-"""Blocks that are not known exactly: the probability over all that one may be.
+"""Blocks and shaking that are not known exactly: the probability over all that they may be.
 
-P = Σ w_i F(eta_i) over what the block may be. The interval is that of the sum: the slope of the sum
+P = Σ w_i F(eta_i) over the product of what the block and what the shaking may be. The interval is that of the sum: the slope of the sum
 by each parameter is Σ w_i F'(eta_i) x_i, one step of the parameters moves all blocks together, and
 the ends are taken on eta as those of a certain block. For a lognormal fragility and a lognormal
 strength all of it is exact: the variances add up.
@@ -21,6 +21,7 @@ from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 
@@ -60,7 +61,7 @@ class Possible(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class BlockScatter:
     """Strength and size lognormal about medians, fractions normal cut at 0 and 1; independent.
 
     Args:
@@ -73,7 +74,7 @@ class Scatter:
     weight: FloatArray
 
     @classmethod
-    def of(cls, block: BlockParameters, sigmas: Iterator[str]) -> Scatter:
+    def of(cls, block: BlockParameters, sigmas: Iterator[str]) -> BlockScatter:
         """Return the points for what is uncertain of a block, a product of steps.
 
         Args:
@@ -128,21 +129,39 @@ class Draws:
         return result
 
 
+@dataclass(frozen=True, eq=False)
+class _Certain:
+    """One block, as it is given."""
+
+    weight: FloatArray = field(default_factory=lambda: np.ones(1))
+
+    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return nothing: no value changes."""
+        del given
+        return {}
+
+
 @dataclass(frozen=True)
 class UncertainModel(FragilityModel):
-    """A fitted model that answers for blocks that are not known exactly."""
+    """A fitted model that answers for blocks and shaking that are not known exactly."""
 
     possible: Possible = field(kw_only=True)
+    points: ShakingPoints | None = field(kw_only=True, default=None)
 
     @classmethod
-    def over(cls, model: FragilityModel, possible: Possible) -> UncertainModel:
-        """Return a model that answers for all that a block may be."""
+    def over(
+        cls,
+        model: FragilityModel,
+        possible: Possible | None = None,
+        points: ShakingPoints | None = None,
+    ) -> UncertainModel:
+        """Return a model that answers for all that a block may be, and its shaking."""
         own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
-        return cls(**own, possible=possible)
+        return cls(**own, possible=_Certain() if possible is None else possible, points=points)
 
     @property
     def uncertain(self) -> bool:
-        """Whether it answers for uncertain blocks."""
+        """Whether it answers for what is not known exactly."""
         return True
 
     def bounds(self, given: Any) -> tuple[Bound, ...]:
@@ -161,7 +180,8 @@ class UncertainModel(FragilityModel):
         del values  # they are those of the medians
         columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in given.items()}
         size = max(column.size for column in columns.values())
-        step = max(1, _AT_ONCE // self.possible.weight.size)
+        each = self.possible.weight.size * (1 if self.points is None else self.points.weight.size)
+        step = max(1, _AT_ONCE // each)
         parts = []
         with np.errstate(all="ignore"):
             for start in range(0, size, step):
@@ -173,49 +193,56 @@ class UncertainModel(FragilityModel):
         return Answer(*rows)
 
     def _part(
-        self, given: Mapping[str, FloatArray], quantiles: Quantiles | None, size: int
+        self,
+        given: Mapping[str, FloatArray],
+        quantiles: Quantiles | None,
+        size: int,
     ) -> Answer:
         """Return the answer for so many questions at once."""
-        ns, weight = arrays(), self.possible.weight
-        blocks = {**given, **self.possible.blocks(given)}
-        values = self.method.block.completed(blocks, self.term, ns)
+        ns, of_block, points = arrays(), self.possible.weight, self.points
+        # blocks, shaking and questions are the three axes
+        values: dict[str, Any] = {name: value[None, None] for name, value in given.items()}
+        values |= {name: each[:, None] for name, each in self.possible.blocks(given).items()}
+        weight = of_block[:, None]
+        if points is not None:
+            weight = weight * points.weight
+            values |= {name: each[None] for name, each in points.measures(given).items()}
+        values = self.method.block.completed(values, self.term, ns)
         unscaled, h = self.form.unscaled(self.parameters, values, ns)
-        eta = np.broadcast_to(unscaled.eta * h, (weight.size, size))
-        forbidden = np.zeros(eta.shape, dtype=np.bool_)
+        shape = (*weight.shape, size)
+        eta = np.broadcast_to(unscaled.eta * h, shape)
+        forbidden = np.zeros(shape, dtype=np.bool_)
         for bound in FragilityModel.bounds(self, values):
             forbidden |= bound.holds(values)
         link = self.method.link
         p = np.where(forbidden, 0.0, link.probability(eta, ns))
-        middle = weight @ p
-        answer = Answer(
-            middle, None, None, None, None,
-            block_sd=np.sqrt(weight @ np.square(p - middle)),
-            outside=weight @ self._outside(values, eta.shape),
-        )  # fmt: skip
+
+        def mean(of: FloatArray) -> FloatArray:
+            return np.tensordot(weight, np.broadcast_to(of, shape), 2)
+
+        middle = mean(p)
+        outside = self.lies_outside(values, ns)
+        if points is None:
+            block_sd = np.sqrt(of_block @ np.square(p[:, 0] - middle))
+            outside = mean(outside)
+        else:  # of low shaking, which fails nothing, nothing is to be said
+            outside = mean(p * outside) / np.where(middle > 0.0, middle, 1.0)
+            each = np.einsum("s,bsn->bn", points.weight, p)
+            block_sd = np.sqrt(of_block @ np.square(each - middle)) if of_block.size > 1 else None
+        answer = Answer(middle, None, None, None, None, block_sd, outside)
         if quantiles is None:
             return answer
         # d(mean P) by each parameter over F' at the mean: slopes of the eta that has the mean P
-        share = weight[:, None] * np.where(forbidden, 0.0, link.density(eta, ns) * h)
+        share = weight[..., None] * np.where(forbidden, 0.0, link.density(eta, ns) * h)
         decided = (middle <= 0.0) | (middle >= 1.0)
         at = link.quantile(np.where(decided, 0.5, middle), ns)
         per = np.where(decided, 0.0, 1.0 / link.density(at, ns))
-        slopes = [np.nansum(share * slope, axis=0) * per for slope in unscaled.slopes]
+        slopes = [np.nansum(share * slope, axis=(0, 1)) * per for slope in unscaled.slopes]
         reach = self.errors.half_width(slopes, quantiles, ns)
         low, high = (
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
         return answer._replace(low=low, high=high)
-
-    def _outside(self, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
-        """Return where a block that it may be lies outside the ranges that were fitted."""
-        values = self.with_ratios(values)
-        inside = np.ones(shape, dtype=np.bool_)
-        for name, (low, high) in self.row.domain.items():
-            if name in values:
-                inside &= (values[name] >= low * (1.0 - 1e-9)) & (values[name] <= high * (1 + 1e-9))
-        if self.spread is not None:
-            inside &= self.spread.holds(values, arrays())
-        return np.where(inside, 0.0, 1.0)
 
 
 def drawn_model(
@@ -283,4 +310,4 @@ def uncertain_model(
     own = [sigma for sigma in sigmas if sigma in rest]
     if not own:
         return model, rest
-    return UncertainModel.over(model, Scatter.of(model.method.block, iter(own))), rest
+    return UncertainModel.over(model, BlockScatter.of(model.method.block, iter(own))), rest
