@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,19 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.shaking import POINTS, WEIGHTS, Scatter, correlation
 from rbfrag.solver.results import FloatArray
 
-SECOND, ALONG = np.arange(-4.0, 5.0), 1.5 * np.arange(-2.0, 3.0)
-"""Points of the second measure given the first, and of the direction in which eta moves most once
-both are known."""
+SECOND, BESIDE_OTHERS = np.arange(-4.0, 5.0), 1.2 * np.arange(-3.0, 4.0)
+"""Points of a second measure given the first, and where there are more than two."""
 
-_LEAST_WEIGHT = 1e-11
+ALONG = 1.5 * np.arange(-2.0, 3.0)
+"""Points of the direction in which eta moves most once two measures are known."""
 
 _PROBED = 2.4
 """Where along the first measure that direction is looked for."""
+
+
+def correlations(names: tuple[str, ...]) -> FloatArray:
+    """Return the matrix of :func:`~rbfrag.fragility.shaking.correlation` of some measures."""
+    return np.array([[correlation(one, other) for other in names] for one in names])
 
 
 class ShakingPoints:
@@ -45,38 +49,59 @@ class ShakingPoints:
         self._model, self._scatter, self._above = model, scatter, above
 
     @cached_property
-    def _scores(self) -> tuple[FloatArray, FloatArray]:
-        """Standard normal scores, shape (points, k), and their weights."""
-        k = len(self._scatter.names)
-        axes = [np.array(POINTS), SECOND, ALONG][:k]
-        weight = np.array(WEIGHTS)
-        for axis in axes[1:]:
-            density = np.exp(-0.5 * axis * axis)
-            weight = np.outer(weight, density / density.sum()).ravel()
-        some = (weight > _LEAST_WEIGHT) & (np.repeat(axes[0], weight.size // 41) > self._above)
-        grid = [axis.ravel()[some] for axis in np.meshgrid(*axes, indexing="ij")]
-        scores = np.column_stack([*grid, *[np.zeros(grid[0].size)] * (k - len(axes))])
+    def _axes(self) -> list[FloatArray]:
+        """Scores of the axes."""
+        k, first = len(self._scatter.names), np.array(POINTS)
+        second = SECOND if k == 2 else BESIDE_OTHERS
+        return [first[first > self._above], second, ALONG][:k]
+
+    @cached_property
+    def _scores(self) -> list[FloatArray]:
+        """Scores by which each measure moves, shape of the axes that it depends on, and (k,)."""
+        k, axes = len(self._scatter.names), self._axes
+        scores = [
+            np.stack(np.meshgrid(*axes[: i + 1], indexing="ij"), axis=-1) for i in range(len(axes))
+        ]
         if k > len(axes):
             # Kronecker's sequence of the generalised golden ratio: x^(d+1) = x + 1 (Roberts 2018)
-            d, ratio = k - len(axes), 1.5
+            d, ratio, last = k - len(axes), 1.5, scores[-1]
             for _ in range(60):
                 ratio = (1.0 + ratio) ** (1.0 / (d + 1.0))
             steps = ratio ** -np.arange(1.0, d + 1.0)
-            uniform = (0.5 + np.outer(np.arange(1.0, len(scores) + 1.0), steps)) % 1.0
-            scores[:, len(axes) :] = arrays().ndtri(uniform)
-        return scores, weight[some]
+            uniform = (0.5 + np.outer(np.arange(1.0, last[..., 0].size + 1.0), steps)) % 1.0
+            rest = arrays().ndtri(uniform).reshape(*last.shape[:-1], d)
+            scores += [np.concatenate([last, rest], axis=-1)] * d
+            scores[2] = scores[-1]
+        return scores
 
-    @property
+    @cached_property
     def weight(self) -> FloatArray:
-        """Weights of the points, shape (points,)."""
-        return self._scores[1]
+        """Weights of the points, the shape of the axes."""
+        result = np.array(WEIGHTS)[-self._axes[0].size :]
+        for axis in self._axes[1:]:
+            density = np.exp(-0.5 * axis * axis)
+            result = np.multiply.outer(result, density / density.sum())
+        return result
 
-    def measures(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the measures that scatter, shape (points, n), for what is given, shape (n,)."""
-        factors = self._factors(given)
-        if factors.shape[1] > 3:
-            factors = self._turned(given, factors)
-        return self._at(given, factors, self._scores[0])
+    def factors(self, given: Mapping[str, FloatArray]) -> FloatArray:
+        """Return what scores of the measures are multiplied by, shape (n, k, k)."""
+        factors = self._lower(given)
+        return self._turned(given, factors) if factors.shape[1] > 3 else factors
+
+    def measures(
+        self, given: Mapping[str, FloatArray], factors: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Return the measures that scatter, the shape of the axes and (n,).
+
+        Args:
+            given: the question, shape (n,) each.
+            factors: what :meth:`factors` gave for it.
+        """
+        result, axes = {}, len(self._axes)
+        for i, (name, scores) in enumerate(zip(self._scatter.names, self._scores, strict=True)):
+            moved = given[name] * np.exp(scores @ factors[:, i, : scores.shape[-1]].T)
+            result[name] = moved[(*[slice(None)] * (moved.ndim - 1), *[None] * (axes + 1 - moved.ndim))]
+        return result
 
     def _at(
         self, given: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
@@ -89,29 +114,30 @@ class ShakingPoints:
     def _eta(
         self, given: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return eta at some scores, shape (scores, n), and what mechanics forbids of it."""
+        """Return eta at some scores, shape (scores, n), and where mechanics forbids failure."""
         ns, model = arrays(), self._model
         values: dict[str, Any] = {**given, **self._at(given, factors, scores)}
         values = model.method.block.completed(values, model.term, ns)
         unscaled, h = model.form.unscaled(model.parameters, values, ns)
-        shape = len(scores), len(factors)
-        forbidden = np.zeros(shape, dtype=np.bool_)
+        eta, forbidden = unscaled.eta * h, np.zeros(1, dtype=np.bool_)
         for bound in model.bounds(values):
-            forbidden |= bound.holds(values)
-        return np.broadcast_to(unscaled.eta * h, shape), forbidden
+            forbidden = forbidden | bound.holds(values)
+        return eta, forbidden
 
     def fails_at(self, given: Mapping[str, FloatArray], score: float, least: float) -> Any:
         """Return where P exceeds some least value at a score of the first measure, shape (n,)."""
         k = len(self._scatter.names)
-        others = np.array(list(product((-3.0, 0.0, 3.0), repeat=k - 1))).reshape(-1, k - 1)
-        scores = np.column_stack([np.full(len(others), score), others])
+        scores = np.zeros((2 * k - 1, k))  # all at their medians, and each by itself off it
+        scores[:, 0] = score
+        for i in range(1, k):
+            scores[2 * i - 1 : 2 * i + 1, i] = (-3.0, 3.0)
         with np.errstate(all="ignore"):
-            eta, forbidden = self._eta(given, self._factors(given), scores)
+            eta, forbidden = self._eta(given, self._lower(given), scores)
             # P rises with eta: one link is enough
             best = np.where(forbidden, -np.inf, np.nan_to_num(eta, nan=np.inf)).max(axis=0)
             return self._model.method.link.probability(best, arrays()) > least
 
-    def _factors(self, given: Mapping[str, FloatArray]) -> FloatArray:
+    def _lower(self, given: Mapping[str, FloatArray]) -> FloatArray:
         """Return lower factors of the covariances of the logarithms, shape (n, k, k)."""
         names, scatter = self._scatter.names, self._scatter
         own, shared = (

@@ -31,7 +31,7 @@ REACH = 5.5
 STRENGTH_POINTS, OTHER_POINTS = 65, 33
 """Points of the strength, in which P is steepest, and of what else is uncertain."""
 
-_AT_ONCE = 1 << 16
+_AT_ONCE = 1 << 15
 
 
 def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray]:
@@ -143,10 +143,17 @@ class _Certain:
 
 @dataclass(frozen=True)
 class UncertainModel(FragilityModel):
-    """A fitted model that answers for blocks and shaking that are not known exactly."""
+    """A fitted model that answers for blocks and shaking that are not known exactly.
+
+    Args:
+        possible: what the block may be.
+        points: what the shaking may be; None where it is certain.
+        judged: whether it is asked how much lies outside the ranges that were fitted.
+    """
 
     possible: Possible = field(kw_only=True)
     points: ShakingPoints | None = field(kw_only=True, default=None)
+    judged: bool = field(kw_only=True, default=True)
 
     @classmethod
     def over(
@@ -154,10 +161,13 @@ class UncertainModel(FragilityModel):
         model: FragilityModel,
         possible: Possible | None = None,
         points: ShakingPoints | None = None,
+        *,
+        judged: bool = True,
     ) -> UncertainModel:
         """Return a model that answers for all that a block may be, and its shaking."""
         own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
-        return cls(**own, possible=_Certain() if possible is None else possible, points=points)
+        some = _Certain() if possible is None else possible
+        return cls(**own, possible=some, points=points, judged=judged)
 
     @property
     def uncertain(self) -> bool:
@@ -180,13 +190,17 @@ class UncertainModel(FragilityModel):
         del values  # they are those of the medians
         columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in given.items()}
         size = max(column.size for column in columns.values())
-        each = self.possible.weight.size * (1 if self.points is None else self.points.weight.size)
-        step = max(1, _AT_ONCE // each)
+        each, points, factors = self.possible.weight.size, self.points, np.empty(0)
         parts = []
         with np.errstate(all="ignore"):
+            if points is not None:
+                each *= points.weight.size
+                factors = points.factors(columns)
+            step = max(1, _AT_ONCE // each)
             for start in range(0, size, step):
                 own = {n: c if c.size == 1 else c[start : start + step] for n, c in columns.items()}
-                parts.append(self._part(own, quantiles, min(step, size - start)))
+                of_these = factors if len(factors) <= 1 else factors[start : start + step]
+                parts.append(self._part(own, of_these, quantiles, min(step, size - start)))
         rows = [None if row[0] is None else np.concatenate(row) for row in zip(*parts, strict=True)]
         if ns is SINGLE:
             return Answer(*(None if row is None else float(row[0]) for row in rows))
@@ -195,40 +209,36 @@ class UncertainModel(FragilityModel):
     def _part(
         self,
         given: Mapping[str, FloatArray],
+        factors: FloatArray,
         quantiles: Quantiles | None,
         size: int,
     ) -> Answer:
         """Return the answer for so many questions at once."""
         ns, of_block, points = arrays(), self.possible.weight, self.points
-        # blocks, shaking and questions are the three axes
-        values: dict[str, Any] = {name: value[None, None] for name, value in given.items()}
-        values |= {name: each[:, None] for name, each in self.possible.blocks(given).items()}
-        weight = of_block[:, None]
+        # blocks, each variable of the shaking, and questions are the axes
+        of_shaking = np.ones(()) if points is None else points.weight
+        weight = np.multiply.outer(of_block, of_shaking)
+        shape, axes = (*weight.shape, size), tuple(range(weight.ndim))
+        apart = (slice(None), *[None] * of_shaking.ndim)
+        values: dict[str, Any] = {
+            **given, **{name: each[apart] for name, each in self.possible.blocks(given).items()}
+        }  # fmt: skip
         if points is not None:
-            weight = weight * points.weight
-            values |= {name: each[None] for name, each in points.measures(given).items()}
+            values |= {name: each[None] for name, each in points.measures(given, factors).items()}
         values = self.method.block.completed(values, self.term, ns)
         unscaled, h = self.form.unscaled(self.parameters, values, ns)
-        shape = (*weight.shape, size)
         eta = np.broadcast_to(unscaled.eta * h, shape)
-        forbidden = np.zeros(shape, dtype=np.bool_)
+        forbidden: Any = False
         for bound in FragilityModel.bounds(self, values):
-            forbidden |= bound.holds(values)
+            forbidden = forbidden | bound.holds(values)
         link = self.method.link
         p = np.where(forbidden, 0.0, link.probability(eta, ns))
-
-        def mean(of: FloatArray) -> FloatArray:
-            return np.tensordot(weight, np.broadcast_to(of, shape), 2)
-
-        middle = mean(p)
-        outside = self.lies_outside(values, ns)
-        if points is None:
-            block_sd = np.sqrt(of_block @ np.square(p[:, 0] - middle))
-            outside = mean(outside)
-        else:  # of low shaking, which fails nothing, nothing is to be said
-            outside = mean(p * outside) / np.where(middle > 0.0, middle, 1.0)
-            each = np.einsum("s,bsn->bn", points.weight, p)
-            block_sd = np.sqrt(of_block @ np.square(each - middle)) if of_block.size > 1 else None
+        middle = np.tensordot(weight, p, len(axes))
+        block_sd = None
+        if points is None or of_block.size > 1:
+            each = np.tensordot(of_shaking, np.moveaxis(p, 0, -2), of_shaking.ndim)
+            block_sd = np.sqrt(of_block @ np.square(each - middle))
+        outside = self._outside(values, p, weight) if self.judged else None
         answer = Answer(middle, None, None, None, None, block_sd, outside)
         if quantiles is None:
             return answer
@@ -237,12 +247,32 @@ class UncertainModel(FragilityModel):
         decided = (middle <= 0.0) | (middle >= 1.0)
         at = link.quantile(np.where(decided, 0.5, middle), ns)
         per = np.where(decided, 0.0, 1.0 / link.density(at, ns))
-        slopes = [np.nansum(share * slope, axis=(0, 1)) * per for slope in unscaled.slopes]
+        sums: dict[tuple[int, ...], FloatArray] = {}
+
+        def total(slope: Any) -> FloatArray:
+            """Return Σ share · slope; along the axes that a slope does not have, share adds up."""
+            long = np.reshape(slope, (1,) * (len(shape) - np.ndim(slope)) + np.shape(slope))
+            same = tuple(axis for axis in axes if long.shape[axis] == 1)
+            if same not in sums:
+                sums[same] = share.sum(axis=same, keepdims=True)
+            return np.asarray(np.nansum(sums[same] * long, axis=axes))
+
+        slopes = [total(slope) * per for slope in unscaled.slopes]
         reach = self.errors.half_width(slopes, quantiles, ns)
         low, high = (
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
         return answer._replace(low=low, high=high)
+
+    def _outside(self, values: dict[str, Any], p: FloatArray, weight: FloatArray) -> Any:
+        """Return the share of the block, or of P where the shaking scatters, outside the ranges."""
+        outside = np.broadcast_to(self.lies_outside(values, arrays()), p.shape)
+        if self.points is None:
+            return np.tensordot(weight, outside, weight.ndim)
+        # of low shaking, which fails nothing, nothing is to be said
+        share = np.tensordot(weight, p * outside, weight.ndim)
+        whole = np.tensordot(weight, p, weight.ndim)
+        return np.divide(share, whole, out=np.zeros(share.shape), where=whole > 0.0)
 
 
 def drawn_model(
