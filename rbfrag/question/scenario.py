@@ -1,0 +1,240 @@
+"""The shaking of a scenario: from magnitude, distance and ground, and by the ground's shape.
+
+What is said so becomes measures with their scatter before a question is asked. A single site loads
+no library.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from os import PathLike
+from typing import Any, NamedTuple
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import stored_row
+from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, STATED, TERMS
+from rbfrag.fragility.method import SINGLE, Numbers, arrays
+from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.prediction import is_single, single
+from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Shaking, bssa14
+
+GROUND = ("magnitude", "rjb_km", "vs30_m_s")
+
+_SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
+_RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 1500.0)}
+_MOST_OF_NORMAL = 7.0
+
+ANOTHER_MODEL = (
+    "the choice of ground-motion model moves P by a factor of up to 3: ask with the medians and "
+    "sigmas of another one, too (gmm), and average the probabilities, not the medians"
+)
+
+
+class Source(NamedTuple):
+    """What is said of the earthquake beside numbers.
+
+    Args:
+        mechanism: how the fault moves; None where that is not said.
+        gmm: table of medians and sigmas of another ground-motion model.
+    """
+
+    mechanism: str | None = None
+    gmm: str | PathLike[str] | None = None
+
+
+def shaken(
+    given: Mapping[str, Any],
+    source: Source,
+    model: Model | None = None,
+    db: str | PathLike[str] | None = None,
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return a question that states measures and their scatter, and what is to be said of it.
+
+    Args:
+        given: the question, in which magnitude, distance and ground may stand for measures.
+        source: what else is said of the earthquake.
+        model: the model that is asked for, which reads its measures; None for PGV alone.
+        db: its database.
+
+    Raises:
+        InputError: a scenario that is stated in part or beside measures, or out of range.
+    """
+    question, remarks = dict(given), ()
+    if source != Source() or not question.keys().isdisjoint(("rjb_km", "vs30_m_s")):
+        names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
+        measures = scenario(given, source, names)
+        remarks = (ANOTHER_MODEL,)
+        question = {name: value for name, value in given.items() if name not in GROUND}
+        if "magnitude" in names and "magnitude" in given:
+            question["magnitude"] = given["magnitude"]
+        ns = _numbers(given)
+        for name, each in measures.items():
+            question[name], question[_SIGMAS[name]] = each.median, each.sigma(ns)
+        if "pgv_m_s" in measures:
+            question["pgv_tau"] = measures["pgv_m_s"].tau
+        own = given.get("amplification_sigma", 0.0)
+        question["amplification_sigma"] = ns.sqrt(own * own + SINGLE_COMPONENT**2)
+    factor = question.pop("amplification", None)
+    if factor is not None:
+        if is_single(factor) and not 0.0 < single("amplification", factor) < math.inf:
+            raise InputError(
+                f"amplification = {factor:g}: give a factor above 0", fields=("amplification",)
+            )
+        for name, power in AMPLIFIED.items():
+            if name in question:
+                question[name] = question[name] * factor**power
+    return question, remarks
+
+
+def scenario(
+    given: Mapping[str, Any], source: Source, names: Collection[str] = MEASURES
+) -> dict[str, Shaking]:
+    """Return measures of RotD50 in a scenario, by their names, without amplification.
+
+    Args:
+        given: ``magnitude``, ``rjb_km`` [km] and ``vs30_m_s`` [m/s]: numbers, or arrays.
+        source: what else is said of the earthquake.
+        names: the measures that are wanted.
+
+    Raises:
+        InputError: something is missing, given twice, or outside the range of the model.
+    """
+    stated = [n for n in given if (n in STATED or n in _SIGMAS.values()) and n != "magnitude"]
+    if stated:
+        raise InputError(
+            f"{stated[0]} does not go with a scenario, which says how strong the shaking is: leave "
+            "one of them out",
+            fields=(stated[0],),
+        )
+    if source.gmm is not None:
+        return _of_table(source.gmm, given.get("rjb_km"), names)
+    missing = [name for name in GROUND if name not in given]
+    if missing:
+        raise InputError(
+            f"{missing[0]} is missing: a scenario is given by {', '.join(GROUND)} and mechanism",
+            fields=(*GROUND, "mechanism"),
+        )
+    mechanism = source.mechanism or MECHANISMS[0]
+    if mechanism not in MECHANISMS:
+        raise InputError(
+            f"mechanism = {mechanism[:40]!r}: write {' or '.join(MECHANISMS)}",
+            fields=("mechanism",),
+        )
+    ns = _numbers(given)
+    values = {name: _checked(name, given[name], mechanism, ns) for name in GROUND}
+    return {
+        name: bssa14(name, *values.values(), mechanism, ns) for name in names if name in MEASURES
+    }
+
+
+def _numbers(given: Mapping[str, Any]) -> Numbers:
+    names = (*GROUND, "amplification", "amplification_sigma")
+    return SINGLE if all(is_single(given[n]) for n in names if n in given) else arrays()
+
+
+def _term(model: Model, db: str | PathLike[str] | None) -> str:
+    if isinstance(model, str):
+        return stored_row(model, db).term
+    return model.term.name if isinstance(model, FragilityModel) else model.term
+
+
+def _checked(name: str, value: Any, mechanism: str, ns: Numbers) -> Any:
+    low, high = _RANGES[name]
+    if name == "magnitude" and mechanism == "normal":
+        high = _MOST_OF_NORMAL
+    if ns is SINGLE:
+        value = worst = single(name, value)
+        outside = not low <= value <= high
+    else:
+        import numpy as np
+
+        value = np.asarray(value, dtype=np.float64)  # what is NaN says why by itself
+        out = np.atleast_1d((value < low) | (value > high))
+        outside, worst = bool(out.any()), np.atleast_1d(value)[int(np.argmax(out))]
+    if outside:
+        raise InputError(
+            f"{name} = {worst:g} is outside of what the ground-motion model (Boore et al. 2014) is "
+            f"for, {low:g} to {high:g}{' of normal faults' if high == _MOST_OF_NORMAL else ''}: "
+            "give medians and sigmas of another model (gmm)",
+            fields=(name, "gmm"),
+        )
+    return value
+
+
+def _of_table(
+    path: str | PathLike[str], rjb_km: Any, names: Collection[str]
+) -> dict[str, Shaking]:
+    """Return measures of a table by distance: medians and sigmas between its rows, over ln Rjb."""
+    import numpy as np
+
+    table = _table(path)
+    result = {}
+    if rjb_km is None and len(table["pgv_m_s" if "pgv_m_s" in table else next(iter(table))]) > 1:
+        raise InputError(f"{path} has several distances: give rjb_km", fields=("rjb_km",))
+    at = np.log(np.maximum(np.asarray(0.0 if rjb_km is None else rjb_km, np.float64), 0.1))
+    over = np.log(np.maximum(table["rjb_km"], 0.1)) if "rjb_km" in table else None
+    if over is None and rjb_km is not None:
+        raise InputError(f"{path} has no column rjb_km: leave the distance out", fields=("rjb_km",))
+    if over is not None and rjb_km is not None:
+        if (np.diff(over) <= 0.0).any():
+            raise InputError(f"{path}: its rows must be sorted by rjb_km, each once")
+        if (at < over[0] - 1e-9).any() or (at > over[-1] + 1e-9).any():
+            low, high = table["rjb_km"][0], table["rjb_km"][-1]
+            raise InputError(f"rjb_km is outside of {path}, {low:g} to {high:g} km")
+
+    def between(values: Any) -> Any:
+        found = values[0] if over is None or rjb_km is None else np.interp(at, over, values)
+        return float(found) if np.ndim(found) == 0 else found
+
+    for name in names:
+        if name not in _SIGMAS:
+            continue
+        sigma = _SIGMAS[name]
+        for column in (name, sigma):
+            if column not in table:
+                raise InputError(f"{path} has no column {column}, which the model reads")
+        total, tau = between(table[sigma]), 0.0
+        if name == "pgv_m_s" and "pgv_tau" in table:
+            tau = between(table["pgv_tau"])
+        median = np.exp(between(np.log(table[name])))
+        median = float(median) if np.ndim(median) == 0 else median
+        result[name] = Shaking(median, tau, (total * total - tau * tau) ** 0.5)
+    return result
+
+
+def _table(path: str | PathLike[str]) -> dict[str, Any]:
+    """Return the columns of a table of medians and sigmas by field, in the units of fields."""
+    import csv
+
+    import numpy as np
+
+    from rbfrag.question.table import columns_in
+
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:  # noqa: PTH123
+            header, *rows = [row for row in csv.reader(file) if any(map(str.strip, row))]
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise InputError(f"{path} is no table of medians and sigmas: {error}") from None
+    wanted = {*_SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
+    stated = columns_in(header, path, wanted).columns
+    table = {}
+    for name, column in stated.items():
+        if name in wanted:
+            place = header.index(column.header)
+            table[name] = column.factor * np.array(_floats(path, rows, place, name))
+            if not (table[name] >= 0.0).all() or (name in _SIGMAS and not table[name].all()):
+                raise InputError(f"{path}: {name} must be above 0 in every row")
+    if not rows or not any(name in table for name in _SIGMAS):
+        raise InputError(f"{path} states no median: name columns such as pgv_m_s and pgv_sigma")
+    return table
+
+
+def _floats(path: object, rows: Sequence[Sequence[str]], place: int, name: str) -> list[float]:
+    values = []
+    for i, row in enumerate(rows):
+        try:
+            values.append(float(row[place]))
+        except (ValueError, IndexError):
+            raise InputError(f"{path}, row {i + 1}: {name} is no number") from None
+    return values
