@@ -244,11 +244,13 @@ def answer_with_findings(
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
         say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE))
     in_domain = _not(missing)
-    for finding in outside_domain(model, values):
+    if model.scattered and answer.outside is not None:
+        in_domain = in_domain & _not(partly)
+    for finding in () if model.scattered else outside_domain(model, values):
         holds = finding.holds & _not(ruled)
         say(holds, finding)
         in_domain = in_domain & _not(holds)
-    if model.spread is not None:
+    if model.spread is not None and not model.scattered:
         together = _not(model.spread.holds(above_zero, ns)) & in_domain & _not(ruled)
         say(together, Remark(together, "", 0.0, model.spread.sentence))
         in_domain = in_domain & _not(together)

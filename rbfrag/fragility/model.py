@@ -185,6 +185,11 @@ class FragilityModel:
         return False
 
     @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain: P itself then tells how much lies out of the ranges."""
+        return False
+
+    @property
     def meaning(self) -> str:
         """What the probability is a probability of."""
         if self.kind != self.method.block.kind:

@@ -89,6 +89,18 @@ class Scatter:
         """Whether one variable says it all."""
         return len(self.names) == 1
 
+    def in_numbers(
+        self, given: Mapping[str, float], tau: Any
+    ) -> dict[str, dict[str, float]]:
+        """Return median, sigma and, where it is known, tau of each measure that scatters."""
+        result = {}
+        for name in self.names:
+            sigma = math.hypot(self.deviation(name, given), self.shared(name, given))
+            result[name] = {"median": given[name], "sigma": sigma}
+        if tau is not None and "pgv_m_s" in result:
+            result["pgv_m_s"]["tau"] = float(tau)
+        return result
+
     def deviation(self, name: str, given: Mapping[str, Any]) -> Any:
         """Return the standard deviation of a measure's logarithm by itself."""
         return given.get(f"{name.partition('_')[0]}_sigma", 0.0)
@@ -112,6 +124,11 @@ class ShakenModel(FragilityModel):
     @property
     def uncertain(self) -> bool:
         """Whether it answers for what is not known exactly."""
+        return True
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain."""
         return True
 
     def bounds(self, given: Any) -> tuple[Bound, ...]:

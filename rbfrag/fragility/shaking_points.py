@@ -88,6 +88,22 @@ class ShakingPoints:
         factors = self._lower(given)
         return self._turned(given, factors) if factors.shape[1] > 3 else factors
 
+    def along(self, given: Mapping[str, Any], possible: Any) -> tuple[FloatArray, float]:
+        """Return P of one question at each point of the first measure, and its deviation.
+
+        Args:
+            given: the question, single numbers.
+            possible: what the block may be; None for a certain one.
+        """
+        from rbfrag.fragility.uncertain import UncertainModel
+
+        columns = {name: np.array([float(value)]) for name, value in given.items()}
+        model = UncertainModel.over(self._model, possible, self, judged=False)
+        p = model.at_points(columns)
+        over = tuple(range(1, p.ndim))
+        weight = self.weight / self.weight.sum(axis=over, keepdims=True)
+        return (p * weight).sum(axis=over), float(self._lower(columns)[0, 0, 0])
+
     def measures(
         self, given: Mapping[str, FloatArray], factors: FloatArray
     ) -> dict[str, FloatArray]:

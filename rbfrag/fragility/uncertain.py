@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Eta, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.solver.results import FloatArray
@@ -174,6 +174,11 @@ class UncertainModel(FragilityModel):
         """Whether it answers for what is not known exactly."""
         return True
 
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain."""
+        return self.points is not None
+
     def bounds(self, given: Any) -> tuple[Bound, ...]:
         """Return nothing: what mechanics forbids is asked of each block that it may be."""
         del given
@@ -206,6 +211,15 @@ class UncertainModel(FragilityModel):
             return Answer(*(None if row is None else float(row[0]) for row in rows))
         return Answer(*rows)
 
+    def at_points(self, given: Mapping[str, FloatArray]) -> FloatArray:
+        """Return P of one question at the points of the shaking, over what the block may be."""
+        assert self.points is not None
+        with np.errstate(all="ignore"):
+            values = self._values(given, self.points.factors(given))
+            shape = (self.possible.weight.size, *self.points.weight.shape, 1)
+            p = self._certain(values, shape)[0]
+        return np.asarray(np.tensordot(self.possible.weight, p, 1)[..., 0])
+
     def _part(
         self,
         given: Mapping[str, FloatArray],
@@ -219,20 +233,9 @@ class UncertainModel(FragilityModel):
         of_shaking = np.ones(()) if points is None else points.weight
         weight = np.multiply.outer(of_block, of_shaking)
         shape, axes = (*weight.shape, size), tuple(range(weight.ndim))
-        apart = (slice(None), *[None] * of_shaking.ndim)
-        values: dict[str, Any] = {
-            **given, **{name: each[apart] for name, each in self.possible.blocks(given).items()}
-        }  # fmt: skip
-        if points is not None:
-            values |= {name: each[None] for name, each in points.measures(given, factors).items()}
-        values = self.method.block.completed(values, self.term, ns)
-        unscaled, h = self.form.unscaled(self.parameters, values, ns)
-        eta = np.broadcast_to(unscaled.eta * h, shape)
-        forbidden: Any = False
-        for bound in FragilityModel.bounds(self, values):
-            forbidden = forbidden | bound.holds(values)
+        values = self._values(given, factors)
+        p, forbidden, eta, unscaled, h = self._certain(values, shape)
         link = self.method.link
-        p = np.where(forbidden, 0.0, link.probability(eta, ns))
         middle = np.tensordot(weight, p, len(axes))
         block_sd = None
         if points is None or of_block.size > 1:
@@ -263,6 +266,30 @@ class UncertainModel(FragilityModel):
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
         return answer._replace(low=low, high=high)
+
+    def _values(self, given: Mapping[str, FloatArray], factors: FloatArray) -> dict[str, Any]:
+        """Return completed values of all that block and shaking may be."""
+        ndim = 0 if self.points is None else self.points.weight.ndim
+        apart = (slice(None), *[None] * ndim)
+        blocks = {name: each[apart] for name, each in self.possible.blocks(given).items()}
+        values: dict[str, Any] = {**given, **blocks}
+        if self.points is not None:
+            measures = self.points.measures(given, factors)
+            values |= {name: each[None] for name, each in measures.items()}
+        return self.method.block.completed(values, self.term, arrays())
+
+    def _certain(
+        self, values: Mapping[str, Any], shape: tuple[int, ...]
+    ) -> tuple[FloatArray, Any, FloatArray, Eta, Any]:
+        """Return P of each, where mechanics forbids failure, eta, and what that is made of."""
+        ns = arrays()
+        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        eta = np.broadcast_to(unscaled.eta * h, shape)
+        forbidden: Any = False
+        for bound in FragilityModel.bounds(self, values):
+            forbidden = forbidden | bound.holds(values)
+        p = np.where(forbidden, 0.0, self.method.link.probability(eta, ns))
+        return p, forbidden, eta, unscaled, h
 
     def _outside(self, values: dict[str, Any], p: FloatArray, weight: FloatArray) -> Any:
         """Return the share of the block, or of P where the shaking scatters, outside the ranges."""
