@@ -128,6 +128,29 @@ def scenario(
     }
 
 
+def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, float]]:
+    """Return the shaking of one site: median, where two thirds lie, and standard deviations of ln.
+
+    Args:
+        given: as for :func:`scenario`, with ``amplification`` and ``amplification_sigma``.
+        source: what else is said of the earthquake.
+    """
+    site = {name: value for name, value in given.items() if not name.startswith("amplif")}
+    names = MEASURES
+    if source.gmm is not None:
+        names = tuple(name for name in _SIGMAS if name in _table(source.gmm))
+    result = {}
+    for name, each in scenario(site, source, names).items():
+        median = each.median * given.get("amplification", 1.0)
+        phi = math.hypot(each.phi, given.get("amplification_sigma", 0.0))
+        sigma = math.hypot(each.tau, phi)
+        low, high = (median * math.exp(end * sigma) for end in (-1.0, 1.0))
+        result[name] = {
+            "median": median, "p16": low, "p84": high, "sigma": sigma, "tau": each.tau, "phi": phi,
+        }  # fmt: skip
+    return result
+
+
 def _numbers(given: Mapping[str, Any]) -> Numbers:
     names = (*GROUND, "amplification", "amplification_sigma")
     return SINGLE if all(is_single(given[n]) for n in names if n in given) else arrays()
