@@ -245,20 +245,17 @@ def _shaken_at_sites(
     from rbfrag.fragility.shaking import Scatter
     from rbfrag.fragility.shaking_points import ShakingPoints
     from rbfrag.fragility.shared_shaking import shaken_share_range
-    from rbfrag.fragility.uncertain import uncertain_model
+    from rbfrag.fragility.uncertain import UncertainModel, uncertain_model
 
     scatter, rest = Scatter.of(model.term, given)
-    assert scatter is not None
-    assert model.dependence is not None
-    first = scatter.names[0]
-    if first != "pgv_m_s":
+    if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
         return with_remarks(answer, (NOT_SHARED,))
     some, rest = uncertain_model(model, rest)
-    along, sigma = ShakingPoints(model, scatter).along(rest, getattr(some, "possible", None))
-    ends = shaken_share_range(
-        along, float(given["pgv_tau"]), sigma, model.dependence, sites, answer.level  # type: ignore[arg-type]
-    )
-    return type(answer)(**(vars(answer) | dict(zip(("event_low", "event_high"), ends, strict=True))))
+    points = ShakingPoints(model, scatter)
+    along, sigma = UncertainModel.over(model, getattr(some, "possible", None), points).along(rest)
+    tau = single("pgv_tau", given["pgv_tau"])
+    low, high = shaken_share_range(along, tau, sigma, model.dependence, sites, answer.level)
+    return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 
 def array_answer(

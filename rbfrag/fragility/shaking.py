@@ -76,7 +76,11 @@ class Scatter:
                 )
             nothing = value == 0.0
             read = SCATTERED.get(name, term.inputs[0]) in term.inputs
-            if name == "pgv_tau" or not read or (nothing is True or getattr(nothing, "all", bool)()):
+            if (
+                name == "pgv_tau"
+                or not read
+                or (nothing is True or getattr(nothing, "all", bool)())
+            ):
                 del rest[name]
         stated = {SCATTERED[name] for name in rest if name in SCATTERED}
         common = "amplification_sigma" if "amplification_sigma" in rest else None
@@ -89,9 +93,7 @@ class Scatter:
         """Whether one variable says it all."""
         return len(self.names) == 1
 
-    def in_numbers(
-        self, given: Mapping[str, float], tau: Any
-    ) -> dict[str, dict[str, float]]:
+    def in_numbers(self, given: Mapping[str, float], tau: Any) -> dict[str, dict[str, float]]:
         """Return median, sigma and, where it is known, tau of each measure that scatters."""
         result = {}
         for name in self.names:
@@ -119,7 +121,9 @@ class ShakenModel(FragilityModel):
     @classmethod
     def over(cls, model: FragilityModel, scatter: Scatter) -> ShakenModel:
         """Return a model that answers for all that the shaking may be."""
-        return cls(**{e.name: getattr(model, e.name) for e in fields(FragilityModel)}, scatter=scatter)
+        return cls(
+            **{e.name: getattr(model, e.name) for e in fields(FragilityModel)}, scatter=scatter
+        )
 
     @property
     def uncertain(self) -> bool:

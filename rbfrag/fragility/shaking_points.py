@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.model import FragilityModel
@@ -43,9 +44,7 @@ class ShakingPoints:
         above: score of the first measure up to which nothing fails, which needs no points.
     """
 
-    def __init__(
-        self, model: FragilityModel, scatter: Scatter, above: float = -math.inf
-    ) -> None:
+    def __init__(self, model: FragilityModel, scatter: Scatter, above: float = -math.inf) -> None:
         self._model, self._scatter, self._above = model, scatter, above
 
     @cached_property
@@ -88,21 +87,9 @@ class ShakingPoints:
         factors = self._lower(given)
         return self._turned(given, factors) if factors.shape[1] > 3 else factors
 
-    def along(self, given: Mapping[str, Any], possible: Any) -> tuple[FloatArray, float]:
-        """Return P of one question at each point of the first measure, and its deviation.
-
-        Args:
-            given: the question, single numbers.
-            possible: what the block may be; None for a certain one.
-        """
-        from rbfrag.fragility.uncertain import UncertainModel
-
-        columns = {name: np.array([float(value)]) for name, value in given.items()}
-        model = UncertainModel.over(self._model, possible, self, judged=False)
-        p = model.at_points(columns)
-        over = tuple(range(1, p.ndim))
-        weight = self.weight / self.weight.sum(axis=over, keepdims=True)
-        return (p * weight).sum(axis=over), float(self._lower(columns)[0, 0, 0])
+    def deviation(self, given: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the standard deviation of the first measure, shape (n,)."""
+        return np.asarray(self._lower(given)[:, 0, 0])
 
     def measures(
         self, given: Mapping[str, FloatArray], factors: FloatArray
@@ -116,7 +103,9 @@ class ShakingPoints:
         result, axes = {}, len(self._axes)
         for i, (name, scores) in enumerate(zip(self._scatter.names, self._scores, strict=True)):
             moved = given[name] * np.exp(scores @ factors[:, i, : scores.shape[-1]].T)
-            result[name] = moved[(*[slice(None)] * (moved.ndim - 1), *[None] * (axes + 1 - moved.ndim))]
+            result[name] = moved[
+                (*[slice(None)] * (moved.ndim - 1), *[None] * (axes + 1 - moved.ndim))
+            ]
         return result
 
     def _at(
@@ -129,7 +118,7 @@ class ShakingPoints:
 
     def _eta(
         self, given: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Return eta at some scores, shape (scores, n), and where mechanics forbids failure."""
         ns, model = arrays(), self._model
         values: dict[str, Any] = {**given, **self._at(given, factors, scores)}

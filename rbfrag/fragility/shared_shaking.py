@@ -10,7 +10,7 @@ from rbfrag.fragility.joint import SIDES, beta_binomial_quantiles, joint_excess
 from rbfrag.fragility.shaking import POINTS, WEIGHTS
 from rbfrag.solver.results import FloatArray
 
-_LEVELS = (np.arange(200) + 0.5) / 200.0
+_LEVELS: FloatArray = (np.arange(200.0) + 0.5) / 200.0
 _LEAST, _MOST = 1e-9, 1.0 - 1e-9
 
 
@@ -46,7 +46,7 @@ def shaken_share_range(
     for number, r in ((1.0, site + law.rho_v - law.rho_o), (2.0, site)):
         pairs += number / (n - 1.0) * ((joint_excess(a, a, np.full(a.shape, r)) + p * p) @ w)
     alone = np.maximum(mean * (1.0 - mean), _LEAST * _LEAST)
-    rho = np.clip((pairs - mean * mean) / alone, _LEAST, _MOST)
+    rho = np.asarray(np.clip((pairs - mean * mean) / alone, _LEAST, _MOST), dtype=np.float64)
     counts = beta_binomial_quantiles(n, mean, rho, _LEVELS)
     order = np.argsort(counts, axis=None)
     below = np.cumsum(np.broadcast_to(w / _LEVELS.size, counts.shape).ravel()[order])

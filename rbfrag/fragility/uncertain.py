@@ -1,9 +1,9 @@
 """Blocks and shaking that are not known exactly: the probability over all that they may be.
 
-P = Σ w_i F(eta_i) over the product of what the block and what the shaking may be. The interval is that of the sum: the slope of the sum
-by each parameter is Σ w_i F'(eta_i) x_i, one step of the parameters moves all blocks together, and
-the ends are taken on eta as those of a certain block. For a lognormal fragility and a lognormal
-strength all of it is exact: the variances add up.
+P = Σ w_i F(eta_i) over the product of what the block and what the shaking may be. The interval is
+that of the sum: the slope of the sum by each parameter is Σ w_i F'(eta_i) x_i, one step of the
+parameters moves all together, and the ends are taken on eta as those of a certain block. For a
+lognormal fragility and a lognormal strength all of it is exact: the variances add up.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
@@ -211,14 +211,22 @@ class UncertainModel(FragilityModel):
             return Answer(*(None if row is None else float(row[0]) for row in rows))
         return Answer(*rows)
 
-    def at_points(self, given: Mapping[str, FloatArray]) -> FloatArray:
-        """Return P of one question at the points of the shaking, over what the block may be."""
+    def along(self, given: Mapping[str, Any]) -> tuple[FloatArray, float]:
+        """Return P of one question at each point of the first measure, and its deviation.
+
+        Args:
+            given: the question, single numbers.
+        """
         assert self.points is not None
+        columns = {name: np.array([float(value)]) for name, value in given.items()}
+        weight = self.points.weight
         with np.errstate(all="ignore"):
-            values = self._values(given, self.points.factors(given))
-            shape = (self.possible.weight.size, *self.points.weight.shape, 1)
-            p = self._certain(values, shape)[0]
-        return np.asarray(np.tensordot(self.possible.weight, p, 1)[..., 0])
+            values = self._values(columns, self.points.factors(columns))
+            p = self._certain(values, (self.possible.weight.size, *weight.shape, 1))[0]
+        over = tuple(range(1, weight.ndim))
+        each = np.tensordot(self.possible.weight, p, 1)[..., 0]
+        share = weight / weight.sum(axis=over, keepdims=True)
+        return (each * share).sum(axis=over), float(self.points.deviation(columns)[0])
 
     def _part(
         self,

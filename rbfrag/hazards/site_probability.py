@@ -9,9 +9,9 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.prediction_array import predict_many
-from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.shaking import Scatter
 from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.fragility.uncertain import UncertainModel
@@ -108,7 +108,7 @@ def site_probability(
     blocks = 1 if own_block else size
     scatter, _ = Scatter.of(chosen.term, shaking.given(np.arange(n)))
 
-    def asked(site: Indices, block: Indices) -> dict[str, FloatArray]:
+    def pairs_of(site: Indices, block: Indices) -> dict[str, FloatArray]:
         """Return block and shaking of pairs of site and block."""
         return {**{name: values[block] for name, values in columns.items()}, **shaking.given(site)}
 
@@ -117,7 +117,7 @@ def site_probability(
     for sites in _chunks(np.arange(n), _CHUNK // blocks):
         site = np.repeat(sites, blocks)
         block = site if own_block else np.tile(np.arange(blocks), sites.size)
-        given = asked(site, block)
+        given = pairs_of(site, block)
         measures = {name: given[name] for name in (*columns, *shaking.names)}
         median = array_answer(chosen, measures, level, interval=False)
         in_domain[sites] = median.in_domain.reshape(-1, blocks).all(axis=1)
@@ -127,7 +127,9 @@ def site_probability(
             continue
         points = ShakingPoints(chosen, scatter)
         for score in (_STRONGEST, *_SILENT):  # the highest of these at which nothing fails yet
-            fails = points.fails_at(asked(*both), score, RARE if score == _STRONGEST else NOTHING)
+            fails = points.fails_at(
+                pairs_of(*both), score, RARE if score == _STRONGEST else NOTHING
+            )
             if score < _STRONGEST:
                 pairs.setdefault(score, []).append(both[:, ~fails])
             both = both[:, fails]
@@ -141,10 +143,12 @@ def site_probability(
             model = UncertainModel.over(chosen, None, points, judged=False)
         for part in _chunks(np.arange(site.size), _CHUNK):
             answer = predict_many(
-                model, asked(site[part], block[part]), quantiles_of(level),
+                model, pairs_of(site[part], block[part]), quantiles_of(level),
                 interval=True, refuse_nan=False,
             )  # fmt: skip
-            answers.append((site[part], block[part], answer.probability, answer.ci_low, answer.ci_high))
+            answers.append(
+                (site[part], block[part], answer.probability, answer.ci_low, answer.ci_high)
+            )
     site, block, *each = (np.concatenate(column) for column in zip(*answers, strict=True))
     probability, low, high = (
         np.bincount(site, row * weights[block], n).astype(np.float64) for row in each

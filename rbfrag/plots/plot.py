@@ -17,7 +17,7 @@ from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
-from rbfrag.question.fields import RangeFields, MeasureFields
+from rbfrag.question.fields import MeasureFields, RangeFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.question import described
 

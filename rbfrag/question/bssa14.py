@@ -75,7 +75,7 @@ _CM_S = 0.01
 _ROCK_M_S = 760.0
 
 
-class Shaking(NamedTuple):
+class Ordinate(NamedTuple):
     """A measure of RotD50, whose logarithm is normal.
 
     Args:
@@ -95,7 +95,7 @@ class Shaking(NamedTuple):
 
 def bssa14(
     measure: str, magnitude: Any, rjb_km: Any, vs30_m_s: Any, mechanism: str, ns: Numbers
-) -> Shaking:
+) -> Ordinate:
     """Return a measure of the shaking.
 
     Args:
@@ -121,15 +121,13 @@ def bssa14(
     far = within(ns.log(ns.maximum(rjb_km, 1.0) / of.r1) / math.log(of.r2 / of.r1))
     soft = within(ns.log(300.0 / vs30_m_s) / math.log(300.0 / 225.0))
     tau, phi = (first + (second - first) * large for first, second in (of.tau, of.phi))
-    return Shaking(
+    return Ordinate(
         median * (_CM_S if measure == "pgv_m_s" else 1.0),
         tau, phi + of.d_phi_r * far - of.d_phi_v * soft,
     )  # fmt: skip
 
 
-def _on_rock(
-    of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: str, ns: Numbers
-) -> Any:
+def _on_rock(of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: str, ns: Numbers) -> Any:
     """Return the logarithm of a median at 760 m/s."""
     d = magnitude - of.mh
     below, above = ns.minimum(d, 0.0), ns.maximum(d, 0.0)

@@ -361,9 +361,7 @@ class SceneFields(TypedDict, Generic[V], total=False):
     amplification: Annotated[
         V, Field("Factor on all measures for the shape of the ground", above=0.0)
     ]
-    amplification_sigma: Annotated[
-        V, Field("Standard deviation of ln {amplification}", least=0.0)
-    ]
+    amplification_sigma: Annotated[V, Field("Standard deviation of ln {amplification}", least=0.0)]
 
 
 SCENE = frozenset({"rjb_km", "vs30_m_s", "amplification"})

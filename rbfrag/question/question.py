@@ -15,8 +15,8 @@ from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.prediction import Prediction, answer_given, is_single, with_remarks
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.fields import (
-    ArrayFields,
     SCENE,
+    ArrayFields,
     QuestionFields,
     RequestFields,
     ShakingFields,

@@ -7,7 +7,7 @@ no library.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from os import PathLike
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, STATED, TERMS
 from rbfrag.fragility.method import SINGLE, Numbers, arrays
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import is_single, single
-from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Shaking, bssa14
+from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Ordinate, bssa14
 
 GROUND = ("magnitude", "rjb_km", "vs30_m_s")
 
@@ -60,7 +60,7 @@ def shaken(
     Raises:
         InputError: a scenario that is stated in part or beside measures, or out of range.
     """
-    question, remarks = dict(given), ()
+    question, remarks = dict(given), tuple[str, ...]()
     if source != Source() or not question.keys().isdisjoint(("rjb_km", "vs30_m_s")):
         names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
         measures = scenario(given, source, names)
@@ -89,7 +89,7 @@ def shaken(
 
 def scenario(
     given: Mapping[str, Any], source: Source, names: Collection[str] = MEASURES
-) -> dict[str, Shaking]:
+) -> dict[str, Ordinate]:
     """Return measures of RotD50 in a scenario, by their names, without amplification.
 
     Args:
@@ -108,7 +108,10 @@ def scenario(
             fields=(stated[0],),
         )
     if source.gmm is not None:
-        return _of_table(source.gmm, given.get("rjb_km"), names)
+        # Kept apart: a single site without a table loads no numpy.
+        from rbfrag.question.gmm_table import of_table
+
+        return of_table(source.gmm, given.get("rjb_km"), names)
     missing = [name for name in GROUND if name not in given]
     if missing:
         raise InputError(
@@ -124,7 +127,9 @@ def scenario(
     ns = _numbers(given)
     values = {name: _checked(name, given[name], mechanism, ns) for name in GROUND}
     return {
-        name: bssa14(name, *values.values(), mechanism, ns) for name in names if name in MEASURES
+        name: bssa14(name, values["magnitude"], values["rjb_km"], values["vs30_m_s"], mechanism, ns)
+        for name in names
+        if name in MEASURES
     }
 
 
@@ -138,7 +143,9 @@ def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, 
     site = {name: value for name, value in given.items() if not name.startswith("amplif")}
     names = MEASURES
     if source.gmm is not None:
-        names = tuple(name for name in _SIGMAS if name in _table(source.gmm))
+        from rbfrag.question.gmm_table import read_gmm_table
+
+        names = tuple(name for name in _SIGMAS if name in read_gmm_table(source.gmm))
     result = {}
     for name, each in scenario(site, source, names).items():
         median = each.median * given.get("amplification", 1.0)
@@ -183,81 +190,3 @@ def _checked(name: str, value: Any, mechanism: str, ns: Numbers) -> Any:
             fields=(name, "gmm"),
         )
     return value
-
-
-def _of_table(
-    path: str | PathLike[str], rjb_km: Any, names: Collection[str]
-) -> dict[str, Shaking]:
-    """Return measures of a table by distance: medians and sigmas between its rows, over ln Rjb."""
-    import numpy as np
-
-    table = _table(path)
-    result = {}
-    if rjb_km is None and len(table["pgv_m_s" if "pgv_m_s" in table else next(iter(table))]) > 1:
-        raise InputError(f"{path} has several distances: give rjb_km", fields=("rjb_km",))
-    at = np.log(np.maximum(np.asarray(0.0 if rjb_km is None else rjb_km, np.float64), 0.1))
-    over = np.log(np.maximum(table["rjb_km"], 0.1)) if "rjb_km" in table else None
-    if over is None and rjb_km is not None:
-        raise InputError(f"{path} has no column rjb_km: leave the distance out", fields=("rjb_km",))
-    if over is not None and rjb_km is not None:
-        if (np.diff(over) <= 0.0).any():
-            raise InputError(f"{path}: its rows must be sorted by rjb_km, each once")
-        if (at < over[0] - 1e-9).any() or (at > over[-1] + 1e-9).any():
-            low, high = table["rjb_km"][0], table["rjb_km"][-1]
-            raise InputError(f"rjb_km is outside of {path}, {low:g} to {high:g} km")
-
-    def between(values: Any) -> Any:
-        found = values[0] if over is None or rjb_km is None else np.interp(at, over, values)
-        return float(found) if np.ndim(found) == 0 else found
-
-    for name in names:
-        if name not in _SIGMAS:
-            continue
-        sigma = _SIGMAS[name]
-        for column in (name, sigma):
-            if column not in table:
-                raise InputError(f"{path} has no column {column}, which the model reads")
-        total, tau = between(table[sigma]), 0.0
-        if name == "pgv_m_s" and "pgv_tau" in table:
-            tau = between(table["pgv_tau"])
-        median = np.exp(between(np.log(table[name])))
-        median = float(median) if np.ndim(median) == 0 else median
-        result[name] = Shaking(median, tau, (total * total - tau * tau) ** 0.5)
-    return result
-
-
-def _table(path: str | PathLike[str]) -> dict[str, Any]:
-    """Return the columns of a table of medians and sigmas by field, in the units of fields."""
-    import csv
-
-    import numpy as np
-
-    from rbfrag.question.table import columns_in
-
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:  # noqa: PTH123
-            header, *rows = [row for row in csv.reader(file) if any(map(str.strip, row))]
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise InputError(f"{path} is no table of medians and sigmas: {error}") from None
-    wanted = {*_SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
-    stated = columns_in(header, path, wanted).columns
-    table = {}
-    for name, column in stated.items():
-        if name in wanted:
-            place = header.index(column.header)
-            table[name] = column.factor * np.array(_floats(path, rows, place, name))
-            if not (table[name] >= 0.0).all() or (name in _SIGMAS and not table[name].all()):
-                raise InputError(f"{path}: {name} must be above 0 in every row")
-    if not rows or not any(name in table for name in _SIGMAS):
-        raise InputError(f"{path} states no median: name columns such as pgv_m_s and pgv_sigma")
-    return table
-
-
-def _floats(path: object, rows: Sequence[Sequence[str]], place: int, name: str) -> list[float]:
-    values = []
-    for i, row in enumerate(rows):
-        try:
-            values.append(float(row[place]))
-        except (ValueError, IndexError):
-            raise InputError(f"{path}, row {i + 1}: {name} is no number") from None
-    return values

@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import RangeFields, MeasureFields
+from rbfrag.question.fields import MeasureFields, RangeFields
 from rbfrag.question.keywords import BlockKeywords, parts_of
 
 SUFFIXES = (".pdf", ".png", ".html")
