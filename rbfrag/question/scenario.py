@@ -22,6 +22,7 @@ from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Ordin
 GROUND = ("magnitude", "rjb_km", "vs30_m_s")
 
 _SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
+# that 400 km is the limit of the paper is from memory
 _RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 1500.0)}
 _MOST_OF_NORMAL = 7.0
 
