@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from rbfrag.cli.output import print_json, print_table
+from rbfrag.cli.output import print_json, print_sentences, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, fields_of, stacked
+from rbfrag.cli.sentences import rounded
 from rbfrag.question.fields import SourceFields, declared
 
 EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse"
@@ -32,6 +33,15 @@ def scenario(
     if json:
         print_json(measures)
         return
+    name, first = next(iter(measures.items()))
+    low, median, high = (rounded(first[each]) for each in ("p16", "median", "p84"))
+    unit = declared()[name].unit
+    print_sentences(
+        [
+            f"The {declared()[name].what} is {median} {unit} in the median, and {low} to {high} "
+            f"{unit} in two of three cases."
+        ]
+    )
     abouts = {name: declared()[name] for name in measures}
     rows = [
         [abouts[name].what, *(float(f"{each:.4g}") for each in of.values()), abouts[name].unit]
