@@ -22,7 +22,7 @@ def scenario(
     source: Annotated[Given, fields_of(SourceFields)],
     json: options.Json = False,
 ) -> None:
-    """Print the shaking of an earthquake at a site: medians, and how they scatter.
+    """Print the shaking of an earthquake at a site, and its scatter.
 
     After Boore et al. (2014), for the median over all directions (RotD50); predict adds the scatter
     of a single component, 0.16 in ln. tau is what all sites of an earthquake share.
