@@ -44,6 +44,7 @@ from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.recognise import read_motions
+from rbfrag.question.gmm_table import read_gmm_table
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
@@ -107,6 +108,8 @@ REALIZATIONS = (
     b"#,,\"generated_by='OpenQuake engine 3.16'\"\nrlz_id,branch_path,weight\n"
     b"0,A~A,2.500000E-01\n1,B~A,7.500000E-01\n",
 )
+
+GMM_TABLE = (b"rjb_km,PGV [cm/s],pgv_sigma,pgv_tau\n5,40,0.6,0.3\n20,20,0.65,0.35\n",)
 
 METADATA = (
     b"file,trace_index,event_id,units,is_vertical,companion_group,magnitude,processing,dt_s\n"
@@ -266,6 +269,7 @@ READERS: tuple[Reader, ...] = (
     Reader("hazard curve CSV", ".csv", lambda: HAZARD_CSV, read_hazard_curves),
     Reader("hazard curve JSON", ".json", lambda: HAZARD_JSON, read_hazard_curves),
     Reader("realizations", ".csv", lambda: REALIZATIONS, _read_weights),
+    Reader("ground-motion medians", ".csv", lambda: GMM_TABLE, read_gmm_table),
     Reader("metadata", ".csv", lambda: METADATA, read_metadata),
     Reader("index of intervals", INDEX, lambda: (b"list.txt 0.01\n",), _read_index),
     Reader("zip of records", ".zip", _zips, read_motions),

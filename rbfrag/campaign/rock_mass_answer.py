@@ -19,7 +19,7 @@ from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
-from rbfrag.question.fields import ShakingFields
+from rbfrag.question.fields import MeasureFields
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables
@@ -75,7 +75,7 @@ class RockMassAnswer(Tabular):
         return f"RockMassAnswer({self.blocks.n_blocks} blocks: {counts})"
 
 
-class RockMassQuestion(ShakingFields[float | None], total=False):
+class RockMassQuestion(MeasureFields[float | None], total=False):
     """What may be asked of the blocks of a rock mass."""
 
     sa_g: Mapping[float, float] | None
@@ -148,7 +148,7 @@ def rockmass(
     def of(names: Iterable[str]) -> dict[str, Any]:
         return {name: given[name] for name in names if name in given}
 
-    measures = of(ShakingFields.__annotations__) | spectral(given.get("sa_g", {}))
+    measures = of(MeasureFields.__annotations__) | spectral(given.get("sa_g", {}))
     level, motion = checked_level(given.get("level", 0.95)), given.get("motion")
     if motion is not None and measures:
         raise InputError(

@@ -40,6 +40,7 @@ COMMANDS = {
     "simulate": "Store critical values and outcomes of every motion and block.",
     "fit": "Fit a fragility model to stored critical values or outcomes.",
     "predict": "Print the probability that a block fails.",
+    "scenario": "Print the shaking of an earthquake at a site, and its scatter.",
     "hazard": "Print the annual rate at which a block topples.",
     "losses": "Count failures and losses in the earthquakes of an event set.",
     "survival": "Print how likely standing blocks are under a seismic hazard.",

@@ -21,7 +21,7 @@ from rbfrag.question.fields import BlockFields, column_of, names_of
 from rbfrag.question.shapes import SHAPES
 from rbfrag.question.table import Header, columns_in
 
-IF_EMPTY = {"count": 1.0, "weight": 1.0}
+IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
 
 

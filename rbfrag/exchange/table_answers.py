@@ -25,7 +25,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
-from rbfrag.question.fields import BlockFields, ShakingFields, column_of, names_of
+from rbfrag.question.fields import BlockFields, ScatterFields, ShakingFields, column_of, names_of
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import ask
 from rbfrag.solver.results import FloatArray
@@ -35,7 +35,7 @@ _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-_SHAKING = names_of(ShakingFields)
+_SHAKING, _SCATTER = names_of(ShakingFields), frozenset(names_of(ScatterFields))
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
@@ -102,7 +102,7 @@ def predict_table(
     chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
     with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
         table.check(given, kind)
-        uncertain = any(name.endswith("_sigma") for name in (*table.stated.columns, *given))
+        uncertain = not _SCATTER.isdisjoint((*table.stated.columns, *given))
         columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
         if goal is None:
             write = _listed(table, columns, rows)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from rbfrag.fragility.domain import RATIOS, Ratio
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
+from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 
@@ -49,6 +49,7 @@ _DESCRIPTIONS = {
         for name in ("p2", "ps2", "pct2", "kr", "ky", "ks", "kct")
     },
     "restitution_sigma": ("", "the standard deviation of the restitution, 0 or more"),
+    **dict.fromkeys(ABOUT_SCATTER, ("", "a standard deviation of a logarithm, 0 or more")),
     "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
@@ -132,11 +133,11 @@ class Contradiction(Remark):
 _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
 
 NOTABLE_SHARE = 0.05
-"""From this share of an uncertain block outside the fitted ranges on an answer says so."""
+"""From this share of an uncertain block, or of P, outside the fitted ranges on it is told."""
 
 PARTLY_OUTSIDE = (
     f"{100.0 * NOTABLE_SHARE:g} % or more of what the uncertain block may be lies outside the "
-    "fitted ranges: the answer is an extrapolation there"
+    "fitted ranges, or of P where the shaking is uncertain: the answer is an extrapolation there"
 )
 
 NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
@@ -243,11 +244,13 @@ def answer_with_findings(
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
         say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE))
     in_domain = _not(missing)
-    for finding in outside_domain(model, values):
+    if model.scattered and answer.outside is not None:
+        in_domain = in_domain & _not(partly)
+    for finding in () if model.scattered else outside_domain(model, values):
         holds = finding.holds & _not(ruled)
         say(holds, finding)
         in_domain = in_domain & _not(holds)
-    if model.spread is not None:
+    if model.spread is not None and not model.scattered:
         together = _not(model.spread.holds(above_zero, ns)) & in_domain & _not(ruled)
         say(together, Remark(together, "", 0.0, model.spread.sentence))
         in_domain = in_domain & _not(together)

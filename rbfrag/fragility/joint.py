@@ -208,7 +208,7 @@ def share_range(
     """
     p, n = np.asarray(probability, dtype=np.float64), SIDES * sites
     rho, tail = overdispersion(p, law, sites), 0.5 - 0.5 * level
-    low, high = _beta_binomial_quantiles(n, p, rho, np.array([tail, 1.0 - tail])) / n
+    low, high = beta_binomial_quantiles(n, p, rho, np.array([tail, 1.0 - tail])) / n
     return low, high
 
 
@@ -230,7 +230,7 @@ def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
     return np.clip(rho, _LEAST_RHO, _MOST_RHO)
 
 
-def _beta_binomial_quantiles(
+def beta_binomial_quantiles(
     n: int, share: FloatArray, rho: FloatArray, q: FloatArray
 ) -> FloatArray:
     """Return the smallest numbers of n that are not exceeded with probabilities q, shape (q, …).
@@ -421,7 +421,7 @@ class FailureCount:
             counts = np.full(levels.shape, self.mean)
         elif rho > _LEAST_RHO:
             law = np.array(share), np.array(min(rho, _MOST_RHO))
-            counts = _beta_binomial_quantiles(self.n, *law, levels.ravel()).reshape(levels.shape)
+            counts = beta_binomial_quantiles(self.n, *law, levels.ravel()).reshape(levels.shape)
         else:  # of whole blocks: the mean stays
             n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
             counts = binom.ppf(levels, n, self.mean / n)

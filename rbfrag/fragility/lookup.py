@@ -16,7 +16,15 @@ from rbfrag.db.model_file import (
     unknown_model,
 )
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import MEASURES, STATED, TERMS, least_inputs, terms_from
+from rbfrag.fragility.measures import (
+    ABOUT_SCATTER,
+    MEASURES,
+    SCATTERED,
+    STATED,
+    TERMS,
+    least_inputs,
+    terms_from,
+)
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
@@ -179,6 +187,7 @@ def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[str,
         f"{name} was not used: model {model.name} reads {' and '.join(read)}"
         for name in given
         if name in MEASURES and name not in read
+        if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read
     )
 
 

@@ -209,8 +209,19 @@ TERMS: Mapping[str, Term] = {
 STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m", "arias_m_s", "magnitude")
 """The measures that a question may state, by name."""
 
-MEASURES = frozenset({*STATED, "xp_m_s"})
-"""The names of all measures."""
+SCATTERED = {
+    f"{name.partition('_')[0]}_sigma": name for name in ("pgv_m_s", "pga_g", *SPECTRAL.values())
+}
+"""By the name of its standard deviation each measure that may be known with scatter."""
+
+AMPLIFIED = {**dict.fromkeys(("pgv_m_s", "pga_g", "pgd_m", *SPECTRAL.values()), 1), "arias_m_s": 2}
+"""Measures that grow with the amplitude of the shaking, and to which power."""
+
+ABOUT_SCATTER = frozenset({*SCATTERED, "pgv_tau", "amplification_sigma"})
+"""What a question may state of the scatter of its measures."""
+
+MEASURES = frozenset({*STATED, "xp_m_s", *ABOUT_SCATTER})
+"""The names of all that a question states of the shaking: measures and their scatter."""
 
 ALONE = ("pgv_m_s", "sa10_g", "pga_g")
 """Measures that a shipped model reads alone, by falling skill."""

@@ -13,7 +13,7 @@ from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
-from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
+from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, Bound, Form, Method, Numbers
 from rbfrag.fragility.methods import method_named, method_names
 
@@ -181,7 +181,12 @@ class FragilityModel:
 
     @property
     def uncertain(self) -> bool:
-        """Whether it answers for blocks that are not known exactly."""
+        """Whether it answers for blocks or shaking that are not known exactly."""
+        return False
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain: P itself then tells how much lies out of the ranges."""
         return False
 
     @property
@@ -250,7 +255,7 @@ class FragilityModel:
         return ranges
 
     def _clear_range(self, name: str) -> Range:
-        if name in self.method.block.sigmas:
+        if name in self.method.block.sigmas or name in ABOUT_SCATTER:
             return Range(name, 0.0, HIGHEST)
         low, high = LOWEST, HIGHEST
         for least, most, *_ in (
@@ -261,6 +266,18 @@ class FragilityModel:
         ):
             low, high = max(low, least), min(high, most)
         return Range(name, low, high)
+
+    def lies_outside(self, values: dict[str, Any], ns: Numbers) -> Any:
+        """Return whether completed values lie outside the ranges that were fitted."""
+        values = self.with_ratios(values)
+        outside: Any = False
+        for name, (low, high) in self.row.domain.items():
+            if name in values:
+                value = values[name]
+                outside = outside | (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
+        if self.spread is not None:
+            outside = outside | (self.spread.holds(values, ns) ^ True)
+        return outside
 
     def bounds(self, given: Collection[str]) -> tuple[Bound, ...]:
         """Return what mechanics forbids of a question that gives values of some names."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
+from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.solver.kinds import mode_of_kind
@@ -58,6 +59,9 @@ class Prediction:
         block_sd: standard deviation of P over what an uncertain block may be; None where it is
             certain.
         data: the database that the model is of; None of a model that was given itself.
+        shaking: where the shaking is uncertain, the median of each measure that scatters, the
+            standard deviation ``sigma`` of its logarithm, and ``tau``, the part of it that all
+            sites of an earthquake share, where that is known; else None.
     """
 
     kind: str
@@ -79,6 +83,7 @@ class Prediction:
     median_displacement_m: float | None = None
     block_sd: float | None = None
     data: str | None = field(default=None, compare=False)
+    shaking: dict[str, dict[str, float]] | None = None
 
     @property
     def mode(self) -> str:
@@ -156,29 +161,54 @@ def answer_given(
     """Return the answer of one model for values by name; see :func:`predict`."""
     if sites is not None:
         answer = answer_given(model, given, level, nan=nan, interval=interval, weights=weights)
-        return _at_sites(answer, model, sites)
+        return _at_sites(answer, model, sites, given, weights)
     if not given.keys() >= {*model.method.block.names}:
         check_numbers(model.kind, model.method.block, given)
     quantiles = quantiles_of(checked_level(level))
+    # Kept apart: most questions are about certain blocks and shaking, and need no more.
+    certain, scatter, tau = model, None, None
+    if not ABOUT_SCATTER.isdisjoint(given):
+        from rbfrag.fragility.shaking import Scatter, ShakenModel
+
+        tau = given.get("pgv_tau")
+        scatter, given = Scatter.of(model.term, given)
     if weights is not None:
         from rbfrag.fragility.uncertain import drawn_model
 
-        model, given = drawn_model(model, given, weights)
+        model, given = drawn_model(certain, given, weights)
     elif not model.method.block.sigmas.keys().isdisjoint(given):
-        # Kept apart: most questions are about certain blocks, and need no numpy.
         from rbfrag.fragility.uncertain import uncertain_model
 
-        model, given = uncertain_model(model, given)
+        model, given = uncertain_model(certain, given)
     singles = single_numbers(given)
+    if scatter is not None:
+        if model is certain and singles is not None and scatter.single:
+            model = ShakenModel.over(certain, scatter)
+        else:
+            from rbfrag.fragility.shaking_points import ShakingPoints
+            from rbfrag.fragility.uncertain import UncertainModel
+
+            points = ShakingPoints(certain, scatter)
+            model = UncertainModel.over(certain, getattr(model, "possible", None), points)
     if singles is not None:
-        return _answer_single(model, singles, quantiles)
+        answer = _answer_single(model, singles, quantiles)
+        if scatter is None:
+            return answer
+        about = scatter.in_numbers(singles, tau)
+        return type(answer)(**(vars(answer) | {"shaking": about}))
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
 
     return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
-def _at_sites(answer: A, model: FragilityModel, sites: float) -> A:
+def _at_sites(
+    answer: A,
+    model: FragilityModel,
+    sites: float,
+    given: Mapping[str, ArrayLike],
+    weights: ArrayLike | None,
+) -> A:
     """Return an answer with the range of the share that fails at some sites of one earthquake."""
     if isinstance(sites, bool | str) or sites not in range(1, MOST_SITES + 1):
         raise InputError(
@@ -189,10 +219,42 @@ def _at_sites(answer: A, model: FragilityModel, sites: float) -> A:
     if model.dependence is None:
         return with_remarks(answer, (NO_EVENT_RANGE,))
     # Kept apart: a single answer loads no library.
+    scatters = not ABOUT_SCATTER.isdisjoint(given)
+    if scatters and isinstance(answer, Prediction) and answer.shaking is None:
+        scatters = False
+    if scatters:
+        if not isinstance(answer, Prediction) or "pgv_tau" not in given or weights is not None:
+            return with_remarks(answer, (NOT_SHARED,))
+        return _shaken_at_sites(answer, model, int(sites), given)
     from rbfrag.fragility.joint import share_range
 
     ends = share_range(answer.probability, model.dependence, int(sites), answer.level)
     low, high = map(float, ends) if isinstance(answer, Prediction) else ends
+    return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
+
+
+NOT_SHARED = (
+    "what the sites of one earthquake share of the shaking (pgv_tau) is not known here: the range "
+    "of one future earthquake is left out"
+)
+
+
+def _shaken_at_sites(
+    answer: A, model: FragilityModel, sites: int, given: Mapping[str, ArrayLike]
+) -> A:
+    from rbfrag.fragility.shaking import Scatter
+    from rbfrag.fragility.shaking_points import ShakingPoints
+    from rbfrag.fragility.shared_shaking import shaken_share_range
+    from rbfrag.fragility.uncertain import UncertainModel, uncertain_model
+
+    scatter, rest = Scatter.of(model.term, given)
+    if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
+        return with_remarks(answer, (NOT_SHARED,))
+    some, rest = uncertain_model(model, rest)
+    points = ShakingPoints(model, scatter)
+    along, sigma = UncertainModel.over(model, getattr(some, "possible", None), points).along(rest)
+    tau = single("pgv_tau", given["pgv_tau"])
+    low, high = shaken_share_range(along, tau, sigma, model.dependence, sites, answer.level)
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import NOTABLE_SHARE, Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
+from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
@@ -326,7 +327,7 @@ def _answer_with_diagnostics(
         sentences.add(holds, "unstable")
 
     block = model.method.block
-    stated = [name for name in (*block.options, *block.sigmas) if name in given]
+    stated = [name for name in (*block.options, *block.sigmas, *ABOUT_SCATTER) if name in given]
     needed = [*block.names, *model.term.inputs, *stated]
     judgement = answer_with_findings(
         model, given, needed, quantiles, arrays(),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, unused_measures
-from rbfrag.fragility.measures import SPECTRAL, STATED
+from rbfrag.fragility.measures import ABOUT_SCATTER, SPECTRAL, STATED
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import (
     MotionPrediction,
@@ -29,6 +29,9 @@ Polarity = Literal["forward", "reverse", "both"]
 
 UNRECORDED = ("magnitude",)
 """What is known of an earthquake and not seen in its record."""
+
+NOT_OF_A_RECORD = ("rjb_km", "vs30_m_s", "amplification")
+"""What says how strong the shaking is where there is no record of it."""
 
 SIMULATED = (
     "what a known motion does to an uncertain block is simulated, by rbfrag respond with draws or "
@@ -56,7 +59,8 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
-    extra = [name for name in given if name in STATED and name not in UNRECORDED]
+    beside = {*STATED, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
+    extra = [name for name in given if name in beside]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"

@@ -1,9 +1,9 @@
-"""Blocks that are not known exactly: the probability over all that one may be.
+"""Blocks and shaking that are not known exactly: the probability over all that they may be.
 
-P = Σ w_i F(eta_i) over what the block may be. The interval is that of the sum: the slope of the sum
-by each parameter is Σ w_i F'(eta_i) x_i, one step of the parameters moves all blocks together, and
-the ends are taken on eta as those of a certain block. For a lognormal fragility and a lognormal
-strength all of it is exact: the variances add up.
+P = Σ w_i F(eta_i) over the product of what the block and what the shaking may be. The interval is
+that of the sum: the slope of the sum by each parameter is Σ w_i F'(eta_i) x_i, one step of the
+parameters moves all together, and the ends are taken on eta as those of a certain block. For a
+lognormal fragility and a lognormal strength all of it is exact: the variances add up.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Eta, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 
@@ -30,7 +31,7 @@ REACH = 5.5
 STRENGTH_POINTS, OTHER_POINTS = 65, 33
 """Points of the strength, in which P is steepest, and of what else is uncertain."""
 
-_AT_ONCE = 1 << 16
+_AT_ONCE = 1 << 15
 
 
 def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray]:
@@ -60,7 +61,7 @@ class Possible(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class BlockScatter:
     """Strength and size lognormal about medians, fractions normal cut at 0 and 1; independent.
 
     Args:
@@ -73,7 +74,7 @@ class Scatter:
     weight: FloatArray
 
     @classmethod
-    def of(cls, block: BlockParameters, sigmas: Iterator[str]) -> Scatter:
+    def of(cls, block: BlockParameters, sigmas: Iterator[str]) -> BlockScatter:
         """Return the points for what is uncertain of a block, a product of steps.
 
         Args:
@@ -128,22 +129,55 @@ class Draws:
         return result
 
 
+@dataclass(frozen=True, eq=False)
+class _Certain:
+    """One block, as it is given."""
+
+    weight: FloatArray = field(default_factory=lambda: np.ones(1))
+
+    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return nothing: no value changes."""
+        del given
+        return {}
+
+
 @dataclass(frozen=True)
 class UncertainModel(FragilityModel):
-    """A fitted model that answers for blocks that are not known exactly."""
+    """A fitted model that answers for blocks and shaking that are not known exactly.
+
+    Args:
+        possible: what the block may be.
+        points: what the shaking may be; None where it is certain.
+        judged: whether it is asked how much lies outside the ranges that were fitted.
+    """
 
     possible: Possible = field(kw_only=True)
+    points: ShakingPoints | None = field(kw_only=True, default=None)
+    judged: bool = field(kw_only=True, default=True)
 
     @classmethod
-    def over(cls, model: FragilityModel, possible: Possible) -> UncertainModel:
-        """Return a model that answers for all that a block may be."""
+    def over(
+        cls,
+        model: FragilityModel,
+        possible: Possible | None = None,
+        points: ShakingPoints | None = None,
+        *,
+        judged: bool = True,
+    ) -> UncertainModel:
+        """Return a model that answers for all that a block may be, and its shaking."""
         own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
-        return cls(**own, possible=possible)
+        some = _Certain() if possible is None else possible
+        return cls(**own, possible=some, points=points, judged=judged)
 
     @property
     def uncertain(self) -> bool:
-        """Whether it answers for uncertain blocks."""
+        """Whether it answers for what is not known exactly."""
         return True
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain."""
+        return self.points is not None
 
     def bounds(self, given: Any) -> tuple[Bound, ...]:
         """Return nothing: what mechanics forbids is asked of each block that it may be."""
@@ -161,61 +195,119 @@ class UncertainModel(FragilityModel):
         del values  # they are those of the medians
         columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in given.items()}
         size = max(column.size for column in columns.values())
-        step = max(1, _AT_ONCE // self.possible.weight.size)
+        each, points, factors = self.possible.weight.size, self.points, np.empty(0)
         parts = []
         with np.errstate(all="ignore"):
+            if points is not None:
+                each *= points.weight.size
+                factors = points.factors(columns)
+            step = max(1, _AT_ONCE // each)
             for start in range(0, size, step):
                 own = {n: c if c.size == 1 else c[start : start + step] for n, c in columns.items()}
-                parts.append(self._part(own, quantiles, min(step, size - start)))
+                of_these = factors if len(factors) <= 1 else factors[start : start + step]
+                parts.append(self._part(own, of_these, quantiles, min(step, size - start)))
         rows = [None if row[0] is None else np.concatenate(row) for row in zip(*parts, strict=True)]
         if ns is SINGLE:
             return Answer(*(None if row is None else float(row[0]) for row in rows))
         return Answer(*rows)
 
+    def along(self, given: Mapping[str, Any]) -> tuple[FloatArray, float]:
+        """Return P of one question at each point of the first measure, and its deviation.
+
+        Args:
+            given: the question, single numbers.
+        """
+        assert self.points is not None
+        columns = {name: np.array([float(value)]) for name, value in given.items()}
+        weight = self.points.weight
+        with np.errstate(all="ignore"):
+            values = self._values(columns, self.points.factors(columns))
+            p = self._certain(values, (self.possible.weight.size, *weight.shape, 1))[0]
+        over = tuple(range(1, weight.ndim))
+        each = np.tensordot(self.possible.weight, p, 1)[..., 0]
+        share = weight / weight.sum(axis=over, keepdims=True)
+        return (each * share).sum(axis=over), float(self.points.deviation(columns)[0])
+
     def _part(
-        self, given: Mapping[str, FloatArray], quantiles: Quantiles | None, size: int
+        self,
+        given: Mapping[str, FloatArray],
+        factors: FloatArray,
+        quantiles: Quantiles | None,
+        size: int,
     ) -> Answer:
         """Return the answer for so many questions at once."""
-        ns, weight = arrays(), self.possible.weight
-        blocks = {**given, **self.possible.blocks(given)}
-        values = self.method.block.completed(blocks, self.term, ns)
-        unscaled, h = self.form.unscaled(self.parameters, values, ns)
-        eta = np.broadcast_to(unscaled.eta * h, (weight.size, size))
-        forbidden = np.zeros(eta.shape, dtype=np.bool_)
-        for bound in FragilityModel.bounds(self, values):
-            forbidden |= bound.holds(values)
+        ns, of_block, points = arrays(), self.possible.weight, self.points
+        # blocks, each variable of the shaking, and questions are the axes
+        of_shaking = np.ones(()) if points is None else points.weight
+        weight = np.multiply.outer(of_block, of_shaking)
+        shape, axes = (*weight.shape, size), tuple(range(weight.ndim))
+        values = self._values(given, factors)
+        p, forbidden, eta, unscaled, h = self._certain(values, shape)
         link = self.method.link
-        p = np.where(forbidden, 0.0, link.probability(eta, ns))
-        middle = weight @ p
-        answer = Answer(
-            middle, None, None, None, None,
-            block_sd=np.sqrt(weight @ np.square(p - middle)),
-            outside=weight @ self._outside(values, eta.shape),
-        )  # fmt: skip
+        middle = np.tensordot(weight, p, len(axes))
+        block_sd = None
+        if points is None or of_block.size > 1:
+            each = np.tensordot(of_shaking, np.moveaxis(p, 0, -2), of_shaking.ndim)
+            block_sd = np.sqrt(of_block @ np.square(each - middle))
+        outside = self._outside(values, p, weight) if self.judged else None
+        answer = Answer(middle, None, None, None, None, block_sd, outside)
         if quantiles is None:
             return answer
         # d(mean P) by each parameter over F' at the mean: slopes of the eta that has the mean P
-        share = weight[:, None] * np.where(forbidden, 0.0, link.density(eta, ns) * h)
+        share = weight[..., None] * np.where(forbidden, 0.0, link.density(eta, ns) * h)
         decided = (middle <= 0.0) | (middle >= 1.0)
         at = link.quantile(np.where(decided, 0.5, middle), ns)
         per = np.where(decided, 0.0, 1.0 / link.density(at, ns))
-        slopes = [np.nansum(share * slope, axis=0) * per for slope in unscaled.slopes]
+        sums: dict[tuple[int, ...], FloatArray] = {}
+
+        def total(slope: Any) -> FloatArray:
+            """Return Σ share · slope; along the axes that a slope does not have, share adds up."""
+            long = np.reshape(slope, (1,) * (len(shape) - np.ndim(slope)) + np.shape(slope))
+            same = tuple(axis for axis in axes if long.shape[axis] == 1)
+            if same not in sums:
+                sums[same] = share.sum(axis=same, keepdims=True)
+            return np.asarray(np.nansum(sums[same] * long, axis=axes))
+
+        slopes = [total(slope) * per for slope in unscaled.slopes]
         reach = self.errors.half_width(slopes, quantiles, ns)
         low, high = (
             np.where(decided, middle, link.probability(at + end * reach, ns)) for end in (-1.0, 1.0)
         )
         return answer._replace(low=low, high=high)
 
-    def _outside(self, values: dict[str, Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
-        """Return where a block that it may be lies outside the ranges that were fitted."""
-        values = self.with_ratios(values)
-        inside = np.ones(shape, dtype=np.bool_)
-        for name, (low, high) in self.row.domain.items():
-            if name in values:
-                inside &= (values[name] >= low * (1.0 - 1e-9)) & (values[name] <= high * (1 + 1e-9))
-        if self.spread is not None:
-            inside &= self.spread.holds(values, arrays())
-        return np.where(inside, 0.0, 1.0)
+    def _values(self, given: Mapping[str, FloatArray], factors: FloatArray) -> dict[str, Any]:
+        """Return completed values of all that block and shaking may be."""
+        ndim = 0 if self.points is None else self.points.weight.ndim
+        apart = (slice(None), *[None] * ndim)
+        blocks = {name: each[apart] for name, each in self.possible.blocks(given).items()}
+        values: dict[str, Any] = {**given, **blocks}
+        if self.points is not None:
+            measures = self.points.measures(given, factors)
+            values |= {name: each[None] for name, each in measures.items()}
+        return self.method.block.completed(values, self.term, arrays())
+
+    def _certain(
+        self, values: Mapping[str, Any], shape: tuple[int, ...]
+    ) -> tuple[FloatArray, Any, FloatArray, Eta, Any]:
+        """Return P of each, where mechanics forbids failure, eta, and what that is made of."""
+        ns = arrays()
+        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        eta = np.broadcast_to(unscaled.eta * h, shape)
+        forbidden: Any = False
+        for bound in FragilityModel.bounds(self, values):
+            forbidden = forbidden | bound.holds(values)
+        p = np.where(forbidden, 0.0, self.method.link.probability(eta, ns))
+        return p, forbidden, eta, unscaled, h
+
+    def _outside(self, values: dict[str, Any], p: FloatArray, weight: FloatArray) -> Any:
+        """Return the share of the block, or of P where the shaking scatters, outside the ranges."""
+        outside = np.broadcast_to(self.lies_outside(values, arrays()), p.shape)
+        if self.points is None:
+            return np.tensordot(weight, outside, weight.ndim)
+        # of low shaking, which fails nothing, nothing is to be said
+        share = np.tensordot(weight, p * outside, weight.ndim)
+        whole = np.tensordot(weight, p, weight.ndim)
+        return np.divide(share, whole, out=np.zeros(share.shape), where=whole > 0.0)
 
 
 def drawn_model(
@@ -283,4 +375,4 @@ def uncertain_model(
     own = [sigma for sigma in sigmas if sigma in rest]
     if not own:
         return model, rest
-    return UncertainModel.over(model, Scatter.of(model.method.block, iter(own))), rest
+    return UncertainModel.over(model, BlockScatter.of(model.method.block, iter(own))), rest

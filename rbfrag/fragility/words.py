@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,6 +51,14 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         sentences.append(
             "The block is uncertain: among what it may be, P differs with a standard deviation of "
             f"{of_block:.2g}."
+        )
+    for name, about in (document.get("shaking") or {}).items():
+        low, high = (about["median"] * math.exp(end * about["sigma"]) for end in (-1.0, 1.0))
+        measure, _, unit = name.partition("_")
+        sentences.append(
+            f"The shaking is uncertain: the median of {measure.upper()} is {about['median']:.3g} "
+            f"{unit.replace('_', '/')} with a scatter of {about['sigma']:.2f} in ln, {low:.2g} to "
+            f"{high:.2g} in two of three cases."
         )
     return tuple(sentences)
 

@@ -7,7 +7,7 @@ The residual of the logarithm of a measure at a site is
 with σ the map's standard deviation there, B common to the earthquake, W(x) the within-event
 residual with the spatial correlation of Jayaram and Baker (2009), and s ξ the scatter of a single
 component, independent from site to site. Residuals of several measures at a place correlate as in
-:func:`rbfrag.hazards.correlations.correlation`; they share the range of the first. Given the
+:func:`rbfrag.fragility.shaking.correlation`; they share the range of the first. Given the
 shaking the blocks fail by the copula of the model that answers, so that every block's P is the mean
 that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
 """
@@ -25,7 +25,7 @@ from scipy.special import ndtr
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.hazards.correlations import correlations
+from rbfrag.fragility.shaking_points import correlations
 from rbfrag.hazards.site_probability import SiteProbability
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.prediction_array import predict_many
+from rbfrag.fragility.shaking import Scatter
+from rbfrag.fragility.shaking_points import ShakingPoints
+from rbfrag.fragility.uncertain import UncertainModel
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.question.fields import AnsweringFields, V
@@ -22,22 +23,17 @@ from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]
 
-REACH = 4.0
-"""Standard deviations of the shaking that are integrated over, to both sides."""
-
 NOTHING = 1e-9
-"""Where even the strongest of these has a smaller probability, zero is answered."""
+"""Where certain shaking has a smaller probability, zero is answered."""
 
-_SILENT = (2.0, 0.0, -2.0)
+_STRONGEST, RARE = 4.8, 1e-5
+"""Where P is smaller at this score of the first measure, zero is answered: 8e-7 of the shaking is
+stronger."""
+
+_SILENT = (3.0, 1.5, 0.0, -1.5)
 """Scores of the first measure below which is not integrated where nothing fails at one of them."""
 
-_STEP = 0.2
-"""Greatest step in ln PGV: fragilities are wider."""
-
-_CHUNK = 400_000
-
-_MOST_GRID, _SOBOL_POWER = 2, 10
-"""Most variables that a grid of points is laid over, and the power of two that draw more."""
+_CHUNK = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +80,7 @@ def site_probability(
 
     The best model that the measures suffice for reads its own of them. Their logarithms at a site
     are taken as normal about those of the given values, with the given standard deviations and the
-    correlations of :func:`~rbfrag.hazards.correlations.correlation`; to these the scatter of a
+    correlations of :func:`~rbfrag.fragility.shaking.correlation`; to these the scatter of a
     single component about the stated definition is added, common to all.
 
     Args:
@@ -110,45 +106,50 @@ def site_probability(
     weights = np.full(size, 1.0) if weight is None else weight
     weights = np.ones(n) if own_block else weights / weights.sum()
     blocks = 1 if own_block else size
-    across = bool(shaking.integrated)
-    widest = float(shaking.factors[:, 0, 0].max(initial=0.0))
+    scatter, _ = Scatter.of(chosen.term, shaking.given(np.arange(n)))
 
-    def answers(site: Indices, block: Indices, points: FloatArray) -> PredictionArray:
-        """Return answers for pairs of site and block at normal scores, shape (pairs, points)."""
-        own = {name: values[block, None] for name, values in columns.items()}
-        return array_answer(chosen, {**own, **shaking.at(site, points)}, level)
+    def pairs_of(site: Indices, block: Indices) -> dict[str, FloatArray]:
+        """Return block and shaking of pairs of site and block."""
+        return {**{name: values[block] for name, values in columns.items()}, **shaking.given(site)}
 
-    k = len(shaking.names)
     in_domain = np.empty(n, dtype=bool)
-    median_point = np.zeros((1, k))
-    strong = median_point if widest == 0.0 else _strongest(k, across=across)
-    alive = []
-    for sites in _chunks(np.arange(n), _CHUNK // (blocks * len(strong))):
+    pairs: dict[float, list[Indices]] = {}
+    for sites in _chunks(np.arange(n), _CHUNK // blocks):
         site = np.repeat(sites, blocks)
         block = site if own_block else np.tile(np.arange(blocks), sites.size)
-        # the median answers for the domain, the strongest shaking for what can fail at all
-        median = answers(site, block, median_point)
+        given = pairs_of(site, block)
+        measures = {name: given[name] for name in (*columns, *shaking.names)}
+        median = array_answer(chosen, measures, level, interval=False)
         in_domain[sites] = median.in_domain.reshape(-1, blocks).all(axis=1)
-        strongest = np.nan_to_num(answers(site, block, strong).ci_high, nan=np.inf).max(axis=1)
-        alive.append(np.stack([site, block])[:, strongest > NOTHING])
-    site, block = np.concatenate(alive, axis=1)
-    points, both = median_point, np.ones(1)
-    silent = np.full(site.size, -np.inf)
-    if widest > 0.0:
-        points, both = _points(k, widest, across=across)
-        for score in _SILENT:  # the highest of these at which nothing fails yet
-            for some in _chunks(np.flatnonzero(silent == -np.inf), _CHUNK // len(strong)):
-                strong[:, 0] = score
-                most = np.nan_to_num(answers(site[some], block[some], strong).ci_high, nan=np.inf)
-                silent[some[most.max(axis=1) <= NOTHING]] = score
-    each = np.zeros((3, site.size))
-    for score in np.unique(silent):
-        above = points[:, 0] > score
-        for some in _chunks(np.flatnonzero(silent == score), _CHUNK // int(above.sum())):
-            answer = answers(site[some], block[some], points[above])
-            each[0, some] = answer.probability @ both[above]
-            each[1, some] = answer.ci_low @ both[above]
-            each[2, some] = answer.ci_high @ both[above]
+        both = np.stack([site, block])
+        if scatter is None:
+            pairs.setdefault(-np.inf, []).append(both[:, ~(median.probability <= NOTHING)])
+            continue
+        points = ShakingPoints(chosen, scatter)
+        for score in (_STRONGEST, *_SILENT):  # the highest of these at which nothing fails yet
+            fails = points.fails_at(
+                pairs_of(*both), score, RARE if score == _STRONGEST else NOTHING
+            )
+            if score < _STRONGEST:
+                pairs.setdefault(score, []).append(both[:, ~fails])
+            both = both[:, fails]
+        pairs.setdefault(-np.inf, []).append(both)
+    answers = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), *np.empty((3, 0)))]
+    for score, some in pairs.items():
+        site, block = np.concatenate(some, axis=1)
+        model = chosen
+        if scatter is not None:
+            points = ShakingPoints(chosen, scatter, score)
+            model = UncertainModel.over(chosen, None, points, judged=False)
+        for part in _chunks(np.arange(site.size), _CHUNK):
+            answer = predict_many(
+                model, pairs_of(site[part], block[part]), quantiles_of(level),
+                interval=True, refuse_nan=False,
+            )  # fmt: skip
+            answers.append(
+                (site[part], block[part], answer.probability, answer.ci_low, answer.ci_high)
+            )
+    site, block, *each = (np.concatenate(column) for column in zip(*answers, strict=True))
     probability, low, high = (
         np.bincount(site, row * weights[block], n).astype(np.float64) for row in each
     )
@@ -159,34 +160,3 @@ def site_probability(
 
 def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
     return [places[i : i + max(size, 1)] for i in range(0, places.size, max(size, 1))]
-
-
-def _strongest(k: int, *, across: bool) -> FloatArray:
-    """Return scores of the strongest shaking, the first measure at its reach, shape (points, k)."""
-    others = np.array(list(product((-3.0, 0.0, 3.0) if across else (0.0,), repeat=k - 1)))
-    return np.column_stack([np.full(len(others), REACH), others])
-
-
-def _points(k: int, widest: float, *, across: bool) -> tuple[FloatArray, FloatArray]:
-    """Return points of k standard normal variables, shape (points, k), and their weights.
-
-    One variable is taken in equal steps, a second in five; four and more are drawn by a sequence of
-    low discrepancy (Sobol), whose mean is good to some thousandths of P.
-
-    Args:
-        widest: greatest standard deviation that the first one stands for.
-        across: False where the others do not vary beside the first.
-    """
-    if k > _MOST_GRID and across:
-        from scipy.stats import norm, qmc
-
-        sobol = qmc.Sobol(k, scramble=True, rng=np.random.default_rng(0))
-        drawn = norm.ppf(sobol.random_base2(_SOBOL_POWER))
-        return drawn, np.full(len(drawn), 1.0 / len(drawn))
-    count = 2 * math.ceil(REACH * widest / _STEP) + 1
-    x, wx = normal_steps(min(max(count, 9), 65), REACH)
-    y, wy = normal_steps(5 if k > 1 and across else 1, 3.0)
-    points = np.zeros((x.size * y.size, k))
-    points[:, 0] = np.repeat(x, y.size)
-    points[:, 1:2] = np.tile(y, x.size)[:, None]
-    return points, np.repeat(wx, y.size) * np.tile(wy, x.size)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.measures import SCATTERED
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.conversions import Component
-from rbfrag.hazards.correlations import correlations
 from rbfrag.solver.results import FloatArray
 
 
@@ -59,16 +58,17 @@ class SiteShaking:
         """The measures."""
         return self.model.term.inputs
 
-    @cached_property
-    def factors(self) -> FloatArray:
-        """Lower factors of the covariances of the logarithms, shape (n, k, k)."""
-        own = correlations(self.names) * self.deviations[:, :, None] * self.deviations[:, None, :]
-        return _cholesky(own + self.scatter**2)
-
-    def at(self, site: NDArray[np.intp], scores: FloatArray) -> dict[str, FloatArray]:
-        """Return measures by name, shape (sites, points), at normal scores, shape (points, k)."""
-        logs = self.factors[site] @ scores.T
-        return self.shaken(site, np.moveaxis(logs, 1, -1))
+    def given(self, site: NDArray[np.intp]) -> dict[str, FloatArray]:
+        """Return medians by name, and the scatter about them, at some sites."""
+        return {
+            **{name: self.median[site, i] for i, name in enumerate(self.names)},
+            **{
+                sigma: self.deviations[site, self.names.index(name)]
+                for sigma, name in SCATTERED.items()
+                if name in self.integrated
+            },
+            **({"amplification_sigma": np.array([self.scatter])} if self.scatter else {}),
+        }
 
     def shaken(self, site: NDArray[np.intp], logs: FloatArray) -> dict[str, FloatArray]:
         """Return measures by name with residuals of their logarithms, shape (sites, points, k)."""
@@ -90,18 +90,3 @@ def integrated_deviations(
     if not all(name in std_ln for name in needed):
         return {}
     return {name: std_ln[name] for name in names if name in std_ln}
-
-
-def _cholesky(covariance: FloatArray) -> FloatArray:
-    """Return lower factors of covariances that may be singular, shape (n, k, k)."""
-    n, k, _ = covariance.shape
-    factor = np.zeros((n, k, k))
-    for i in range(k):
-        for j in range(i + 1):
-            rest = covariance[:, i, j] - np.einsum("sm,sm->s", factor[:, i, :j], factor[:, j, :j])
-            if i == j:
-                factor[:, i, i] = np.sqrt(np.maximum(rest, 0.0))
-            else:
-                pivot = factor[:, j, j]
-                factor[:, i, j] = np.divide(rest, pivot, out=np.zeros(n), where=pivot > 0.0)
-    return factor

@@ -17,7 +17,7 @@ from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
-from rbfrag.question.fields import RangeFields, ShakingFields
+from rbfrag.question.fields import MeasureFields, RangeFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.question import described
 
@@ -138,7 +138,7 @@ class _OneCurve(TypedDict, total=False):
 
 class FragilityCurveKeywords(
     BlockKeywords[float | None],
-    ShakingFields[float | None],
+    MeasureFields[float | None],
     RangeFields,
     _OneCurve,
     total=False,
@@ -173,7 +173,7 @@ def curve(
 
     numbers = [each for each in (p2, kr) if each is not None]
     block, held, answering, drawing = parts_of(
-        numbers, question, BlockKeywords, ShakingFields, RangeFields, _OneCurve
+        numbers, question, BlockKeywords, MeasureFields, RangeFields, _OneCurve
     )
     held |= spectral(drawing.get("sa_g") or {})
     kind = block.pop("kind", None)

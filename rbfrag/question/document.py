@@ -10,6 +10,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.prediction import Prediction, answer_given
+from rbfrag.question.fields import SCENE
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -23,6 +24,11 @@ OF_EACH_MODEL = (
     "in_domain",
 )  # fmt: skip
 """What a document has of the answer of each suited model."""
+
+BESIDE_A_MOTION = (
+    "the motion is the shaking at its site: leave rjb_km, vs30_m_s, amplification, mechanism and "
+    "gmm out"
+)
 
 
 def prediction_document(
@@ -38,6 +44,8 @@ def prediction_document(
     db: str | PathLike[str] | None = None,
     remarks: Sequence[str] = (),
     weights: ArrayLike | None = None,
+    mechanism: str | None = None,
+    gmm: str | PathLike[str] | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract, and that of every suited model.
 
@@ -54,12 +62,21 @@ def prediction_document(
         db: database of the models, as for :func:`predict`.
         remarks: warnings about the block, which go before those of the answer.
         weights: of draws of the block, which the arrays are then.
+        mechanism: how the fault of a scenario moves.
+        gmm: table of medians and sigmas of a ground-motion model.
 
     Raises:
         InputError: a value that cannot be used, or measures no model can work with.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
+    if mechanism is not None or gmm is not None or not SCENE.isdisjoint(given):
+        if motion is not None:
+            raise InputError(BESIDE_A_MOTION, fields=(*SCENE, "mechanism", "gmm"))
+        from rbfrag.question.scenario import Source, shaken
+
+        given, further = shaken(given, Source(mechanism, gmm), model, db)
+        remarks = (*remarks, *further)
     others: list[Prediction] = []
     unused: tuple[str, ...] = ()
     if motion is not None:

@@ -288,8 +288,8 @@ class BlockFields(
     """What may be said of a block: numbers, or its sides and planes."""
 
 
-class ShakingFields(TypedDict, Generic[V], total=False):
-    """What may be said of the shaking: measures of one horizontal component."""
+class MeasureFields(TypedDict, Generic[V], total=False):
+    """Measures of one horizontal component."""
 
     pgv_m_s: Annotated[
         V, Field("Peak ground velocity", "m/s", ("pgv", "peak_ground_velocity"), least=0.0)
@@ -321,6 +321,74 @@ class ShakingFields(TypedDict, Generic[V], total=False):
             ("mag", "mw", "moment_magnitude"),
             above=0.0,
             most=10.0,
+        ),
+    ]
+
+
+def _deviation(of: str) -> Field:
+    return Field(f"Standard deviation of ln {of}, of which the median is stated", least=0.0)
+
+
+class SceneFields(TypedDict, Generic[V], total=False):
+    """How well measures are known, and what stands for them: the scenario and the site."""
+
+    pgv_sigma: Annotated[V, _deviation("PGV")]
+    pga_sigma: Annotated[V, _deviation("PGA")]
+    sa03_sigma: Annotated[V, _deviation("SA(0.3)")]
+    sa10_sigma: Annotated[V, _deviation("SA(1.0)")]
+    sa30_sigma: Annotated[V, _deviation("SA(3.0)")]
+    pgv_tau: Annotated[
+        V,
+        Field(
+            "Part of {pgv_sigma} that all sites of one earthquake share, for the range with "
+            "{sites}",
+            least=0.0,
+        ),
+    ]
+    rjb_km: Annotated[
+        V,
+        Field(
+            "Distance from the surface projection of the rupture, instead of measures, with "
+            "{magnitude} and {vs30_m_s}",
+            "km",
+            ("rjb", "r_jb", "joyner_boore_distance"),
+            least=0.0,
+        ),
+    ]
+    vs30_m_s: Annotated[
+        V, Field("Mean velocity of shear waves in the upper 30 m", "m/s", ("vs30",), above=0.0)
+    ]
+    amplification: Annotated[
+        V, Field("Factor on all measures for the shape of the ground", above=0.0)
+    ]
+    amplification_sigma: Annotated[V, Field("Standard deviation of ln {amplification}", least=0.0)]
+
+
+SCENE = frozenset({"rjb_km", "vs30_m_s", "amplification"})
+"""Fields that are turned into measures before a model is asked."""
+
+
+class ShakingFields(MeasureFields[V], SceneFields[V], total=False):
+    """What may be said of the shaking."""
+
+
+class SourceFields(TypedDict, total=False):
+    """What is said of the earthquake of a scenario beside numbers."""
+
+    mechanism: Annotated[
+        str | None,
+        Field(
+            "How the fault moves, with {rjb_km}: strike-slip, normal, reverse or unspecified; "
+            "default: unspecified",
+            is_text=True,
+        ),
+    ]
+    gmm: Annotated[
+        str | PathLike[str] | None,
+        Field(
+            "CSV table of medians and sigmas of another ground-motion model: rjb_km, pgv_m_s, "
+            "pgv_sigma, pgv_tau and the like, a row a distance",
+            is_text=True,
         ),
     ]
 
@@ -397,7 +465,7 @@ class RangeFields(AnsweringFields, total=False):
     ]
 
 
-class RequestFields(RangeFields, total=False):
+class RequestFields(RangeFields, SourceFields, total=False):
     """What is asked of blocks and their shaking."""
 
     rotation_deg: Annotated[
@@ -483,7 +551,7 @@ class RowFields(TypedDict, total=False):
     loss_sigma: Annotated[float, Field("Standard deviation of the logarithm of the loss")]
 
 
-SPECTRAL = tuple(name for name in ShakingFields.__annotations__ if name.startswith("sa"))
+SPECTRAL = tuple(name for name in MeasureFields.__annotations__ if name.startswith("sa"))
 
 _CLASSES = (QuestionFields, AtRestFields, RowFields)
 
@@ -538,7 +606,7 @@ def column_of(name: str) -> str:
     return declared()[name].column or name
 
 
-_UNIT = re.compile("_(deg|m_s|kg_m3|pa|m|g|s)$")
+_UNIT = re.compile("_(deg|m_s|kg_m3|pa|km|m|g|s)$")
 
 OTHER_WORDS = {"dip": "beta_deg"}
 """Further words for fields, which shell and requests take too."""

@@ -15,9 +15,11 @@ from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.prediction import Prediction, answer_given, is_single, with_remarks
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.fields import (
+    SCENE,
     ArrayFields,
     QuestionFields,
     RequestFields,
+    ShakingFields,
     keywords_in_words,
     names_of,
 )
@@ -139,9 +141,13 @@ def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownF
     return UnknownFieldError(f"{name[:60]} is no field of a question{hint}")
 
 
+OF_SHAKING = frozenset({*names_of(ShakingFields), *MEASURES})
+"""Fields that say nothing of the block."""
+
+
 def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
     """Return the single block of a question as answers read it; its measures are left aside."""
-    return one_block({n: value for n, value in given.items() if n not in MEASURES}, kind)
+    return one_block({n: value for n, value in given.items() if n not in OF_SHAKING}, kind)
 
 
 def _answer_motion(
@@ -149,10 +155,14 @@ def _answer_motion(
 ) -> Prediction:
     from rbfrag.fragility.prediction_motion import predict_motion
 
+    for name in ("mechanism", "gmm"):
+        if options.pop(name, None) is not None:
+            measures_of_it = f"{name} given beside a motion: the motion is one; leave it out"
+            raise InputError(measures_of_it, fields=(name,))
     defaults: dict[str, Any] = {"rotation_deg": None, "model": None, "level": 0.95, "db": None}
     of_arrays = ("nan", "interval")
     options = defaults | {name: each for name, each in options.items() if name not in of_arrays}
-    measures = {name: value for name, value in given.items() if name in MEASURES}
+    measures = {name: value for name, value in given.items() if name in OF_SHAKING}
     blocks = described(given, kind)
     group = blocks.groups[0]
     answer = predict_motion(
@@ -174,6 +184,8 @@ def ask(
     nan: Literal["propagate", "raise"] = "propagate",
     interval: bool = True,
     weights: ArrayLike | None = None,
+    mechanism: str | None = None,
+    gmm: str | PathLike[str] | None = None,
     rows: bool = False,
 ) -> Prediction | PredictionArray:
     """Return the answer for blocks and measures by field; see :func:`predict`.
@@ -190,10 +202,22 @@ def ask(
         nan: what becomes of elements that cannot be used.
         interval: whether an interval is asked for.
         weights: of draws of one block.
+        mechanism: how the fault of a scenario moves.
+        gmm: table of medians and sigmas of a ground-motion model.
         rows: the arrays are columns of a table, which may state more than is needed.
     """
     if nan not in ("propagate", "raise"):
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
+    if mechanism is not None or gmm is not None or not SCENE.isdisjoint(given):
+        # Kept apart: most questions state measures.
+        from rbfrag.question.scenario import Source, shaken
+
+        given, remarks = shaken(given, Source(mechanism, gmm), model, db)
+        answer = ask(
+            given, kind=kind, mode=mode, rotation_deg=rotation_deg, sites=sites, model=model,
+            level=level, db=db, nan=nan, interval=interval, weights=weights, rows=rows,
+        )  # fmt: skip
+        return with_remarks(answer, remarks)
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:
         if not has_shape(given):

@@ -18,6 +18,7 @@ from rbfrag.question.fields import (
     AnsweringFields,
     AtRestFields,
     BlockFields,
+    MeasureFields,
     PlaneFields,
     RequestFields,
     ShakingFields,
@@ -44,7 +45,7 @@ Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, f
 COLUMNS = frozenset(names_of(BlockFields, ShakingFields))
 """Fields of which many blocks have one each."""
 
-_NOT_SENT = frozenset({"block", "db"})
+_NOT_SENT = frozenset({"block", "db", "gmm"})
 """Fields that no request can state."""
 
 _HOW = ("kind", *names_of(RequestFields))
@@ -195,7 +196,7 @@ class CriticalQuery(Reading):
     """Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4."""
 
 
-@asking(*names_of(ShakingFields, AnsweringFields))
+@asking(*names_of(MeasureFields, AnsweringFields))
 class RockmassQuery(Parameters):
     """Parameters of `/v1/rockmass`."""
 

@@ -8,9 +8,8 @@ from fastapi import APIRouter, Query, Request
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import models_in_memory
-from rbfrag.fragility.measures import MEASURES
 from rbfrag.question.document import prediction_document
-from rbfrag.question.question import ask, described
+from rbfrag.question.question import OF_SHAKING, ask, described
 from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows
 from rbfrag.service.problem import READ, SENT
@@ -30,7 +29,7 @@ def answer_one(query: PredictQuery, db: str | None) -> dict[str, Any]:
     given, how = query.question()
     blocks = described(given, how.pop("kind", None))
     (group,) = blocks.groups
-    known = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
+    known = {**group.numbers, **{name: given[name] for name in given if name in OF_SHAKING}}
     return prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how, db=db)
 
 

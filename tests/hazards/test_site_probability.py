@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
+from rbfrag.fragility.shaking_points import correlations
 from rbfrag.hazards import site_probability as site_module
 from rbfrag.hazards.conversions import component
-from rbfrag.hazards.correlations import correlation, correlations
 from rbfrag.hazards.site_probability import site_probability
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
@@ -52,11 +52,12 @@ def test_only_sites_where_nothing_can_fail_are_left_out(
 
     some = answer()
     monkeypatch.setattr(site_module, "NOTHING", -1.0)
+    monkeypatch.setattr(site_module, "RARE", -1.0)
     every = answer()
     left_out = some == 0.0
     assert 0 < left_out.sum() < 40
-    assert (every[left_out] <= 1e-9).all()
-    assert some[~left_out] == pytest.approx(every[~left_out], abs=1e-9)
+    assert (every[left_out] <= 8e-7).all()
+    assert some[~left_out] == pytest.approx(every[~left_out], abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["single", "rotd50", "larger"])
@@ -146,20 +147,13 @@ def test_values_without_all_deviations_are_certain(measures_db: str) -> None:
 
 
 def test_correlations_of_the_residuals() -> None:
-    # Baker and Jayaram (2008), figure 5 and equation 9
-    assert correlation("sa03_g", "sa10_g") == pytest.approx(0.574, abs=0.001)
-    assert correlation("sa30_g", "sa10_g") == pytest.approx(0.609, abs=0.001)
-    assert correlation("pga_g", "sa10_g") == pytest.approx(0.519, abs=0.001)
-    assert correlation("pgv_m_s", "pga_g") == 0.733
-    # by hand from the published coefficients
-    assert correlation("pgv_m_s", "sa03_g") == pytest.approx(0.689, abs=0.001)
-    assert correlation("sa10_g", "pgv_m_s") == pytest.approx(0.786, abs=0.001)
-    assert correlation("pgv_m_s", "sa30_g") == pytest.approx(0.758, abs=0.001)
+    # Baker and Bradley (2017), total residuals
     every = correlations(("pgv_m_s", "pga_g", "sa03_g", "sa10_g", "sa30_g"))
+    assert every[0].tolist() == [1.0, 0.6536, 0.6750, 0.7884, 0.7078]
+    assert every[1, 2:].tolist() == [0.8496, 0.4852, 0.3076]
+    assert every[3, 4] == 0.6780
+    assert (every == every.T).all()
     assert np.linalg.eigvalsh(every).min() > 0.0
-    matrix = correlations(ALL)
-    assert (matrix == matrix.T).all()
-    assert (np.linalg.eigvalsh(matrix) > 0.0).all()
 
 
 @pytest.mark.parametrize("names", [("pgv_m_s",), ALL])
@@ -178,4 +172,4 @@ def test_weak_shaking_at_which_nothing_fails_is_not_missed(
 
     some = answer()
     monkeypatch.setattr(site_module, "_SILENT", ())
-    assert some == pytest.approx(answer(), abs=2e-9)
+    assert some == pytest.approx(answer(), abs=1e-7)

@@ -64,7 +64,7 @@ class BatchOptions:
 def predict(
     *,
     given: Annotated[Given, fields_of(BlockFields, WholeFields)],
-    measures: options.Measures,
+    measures: options.Shaking,
     request: Annotated[Given, fields_of(RequestFields)],
     block_draws: options.BlockDraws = None,
     record: RecordOptions,
@@ -85,6 +85,10 @@ def predict(
 
     Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
     shaking: ask for --kind rocking.
+
+    Where no measure is known, --magnitude, --rjb, --vs30 and --mechanism say how strong the shaking
+    is and how it scatters (Boore et al. 2014), or --gmm FILE, a table of another ground-motion
+    model. P is the mean over that scatter, or over that of --pgv-sigma and the like.
 
     A block of which --kr-sigma and the like are given is uncertain: P is the mean over all that it
     may be, and block_sd how much P differs among them.

@@ -13,6 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.question.fields import (
     AnsweringFields,
     FailureFields,
+    MeasureFields,
     NumberFields,
     PlaneFields,
     RangeFields,
@@ -83,8 +84,11 @@ Block = Annotated[
 ]
 """One block of which all is known that is stated, by field."""
 
-Measures = Annotated[Given, fields_of(ShakingFields)]
+Measures = Annotated[Given, fields_of(MeasureFields)]
 """What may be known of a motion, by field."""
+
+Shaking = Annotated[Given, fields_of(ShakingFields)]
+"""The same, how well it is known, and what may stand for it."""
 
 Answering = Annotated[Given, fields_of(AnsweringFields)]
 """Which fragility model answers, and how wide its interval is, by field."""

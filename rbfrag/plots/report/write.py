@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import RangeFields, ShakingFields
+from rbfrag.question.fields import MeasureFields, RangeFields
 from rbfrag.question.keywords import BlockKeywords, parts_of
 
 SUFFIXES = (".pdf", ".png", ".html")
@@ -32,7 +32,7 @@ class _Spectrum(TypedDict, total=False):
 
 class ReportKeywords(
     BlockKeywords[float | None],
-    ShakingFields[float | None],
+    MeasureFields[float | None],
     _Spectrum,
     CurveKeywords,
     RangeFields,
@@ -74,7 +74,7 @@ def report(
         UnknownFieldError: a keyword that is none.
     """
     block, shaking, spectrum, meaning, answering = parts_of(
-        (), question, BlockKeywords, ShakingFields, _Spectrum, CurveKeywords, RangeFields
+        (), question, BlockKeywords, MeasureFields, _Spectrum, CurveKeywords, RangeFields
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     rate = RateQuestion(curve, years, meaning)

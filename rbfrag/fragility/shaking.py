@@ -1,0 +1,181 @@
+"""Shaking that is not known exactly: P is its mean over all that the measures may be.
+
+The logarithms of the measures are normal about those of what is stated, with its standard
+deviations; those of several correlate as total residuals do, and a scatter that all share (of an
+amplification, of a component) is added. P is the sum over 41 points, .3 standard deviations apart:
+P has a kink where mechanics forbids failure, for which Gauss-Hermite is worse by far. One measure
+of a certain block is integrated here, without a library; all else in
+:mod:`rbfrag.fragility.uncertain`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.intervals import Quantiles
+from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, Term
+from rbfrag.fragility.method import Bound, Numbers
+from rbfrag.fragility.model import Answer, FragilityModel
+
+POINTS = tuple(0.3 * i for i in range(-20, 21))
+"""The points of a standard normal variable: steps of .3 to 6 on either side."""
+
+_DENSITY = [math.exp(-0.5 * x * x) for x in POINTS]
+WEIGHTS = tuple(each / sum(_DENSITY) for each in _DENSITY)
+"""Their weights, which sum to 1: P is right to 1e-4 for standard deviations up to 1."""
+
+_ORDER = ("pgv_m_s", "pga_g", "sa03_g", "sa10_g", "sa30_g")
+_CORRELATIONS = (
+    (1.0, 0.6536, 0.6750, 0.7884, 0.7078),
+    (0.6536, 1.0, 0.8496, 0.4852, 0.3076),
+    (0.6750, 0.8496, 1.0, 0.5620, 0.3451),
+    (0.7884, 0.4852, 0.5620, 1.0, 0.6780),
+    (0.7078, 0.3076, 0.3451, 0.6780, 1.0),
+)
+
+
+def correlation(one: str, other: str) -> float:
+    """Return the correlation of the total residuals of the logarithms of two measures (RotD50).
+
+    Baker, J. W. & Bradley, B. A. (2017): Intensity measure correlations observed in the NGA-West2
+    database, and dependence of correlations on rupture and site parameters. Earthquake Spectra
+    33(1), 145-156.
+    """
+    return _CORRELATIONS[_ORDER.index(one)][_ORDER.index(other)]
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What of the shaking that a model reads is known with scatter.
+
+    Args:
+        names: the measures that scatter.
+        common: what a scatter that all share is stated as; None where there is none.
+    """
+
+    names: tuple[str, ...]
+    common: str | None = None
+
+    @classmethod
+    def of(cls, term: Term, given: Mapping[str, Any]) -> tuple[Scatter | None, dict[str, Any]]:
+        """Return the scatter of a question, and the question without what does not scatter.
+
+        Raises:
+            InputError: a standard deviation is negative or no number.
+        """
+        rest = dict(given)
+        for name in ABOUT_SCATTER.intersection(given):
+            value = given[name]
+            if isinstance(value, float | int) and not 0.0 <= value < math.inf:
+                raise InputError(
+                    f"{name} = {value:g}: give a standard deviation of 0 or more", fields=(name,)
+                )
+            nothing = value == 0.0
+            read = SCATTERED.get(name, term.inputs[0]) in term.inputs
+            if (
+                name == "pgv_tau"
+                or not read
+                or (nothing is True or getattr(nothing, "all", bool)())
+            ):
+                del rest[name]
+        stated = {SCATTERED[name] for name in rest if name in SCATTERED}
+        common = "amplification_sigma" if "amplification_sigma" in rest else None
+        moved = [name for name in term.inputs if name in (AMPLIFIED if common else stated)]
+        scatter = cls(tuple(moved), common) if moved else None
+        return scatter, rest
+
+    @property
+    def single(self) -> bool:
+        """Whether one variable says it all."""
+        return len(self.names) == 1
+
+    def in_numbers(self, given: Mapping[str, float], tau: Any) -> dict[str, dict[str, float]]:
+        """Return median, sigma and, where it is known, tau of each measure that scatters."""
+        result = {}
+        for name in self.names:
+            sigma = math.hypot(self.deviation(name, given), self.shared(name, given))
+            result[name] = {"median": given[name], "sigma": sigma}
+        if tau is not None and "pgv_m_s" in result:
+            result["pgv_m_s"]["tau"] = float(tau)
+        return result
+
+    def deviation(self, name: str, given: Mapping[str, Any]) -> Any:
+        """Return the standard deviation of a measure's logarithm by itself."""
+        return given.get(f"{name.partition('_')[0]}_sigma", 0.0)
+
+    def shared(self, name: str, given: Mapping[str, Any]) -> Any:
+        """Return that of what all measures share."""
+        return 0.0 if self.common is None else AMPLIFIED[name] * given[self.common]
+
+
+@dataclass(frozen=True)
+class ShakenModel(FragilityModel):
+    """A fitted model that answers for one measure with scatter and one certain block."""
+
+    scatter: Scatter = field(kw_only=True)
+
+    @classmethod
+    def over(cls, model: FragilityModel, scatter: Scatter) -> ShakenModel:
+        """Return a model that answers for all that the shaking may be."""
+        return cls(
+            **{e.name: getattr(model, e.name) for e in fields(FragilityModel)}, scatter=scatter
+        )
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether it answers for what is not known exactly."""
+        return True
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain."""
+        return True
+
+    def bounds(self, given: Any) -> tuple[Bound, ...]:
+        """Return nothing: what mechanics forbids is asked at each point."""
+        del given
+        return ()
+
+    def answer(
+        self,
+        values: Mapping[str, Any],
+        quantiles: Quantiles | None,
+        ns: Numbers,
+        given: Mapping[str, Any],
+    ) -> Answer:
+        """Return the answer over all that the shaking may be; see :class:`FragilityModel`."""
+        (name,) = self.scatter.names
+        own, shared = (of(name, given) for of in (self.scatter.deviation, self.scatter.shared))
+        sigma, link = math.hypot(own, shared), self.method.link
+        middle = outside = 0.0
+        totals: list[float] = []
+        for x, weight in zip(POINTS, WEIGHTS, strict=True):
+            at = {**given, name: given[name] * math.exp(sigma * x)}
+            values = self.method.block.completed(at, self.term, ns)
+            if any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
+                continue
+            unscaled, h = self.form.unscaled(self.parameters, values, ns)
+            p = weight * link.probability(unscaled.eta * h, ns)
+            middle += p
+            outside += p * self.lies_outside(values, ns)
+            if quantiles is not None:
+                share = weight * h * link.density(unscaled.eta * h, ns)
+                slopes = [share * slope for slope in unscaled.slopes]
+                totals = [a + b for a, b in zip(totals, slopes, strict=True)] if totals else slopes
+        answer = Answer(
+            middle, middle, middle, None, None, None, outside / middle if middle else 0.0
+        )
+        if quantiles is None:
+            return answer._replace(low=None, high=None)
+        if not 0.0 < middle < 1.0 or not totals:
+            return answer
+        # d(mean P) by each parameter over F' at the mean: slopes of the eta that has the mean P
+        at_mean = link.quantile(middle, ns)
+        density = link.density(at_mean, ns)
+        reach = self.errors.half_width([each / density for each in totals], quantiles, ns)
+        low, high = (link.probability(at_mean + end * reach, ns) for end in (-1.0, 1.0))
+        return answer._replace(low=low, high=high)

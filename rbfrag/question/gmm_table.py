@@ -1,0 +1,116 @@
+"""Medians and sigmas of any ground-motion model, from a table by distance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.files import csv_rows, source_text
+from rbfrag.fragility.measures import SCATTERED
+from rbfrag.question.bssa14 import Ordinate
+from rbfrag.question.table import columns_in
+
+SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
+"""Measures, and the name of the standard deviation of each."""
+
+_WHAT = "a table of medians and sigmas"
+_NEAREST_KM = 0.1
+
+Columns = dict[str, NDArray[np.float64]]
+
+
+def read_gmm_table(path: str | PathLike[str]) -> Columns:
+    """Return the columns of a table, by field and in the units of fields, shape (rows,).
+
+    Args:
+        path: CSV with measures and their standard deviations (``pgv_m_s``, ``pgv_sigma``, …), of
+            several rows ``rjb_km``, rising, and ``pgv_tau`` where it is known.
+
+    Raises:
+        InputError: the file cannot be read, or a value in it cannot be used.
+    """
+    rows = [
+        each for each in csv_rows(source_text(path, _WHAT), path) if any(map(str.strip, each[1]))
+    ]
+    (_, header), *rest = rows
+    wanted = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
+    table = {}
+    for name, column in columns_in(header, path, wanted).columns.items():
+        place, values = header.index(column.header), []
+        for line, row in rest:
+            text = row[place] if place < len(row) else ""
+            try:
+                value = float(text)
+            except ValueError:
+                value = math.nan
+            above = value > 0.0 if name in SIGMAS else value >= 0.0
+            if not above or value > 1e9:
+                what = "a number above 0" if name in SIGMAS else "a number, 0 or more"
+                raise InputError(f"{path}, line {line}: {name} = {text[:40]!r} must be {what}")
+            values.append(column.factor * value)
+        table[name] = np.array(values)
+    if not rest or SIGMAS.keys().isdisjoint(table):
+        raise InputError(f"{path} states no median: name columns such as pgv_m_s and pgv_sigma")
+    if "rjb_km" not in table and len(rest) > 1:
+        raise InputError(f"{path} has several rows and no column rjb_km: name their distances")
+    if "rjb_km" in table and (np.diff(np.maximum(table["rjb_km"], _NEAREST_KM)) <= 0.0).any():
+        raise InputError(f"{path}: rjb_km must rise from row to row")
+    return table
+
+
+def of_table(path: str | PathLike[str], rjb_km: Any, names: Collection[str]) -> dict[str, Ordinate]:
+    """Return measures at a distance: ln median and sigma between the rows over ln Rjb.
+
+    Args:
+        path: as for :func:`read_gmm_table`.
+        rjb_km: distance [km], a number or an array; None for a table of one row.
+        names: the measures that are wanted; others than those that scatter are passed over.
+
+    Raises:
+        InputError: a column is missing, or a distance is outside of the table.
+    """
+    table = read_gmm_table(path)
+    distances = table.get("rjb_km", np.empty(0))
+    if distances.size > 1 and rjb_km is None:
+        raise InputError(f"{path} has several distances: give rjb_km", fields=("rjb_km",))
+    if not distances.size and rjb_km is not None:
+        raise InputError(f"{path} has no column rjb_km: leave the distance out", fields=("rjb_km",))
+    at = np.asarray(distances[0] if rjb_km is None and distances.size else rjb_km, np.float64)
+    if distances.size:
+        low, high = distances[0] * (1.0 - 1e-9), distances[-1] * (1.0 + 1e-9)
+        if ((at < low) | (at > high)).any():
+            raise InputError(
+                f"rjb_km is outside of {path}, which has {distances[0]:g} to {distances[-1]:g} km",
+                fields=("rjb_km",),
+            )
+
+    def between(column: NDArray[np.float64]) -> Any:
+        if not distances.size:
+            return float(column[0])
+        over, place = (np.log(np.maximum(each, _NEAREST_KM)) for each in (distances, at))
+        value = np.where(np.isnan(at), np.nan, np.interp(place, over, column))
+        return float(value) if value.ndim == 0 else value
+
+    result = {}
+    for name in names:
+        if name not in SIGMAS:
+            continue
+        for column in (name, SIGMAS[name]):
+            if column not in table:
+                raise InputError(f"{path} has no column {column}, which the model reads")
+        sigma, tau = between(table[SIGMAS[name]]), 0.0
+        if name == "pgv_m_s" and "pgv_tau" in table:
+            tau = between(table["pgv_tau"])
+        within = np.sqrt(np.maximum(sigma * sigma - tau * tau, 0.0))
+        median = np.exp(between(np.log(table[name])))
+        single = np.ndim(median) == 0
+        result[name] = Ordinate(
+            float(median) if single else median, tau, float(within) if single else within
+        )
+    return result

@@ -1,0 +1,193 @@
+"""The shaking of a scenario: from magnitude, distance and ground, and by the ground's shape.
+
+What is said so becomes measures with their scatter before a question is asked. A single site loads
+no library.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from os import PathLike
+from typing import Any, NamedTuple
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import stored_row
+from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, STATED, TERMS
+from rbfrag.fragility.method import SINGLE, Numbers, arrays
+from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.prediction import is_single, single
+from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Ordinate, bssa14
+
+GROUND = ("magnitude", "rjb_km", "vs30_m_s")
+
+_SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
+# that 400 km is the limit of the paper is from memory
+_RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 1500.0)}
+_MOST_OF_NORMAL = 7.0
+
+ANOTHER_MODEL = (
+    "the choice of ground-motion model moves P by a factor of up to 3: ask with the medians and "
+    "sigmas of another one, too (gmm), and average the probabilities, not the medians"
+)
+
+
+class Source(NamedTuple):
+    """What is said of the earthquake beside numbers.
+
+    Args:
+        mechanism: how the fault moves; None where that is not said.
+        gmm: table of medians and sigmas of another ground-motion model.
+    """
+
+    mechanism: str | None = None
+    gmm: str | PathLike[str] | None = None
+
+
+def shaken(
+    given: Mapping[str, Any],
+    source: Source,
+    model: Model | None = None,
+    db: str | PathLike[str] | None = None,
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return a question that states measures and their scatter, and what is to be said of it.
+
+    Args:
+        given: the question, in which magnitude, distance and ground may stand for measures.
+        source: what else is said of the earthquake.
+        model: the model that is asked for, which reads its measures; None for PGV alone.
+        db: its database.
+
+    Raises:
+        InputError: a scenario that is stated in part or beside measures, or out of range.
+    """
+    question, remarks = dict(given), tuple[str, ...]()
+    if source != Source() or not question.keys().isdisjoint(("rjb_km", "vs30_m_s")):
+        names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
+        measures = scenario(given, source, names)
+        remarks = (ANOTHER_MODEL,)
+        question = {name: value for name, value in given.items() if name not in GROUND}
+        if "magnitude" in names and "magnitude" in given:
+            question["magnitude"] = given["magnitude"]
+        ns = _numbers(given)
+        for name, each in measures.items():
+            question[name], question[_SIGMAS[name]] = each.median, each.sigma(ns)
+        if "pgv_m_s" in measures:
+            question["pgv_tau"] = measures["pgv_m_s"].tau
+        own = given.get("amplification_sigma", 0.0)
+        question["amplification_sigma"] = ns.sqrt(own * own + SINGLE_COMPONENT**2)
+    factor = question.pop("amplification", None)
+    if factor is not None:
+        if is_single(factor) and not 0.0 < single("amplification", factor) < math.inf:
+            raise InputError(
+                f"amplification = {factor:g}: give a factor above 0", fields=("amplification",)
+            )
+        for name, power in AMPLIFIED.items():
+            if name in question:
+                question[name] = question[name] * factor**power
+    return question, remarks
+
+
+def scenario(
+    given: Mapping[str, Any], source: Source, names: Collection[str] = MEASURES
+) -> dict[str, Ordinate]:
+    """Return measures of RotD50 in a scenario, by their names, without amplification.
+
+    Args:
+        given: ``magnitude``, ``rjb_km`` [km] and ``vs30_m_s`` [m/s]: numbers, or arrays.
+        source: what else is said of the earthquake.
+        names: the measures that are wanted.
+
+    Raises:
+        InputError: something is missing, given twice, or outside the range of the model.
+    """
+    stated = [n for n in given if (n in STATED or n in _SIGMAS.values()) and n != "magnitude"]
+    if stated:
+        raise InputError(
+            f"{stated[0]} does not go with a scenario, which says how strong the shaking is: leave "
+            "one of them out",
+            fields=(stated[0],),
+        )
+    if source.gmm is not None:
+        # Kept apart: a single site without a table loads no numpy.
+        from rbfrag.question.gmm_table import of_table
+
+        return of_table(source.gmm, given.get("rjb_km"), names)
+    missing = [name for name in GROUND if name not in given]
+    if missing:
+        raise InputError(
+            f"{missing[0]} is missing: a scenario is given by {', '.join(GROUND)} and mechanism",
+            fields=(*GROUND, "mechanism"),
+        )
+    mechanism = source.mechanism or MECHANISMS[0]
+    if mechanism not in MECHANISMS:
+        raise InputError(
+            f"mechanism = {mechanism[:40]!r}: write {' or '.join(MECHANISMS)}",
+            fields=("mechanism",),
+        )
+    ns = _numbers(given)
+    values = {name: _checked(name, given[name], mechanism, ns) for name in GROUND}
+    return {
+        name: bssa14(name, values["magnitude"], values["rjb_km"], values["vs30_m_s"], mechanism, ns)
+        for name in names
+        if name in MEASURES
+    }
+
+
+def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, float]]:
+    """Return the shaking of one site: median, where two thirds lie, and standard deviations of ln.
+
+    Args:
+        given: as for :func:`scenario`, with ``amplification`` and ``amplification_sigma``.
+        source: what else is said of the earthquake.
+    """
+    site = {name: value for name, value in given.items() if not name.startswith("amplif")}
+    names = MEASURES
+    if source.gmm is not None:
+        from rbfrag.question.gmm_table import read_gmm_table
+
+        names = tuple(name for name in _SIGMAS if name in read_gmm_table(source.gmm))
+    result = {}
+    for name, each in scenario(site, source, names).items():
+        median = each.median * given.get("amplification", 1.0)
+        phi = math.hypot(each.phi, given.get("amplification_sigma", 0.0))
+        sigma = math.hypot(each.tau, phi)
+        low, high = (median * math.exp(end * sigma) for end in (-1.0, 1.0))
+        result[name] = {
+            "median": median, "p16": low, "p84": high, "sigma": sigma, "tau": each.tau, "phi": phi,
+        }  # fmt: skip
+    return result
+
+
+def _numbers(given: Mapping[str, Any]) -> Numbers:
+    names = (*GROUND, "amplification", "amplification_sigma")
+    return SINGLE if all(is_single(given[n]) for n in names if n in given) else arrays()
+
+
+def _term(model: Model, db: str | PathLike[str] | None) -> str:
+    if isinstance(model, str):
+        return stored_row(model, db).term
+    return model.term.name if isinstance(model, FragilityModel) else model.term
+
+
+def _checked(name: str, value: Any, mechanism: str, ns: Numbers) -> Any:
+    low, high = _RANGES[name]
+    if name == "magnitude" and mechanism == "normal":
+        high = _MOST_OF_NORMAL
+    if ns is SINGLE:
+        value = worst = single(name, value)
+        outside = not low <= value <= high
+    else:
+        import numpy as np
+
+        value = np.asarray(value, dtype=np.float64)  # what is NaN says why by itself
+        out = np.atleast_1d((value < low) | (value > high))
+        outside, worst = bool(out.any()), np.atleast_1d(value)[int(np.argmax(out))]
+    if outside:
+        raise InputError(
+            f"{name} = {worst:g} is outside of what the ground-motion model (Boore et al. 2014) is "
+            f"for, {low:g} to {high:g}{' of normal faults' if high == _MOST_OF_NORMAL else ''}: "
+            "give medians and sigmas of another model (gmm)",
+            fields=(name, "gmm"),
+        )
+    return value
