@@ -18,6 +18,7 @@ from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, names_of
+from rbfrag.question.sections import ANGLES
 from rbfrag.question.shapes import SHAPES
 from rbfrag.question.table import Header, columns_in
 
@@ -100,6 +101,7 @@ class BlockTable:
             kind: how the blocks fail; None for what they are given by.
         """
         known = {*self.stated.columns, *given}
+        known |= {angle for plane, angle in ANGLES.items() if plane in known}
         if not kinds_by_numbers(known) and not any(known.issuperset(shape) for shape in SHAPES):
             block = block_of(known, kind)
             missing = next(name for name in block.names if name not in known)
