@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import opened_table
+from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
@@ -27,9 +27,6 @@ Columns = Mapping[str, NDArray[Any]]
 
 PLACE = ("lon", "lat")
 """Columns of where blocks stand [deg]."""
-
-TEXTS = ("block_id", "site_id", "kind", "mode", *SPACE)
-"""Columns of texts."""
 
 PORTFOLIO = ("count", "weight", "loss", "loss_sigma")
 """Columns of how many like blocks a row is, what a failure counts and costs, and its scatter."""

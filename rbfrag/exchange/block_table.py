@@ -19,8 +19,11 @@ from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, names_of
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import SHAPES
+from rbfrag.question.shapes import SHAPES, SPACE
 from rbfrag.question.table import Header, columns_in
+
+TEXTS = ("block_id", "site_id", "kind", "mode", *SPACE)
+"""Columns of texts."""
 
 IF_EMPTY = {"count": 1.0, "weight": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
@@ -160,7 +163,7 @@ class BlockTable:
 def opened_table(
     source: str | os.PathLike[str] | Mapping[str, Any],
     read: Collection[str],
-    texts: Collection[str] = ("block_id", "site_id", "kind", "mode"),
+    texts: Collection[str] = TEXTS,
     *,
     sheet: str | None = None,
 ) -> Iterator[BlockTable]:

@@ -125,6 +125,27 @@ def chart(
     return plot_chart(chosen, out, held)
 
 
+def planes(
+    out: Out = None, *, face: str | None = None, base: str | None = None, back: str | None = None
+) -> Picture:
+    """Draw a block's planes on a stereonet, and which planes are none of the face's section.
+
+    Args:
+        out: as for :func:`fit`.
+        face: plane of the slope's face, as dip/dip direction [deg].
+        base: plane of the base.
+        back: plane of the back.
+    """
+    from rbfrag.plots.stereonet import plot_planes
+    from rbfrag.solver.block.planes import plane_of
+
+    if face is None or base is None:
+        name = "face" if face is None else "base"
+        raise InputError(f"{name} is missing: give base and face as 25/102", fields=(name,))
+    stated = {"face": face, "base": base} | ({} if back is None else {"back": back})
+    return plot_planes({name: plane_of(text, name) for name, text in stated.items()}, out)
+
+
 VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
 """What a curve may run over."""
 

@@ -160,8 +160,8 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
         tilt = plane.cross_tilt_deg(azimuth)
         if plane.is_exempt(azimuth):
             remarks.append(
-                f"the {name} {plane} strikes {off:.0f} deg off the face and is flat: its cross-tilt "
-                f"of {abs(tilt):.1f} deg is left out"
+                f"the {name} {plane} strikes {off:.0f} deg off the face and is flat: its "
+                f"cross-tilt of {abs(tilt):.1f} deg is left out"
             )
             continue
         raise InputError(
