@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
-from rbfrag.solver.block.planes import STRIKE_DEG, Plane, line_of, section_of
+from rbfrag.solver.block.planes import FLAT_DEG, STRIKE_DEG, TILT_DEG, Plane, line_of, section_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,16 +84,17 @@ def _draw_net(axes: Axes, face: Plane) -> None:
     from matplotlib.patches import Wedge
 
     east = 90.0 - face.direction_deg
+    shaded: dict[str, Any] = {"color": _SHADE, "alpha": 0.2, "lw": 0.0, "zorder": 0.5}
+    label = f"poles refused: strike over {STRIKE_DEG:g}° off"
+    half = 90.0 - STRIKE_DEG
     for middle in (east + 90.0, east - 90.0):
-        half = 90.0 - STRIKE_DEG
-        axes.add_patch(
-            Wedge((0.0, 0.0), 1.0, middle - half, middle + half, color=_SHADE, alpha=0.2, lw=0)
-        )
-    shade = Wedge((0, 0), 0.0, 0, 0, color=_SHADE, alpha=0.2, lw=0)
-    shade.set_label(f"poles refused: strike over {STRIKE_DEG:g}° off")
-    axes.add_patch(shade)
+        axes.add_patch(Wedge((0.0, 0.0), 1.0, middle - half, middle + half, label=label, **shaded))
+        label = "_refused"
     # poles of planes flat enough for any strike are exempt
-    flat = projected(80.0, np.arange(0.0, 361.0, 2.0))
+    off = np.arange(0.5, 360.0)
+    sine = np.abs(np.sin(np.radians(off)))
+    dips = np.degrees(np.arctan(math.tan(math.radians(TILT_DEG)) / sine))
+    flat = projected(90.0 - np.minimum(dips, FLAT_DEG), off + face.direction_deg)
     axes.fill(*flat, facecolor="white", lw=0.8, edgecolor=_SHADE, label="_flat", zorder=0.9)
     around = np.radians(np.arange(0.0, 361.0))
     axes.plot(np.sin(around), np.cos(around), color="black", lw=1.0, label="_rim")

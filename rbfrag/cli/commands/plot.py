@@ -64,8 +64,11 @@ def plot_chart(
     out: Out,
     held: Held,
     model: str | None = option(
-        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm). Default: the "
-        "one that answers for PGV."
+        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm); of another kind "
+        "than toppling any. Default: the one that answers for PGV."
+    ),
+    displacement: float | None = option(
+        "Sliding: displacement [m] that is too far. Default: the middle of the fitted range."
     ),
     db: options.Db = None,
 ) -> None:
@@ -75,7 +78,15 @@ def plot_chart(
     """
     from rbfrag.plots import plot
 
-    plot.chart(out, model=model, p2=held.p2, pga_g=held.pga, tm_s=held.tm, db=db)
+    plot.chart(
+        out,
+        model=model,
+        p2=held.p2,
+        pga_g=held.pga,
+        tm_s=held.tm,
+        displacement_m=displacement,
+        db=db,
+    )
     print(out)
 
 

@@ -16,7 +16,7 @@ from rbfrag.errors import InputError
 STRIKE_DEG = 20.0
 """Planes that strike further off the face are no planes of the section [deg]."""
 
-_FLAT_DEG, _TILT_DEG = 10.0, 5.0
+FLAT_DEG, TILT_DEG = 10.0, 5.0
 """Dip and cross-tilt up to which a plane may strike as it likes [deg]."""
 
 _APART_DEG, _PLUNGE_DEG = 5.0, 10.0
@@ -71,8 +71,8 @@ class Plane(NamedTuple):
 
     def is_exempt(self, azimuth_deg: float) -> bool:
         """Return whether it is so flat that its strike does not matter in a section."""
-        flat = self.dip_deg <= _FLAT_DEG
-        return flat and abs(self.cross_tilt_deg(azimuth_deg)) <= _TILT_DEG
+        flat = self.dip_deg <= FLAT_DEG
+        return flat and abs(self.cross_tilt_deg(azimuth_deg)) <= TILT_DEG
 
 
 def _along(dip_deg: float, cosine: float) -> float:
