@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.chart import CONTOURS
 from rbfrag.plots.labels import as_written
+from rbfrag.question.fields import declared
 from rbfrag.question.words import number_in_words
 
 _NODES = 241
@@ -78,7 +78,8 @@ def plot_kind_chart(
     lines = axes.contour(x, y, answers.probability, CONTOURS, colors=canvas.BLUE, linewidths=1.1)
     axes.clabel(lines, fmt=lambda p: f"{100.0 * p:g} %", fontsize=8)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    axes.set_xlabel(TERMS[first.rsplit("_m_s")[0].removesuffix("_g")].label)
+    about = declared()[first]
+    axes.set_xlabel(f"{about.what} [{about.unit}]")
     axes.set_ylabel(f"yield acceleration coefficient, {number_in_words(strength, 0.0)[0]}")
     axes.grid(visible=True, which="both", lw=0.4, color="#c0c0c0")
     at = [" = ".join(number_in_words(name, value, 3)) for name, value in held.items()]
