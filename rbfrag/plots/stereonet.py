@@ -70,7 +70,8 @@ def plot_planes(planes: Mapping[str, Plane], path: canvas.Out) -> canvas.Picture
     try:
         section = section_of(planes["face"], base, back)
     except InputError as error:
-        title, said = "No section: refused", (str(error),)
+        title = "No section: refused"
+        said: tuple[str, ...] = (str(error),)
     else:
         gamma = "" if section.gamma_deg is None else f", gamma = {section.gamma_deg:.1f}°"
         title, said = f"In the section beta = {section.beta_deg:.1f}°{gamma}", section.remarks

@@ -31,14 +31,14 @@ class OrientationSet(NamedTuple):
         resultant: length R of the sum of their unit poles.
         fisher_k: concentration K = (N - 1)/(N - R).
         alpha95_deg: half-angle of the cone that holds the true mean with 95 % [deg].
-        count: number N of planes.
+        size: number N of planes.
     """
 
     mean: Plane
     resultant: float
     fisher_k: float
     alpha95_deg: float
-    count: int
+    size: int
 
     def share_off(self, face: Plane) -> float:
         """Return the share of such planes that strike more than 20 deg off a face."""
@@ -92,7 +92,7 @@ def read_planes(path: str | os.PathLike[str]) -> list[str]:
         InputError: the file cannot be read, or a row is no plane; the line is named.
     """
     source = Path(path)
-    planes = []
+    planes: list[str] = []
     for line, cells in csv_rows(source_text(source, "planes", _LARGEST_BYTES)):
         row = [cell.strip() for cell in cells]
         if not any(row) or row[0].startswith("#") or (not planes and not _is_number(row[0])):
@@ -157,7 +157,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
         kappa = joints.fisher_k / factors[name] ** 2
         own[f"{name}.dip_deg"] = {"distribution": "von_mises", "mean": dip, "kappa": kappa}
         said.append(
-            f"{name}: {joints.count} planes, mean {joints.mean}, Fisher K {joints.fisher_k:.4g}, "
+            f"{name}: {joints.size} planes, mean {joints.mean}, Fisher K {joints.fisher_k:.4g}, "
             f"alpha95 {joints.alpha95_deg:.3g} deg; {100.0 * joints.share_off(face):.0f} % of such "
             f"planes strike more than {STRIKE_DEG:g} deg off the face, which the section leaves out"
         )
