@@ -71,13 +71,13 @@ def plot_planes(planes: Mapping[str, Plane], path: canvas.Out) -> canvas.Picture
         section = section_of(planes["face"], base, back)
     except InputError as error:
         title = "No section: refused"
-        said: tuple[str, ...] = (str(error),)
+        notes: tuple[str, ...] = (str(error),)
     else:
         gamma = "" if section.gamma_deg is None else f", gamma = {section.gamma_deg:.1f}°"
-        title, said = f"In the section beta = {section.beta_deg:.1f}°{gamma}", section.remarks
+        title, notes = f"In the section beta = {section.beta_deg:.1f}°{gamma}", section.remarks
     axes.set_title(f"{title}\nlower hemisphere, equal area; dots are poles", fontsize=10, pad=18)
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    return replace(canvas.save_figure(figure, path), warnings=said)
+    return replace(canvas.save_figure(figure, path), warnings=notes)
 
 
 def _draw_net(axes: Axes, face: Plane) -> None:

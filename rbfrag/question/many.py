@@ -80,17 +80,17 @@ def many_blocks(
     """
     planes = given.keys() & set(SPACE)
     wrong: Mapping[int, str] = {}
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     if planes:
         from rbfrag.question.sections import in_sections
 
-        given, wrong, said = in_sections(given, size)
+        given, wrong, notes = in_sections(given, size)
     known, unread = (given, ()) if rows else read_by_some(given)
     sorting = _Sorted(known, size, rows)
     for place, why in wrong.items():
         _Some(sorting, np.array([place])).refuse(True, "{why}", why=why)
     blocks = sorting.blocks(kinds, modes)
-    blocks = blocks._replace(remarks=(*said, *blocks.remarks), read=blocks.read | planes)
+    blocks = blocks._replace(remarks=(*notes, *blocks.remarks), read=blocks.read | planes)
     if rows:
         return blocks
     others = given.keys() - known.keys()

@@ -79,7 +79,7 @@ def in_sections(
         for name in touched
     }
     wrong: dict[int, str] = {}
-    said: dict[str, int] = {}
+    notes: dict[str, int] = {}
     shapes = [name for names in SHAPES for name in names if name in own]
     for i in range(size):
         planes = {name: text[i] for name, text in texts.items() if text[i]}
@@ -97,6 +97,6 @@ def in_sections(
         for name in touched:
             columns[name][i] = section.get(name, np.nan)
         for text in remarks:
-            said[text] = said.get(text, 0) + 1
-    counted = (f"{text} ({count:,} of {size:,} blocks)" for text, count in said.items())
+            notes[text] = notes.get(text, 0) + 1
+    counted = (f"{text} ({count:,} of {size:,} blocks)" for text, count in notes.items())
     return {**own, **columns}, wrong, tuple(counted)

@@ -140,7 +140,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
             planes[name] = plane_of(value, f"{name}.plane")
     face = planes["face"]
     section = section_of(face, planes["base"], planes["back"])
-    said = [*section.remarks]
+    notes = [*section.remarks]
     assert section.gamma_deg is not None
     dips = {"base": section.beta_deg, "back": section.beta_deg + section.gamma_deg}
     factors = {"base": section.base_factor, "back": section.back_factor}
@@ -156,17 +156,17 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
         joints = sets[name]
         kappa = joints.fisher_k / factors[name] ** 2
         own[f"{name}.dip_deg"] = {"distribution": "von_mises", "mean": dip, "kappa": kappa}
-        said.append(
+        notes.append(
             f"{name}: {joints.size} planes, mean {joints.mean}, Fisher K {joints.fisher_k:.4g}, "
             f"alpha95 {joints.alpha95_deg:.3g} deg; {100.0 * joints.share_off(face):.0f} % of such "
             f"planes strike more than {STRIKE_DEG:g} deg off the face, which the section leaves out"
         )
         if joints.fisher_k < _WIDE_K:
-            said.append(
+            notes.append(
                 f"{name}: with K below {_WIDE_K:g} the dips in the section scatter a little more "
                 "than the von Mises law drawn from (at K 10 by 3.3 %)"
             )
-    return own, tuple(said)
+    return own, tuple(notes)
 
 
 def _scaled(law: Any, factor: float) -> Any:

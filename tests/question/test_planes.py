@@ -82,19 +82,19 @@ def test_steep_base_and_a_plane_stated_twice() -> None:
 
 
 def test_every_door_answers_as_the_section(tmp_path: Path) -> None:
-    planes = {"base": "8/025", "back": "75/195", "face": "80/200"}
-    shape = {"s1_m": 6.0, "s2_m": 0.5, "phi_deg": 40.0}
+    planes = {"base": "4/150", "back": "78/095", "face": "80/090"}
+    shape = {"s1_m": 2.0, "s2_m": 0.4, "phi_deg": 40.0}
     own, _ = in_section({**planes, **shape})
-    wanted = rbfrag.predict(**own, pgv_m_s=0.9).probability
+    wanted = rbfrag.predict(**own, pgv_m_s=2.0).probability
     assert 0.0 < wanted < 1.0
-    assert rbfrag.predict(**planes, **shape, pgv_m_s=0.9).probability == wanted
-    many = rbfrag.predict(**{**planes, "base": ["8/025", "35/140"]}, **shape, pgv_m_s=0.9)
+    assert rbfrag.predict(**planes, **shape, pgv_m_s=2.0).probability == wanted
+    many = rbfrag.predict(**{**planes, "base": ["4/150", "35/140"]}, **shape, pgv_m_s=2.0)
     assert many.probability[0] == wanted
-    assert "strikes 60 deg off" in many.reason[1]
+    assert "strikes 50 deg off" in many.reason[1]
     table = tmp_path / "blocks.csv"
-    table.write_text("s1_m,s2_m,phi_deg,base,back,face\n6,0.5,40,8/025,75/195,80/200\n")
+    table.write_text("s1_m,s2_m,phi_deg,base,back,face\n2,0.4,40,4/150,78/095,80/090\n")
     rows = read_blocks(table).blocks
-    kr = rbfrag.predict(rows["p2_1_s2"][0], rows["kr"][0], pgv_m_s=0.9)
+    kr = rbfrag.predict(rows["p2_1_s2"][0], rows["kr"][0], pgv_m_s=2.0)
     assert kr.probability == wanted
 
 
