@@ -13,23 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import opened_table
+from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
 from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import BlockFields, column_of, names_of
 from rbfrag.question.many import many_blocks
-from rbfrag.question.shapes import OF_A_SHAPE
+from rbfrag.question.shapes import OF_A_SHAPE, SPACE
 from rbfrag.solver.kinds import KINDS, facts_of
 
 Columns = Mapping[str, NDArray[Any]]
 
 PLACE = ("lon", "lat")
 """Columns of where blocks stand [deg]."""
-
-TEXTS = ("block_id", "site_id", "kind", "mode")
-"""Columns of texts."""
 
 PORTFOLIO = ("count", "weight", "loss", "loss_sigma")
 """Columns of how many like blocks a row is, what a failure counts and costs, and its scatter."""
@@ -211,7 +208,13 @@ def read_blocks(
         columns, faults, lines = table.whole()
     name, size = table.name, len(lines)
     values = {field: columns.pop(field) for field in fields if field in columns}
+    for field in SPACE:
+        if field in columns or field in stated:
+            own = columns.pop(field, np.full(size, "", dtype=object))
+            values[field] = np.where(own == "", stated.get(field, ""), own)
     for field, value in stated.items():
+        if field in SPACE:
+            continue
         own = values.get(field, np.full(size, np.nan))
         values[field] = np.where(np.isnan(own), value, own)
     if ("lon" in columns) != ("lat" in columns):

@@ -18,8 +18,12 @@ from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.fields import BlockFields, column_of, names_of
-from rbfrag.question.shapes import SHAPES
+from rbfrag.question.sections import ANGLES
+from rbfrag.question.shapes import SHAPES, SPACE
 from rbfrag.question.table import Header, columns_in
+
+TEXTS = ("block_id", "site_id", "kind", "mode", *SPACE)
+"""Columns of texts."""
 
 IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
@@ -100,6 +104,7 @@ class BlockTable:
             kind: how the blocks fail; None for what they are given by.
         """
         known = {*self.stated.columns, *given}
+        known |= {angle for plane, angle in ANGLES.items() if plane in known}
         if not kinds_by_numbers(known) and not any(known.issuperset(shape) for shape in SHAPES):
             block = block_of(known, kind)
             missing = next(name for name in block.names if name not in known)
@@ -158,7 +163,7 @@ class BlockTable:
 def opened_table(
     source: str | os.PathLike[str] | Mapping[str, Any],
     read: Collection[str],
-    texts: Collection[str] = ("block_id", "site_id", "kind", "mode"),
+    texts: Collection[str] = TEXTS,
     *,
     sheet: str | None = None,
 ) -> Iterator[BlockTable]:

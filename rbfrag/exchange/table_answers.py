@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, TEXTS
-from rbfrag.exchange.block_table import BlockTable, opened_table
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO
+from rbfrag.exchange.block_table import TEXTS, BlockTable, opened_table
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import table_path, table_writer
 from rbfrag.exchange.tables.parts import TablePart, Write
@@ -28,6 +28,7 @@ from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.fields import BlockFields, ScatterFields, ShakingFields, column_of, names_of
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import ask
+from rbfrag.question.shapes import SPACE
 from rbfrag.solver.results import FloatArray
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
@@ -197,6 +198,11 @@ def _answer(
         elif name in given or name in empty:
             what = "an option and a column of" if name in given else "empty in the first rows of"
             raise InputError(f"{column_of(name)} is {what} {table.name}: give it once, or of all")
+    for name in SPACE:
+        if (texts := table.text(part, name)) is not None:
+            if name in given:
+                raise InputError(f"{name} is an option and a column of {table.name}: give it once")
+            values[name] = np.array(texts, dtype=object)
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
     with table.named():

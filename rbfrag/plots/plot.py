@@ -104,9 +104,12 @@ def chart(
     p2: float | None = None,
     pga_g: float | None = None,
     tm_s: float | None = None,
+    displacement_m: float | None = None,
     db: str | PathLike[str] | None = None,
 ) -> Picture:
     """Draw lines of equal probability of toppling over intensity and block, to read by hand.
+
+    Of other kinds than toppling: of failure over intensity and yield acceleration.
 
     Args:
         out: as for :func:`fit`.
@@ -115,14 +118,51 @@ def chart(
         p2: frequency parameter p² of the blocks [1/s²]; None for the middle of the fitted range.
         pga_g: PGA of the motions [g]; None for one in proportion to PGV.
         tm_s: mean period of the motions [s]; None for the middle of the fitted range.
+        displacement_m: of a model of slides the displacement that is too far [m]; None likewise.
         db: as for :func:`fit`.
     """
+    from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.plots.chart import plot_chart
     from rbfrag.plots.model_lines import held_measures
 
     chosen = find_model(model, ["pgv_m_s"] if model is None else MEASURES, db)
+    if chosen.method.block.kind != TOPPLING_BLOCK.kind:
+        from rbfrag.plots.kind_chart import plot_kind_chart
+
+        size = next((n for n in chosen.method.block.names if not n.startswith("k")), "p2")
+        size = "p2" if size == "displacement_m" else size
+        stated = {size: p2, "pga_g": pga_g, "tm_s": tm_s, "displacement_m": displacement_m}
+        return plot_kind_chart(
+            chosen, out, {name: value for name, value in stated.items() if value is not None}
+        )
+    if displacement_m is not None:
+        raise InputError(
+            f"displacement_m is of slides: model {chosen.name!r} does not read it",
+            fields=("displacement_m",),
+        )
     held = held_measures(chosen, p2=p2, pga_g=pga_g, tm_s=tm_s)
     return plot_chart(chosen, out, held)
+
+
+def planes(
+    out: Out = None, *, face: str | None = None, base: str | None = None, back: str | None = None
+) -> Picture:
+    """Draw a block's planes on a stereonet, and which planes are none of the face's section.
+
+    Args:
+        out: as for :func:`fit`.
+        face: plane of the slope's face, as dip/dip direction [deg].
+        base: plane of the base.
+        back: plane of the back.
+    """
+    from rbfrag.plots.stereonet import plot_planes
+    from rbfrag.solver.block.planes import plane_of
+
+    if face is None or base is None:
+        name = "face" if face is None else "base"
+        raise InputError(f"{name} is missing: give base and face as 25/102", fields=(name,))
+    stated = {"face": face, "base": base} | ({} if back is None else {"back": back})
+    return plot_planes({name: plane_of(text, name) for name, text in stated.items()}, out)
 
 
 VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}

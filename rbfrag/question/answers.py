@@ -17,6 +17,7 @@ from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reaso
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import OF_ALL, many_blocks
+from rbfrag.question.shapes import SPACE
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -60,8 +61,11 @@ def ask_many(
     texts = {
         n: np.zeros(len(v)) for n, v in each.items() if v is not None and not isinstance(v, str)
     }
+    planes = {name: np.array(numbers.pop(name), dtype=object) for name in SPACE if name in numbers}
+    texts |= {name: np.zeros(text.shape) for name, text in planes.items()}
     values, shape = flat({**numbers, **texts})
     size = int(np.prod(shape))
+    backed |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
     blocks = many_blocks({**block, **backed}, size, kinds=kind, modes=mode, rows=rows)
@@ -107,9 +111,12 @@ def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
         return one_block(known, kind), 1
     backed = {name: known.pop(name) for name in OF_ALL if name in known}
     each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
-    values, shape = flat({**known, **each})
+    planes = {name: np.array(known.pop(name), dtype=object) for name in SPACE if name in known}
+    each_text = {name: np.zeros(text.shape) for name, text in planes.items()}
+    values, shape = flat({**known, **each, **each_text})
     size = int(np.prod(shape))
     numbers: dict[str, Any] = {name: values[name] for name in known}
+    backed |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     blocks = many_blocks({**numbers, **backed}, size, kinds=kind)
     if not each:  # of a table that states the kinds, others may read what these do not
         _refuse_unread(blocks, known)

@@ -36,6 +36,7 @@ from rbfrag.question.shapes import (
     PLANES,
     SHAPES,
     SIDES_AND_PLANES,
+    SPACE,
     WAYS,
     ModeShapes,
     check_ranges,
@@ -212,6 +213,7 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
         InputError: two shapes or a part of one, planes without one, a value out of its range, or a
             block without its dip or friction, unless it is a rectangle.
     """
+    given, off_section = sectioned(given)
     names = shape_among(given)
     if names is None:
         return None
@@ -230,8 +232,20 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
         if name not in planes and not is_rectangle:
             raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
     return Shape(
-        block, {**planes, **stated, **bond_of(planes)}, is_rectangle, tuple(listener.remarks)
+        block,
+        {**planes, **stated, **bond_of(planes)},
+        is_rectangle,
+        (*off_section, *listener.remarks),
     )
+
+
+def sectioned(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return fields with planes in space as those of the section, and what is said of it."""
+    if given.keys().isdisjoint(SPACE):
+        return given, ()
+    from rbfrag.question.sections import in_section
+
+    return in_section(given)
 
 
 def bond_of(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -325,7 +339,8 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         InputError: it is described twice or in part, is of another kind than is requested, slides
             without a displacement, or no earthquake decides about it.
     """
-    given, unread = read_by_some(without_kv(given))
+    given, off_section = sectioned(without_kv(given))
+    given, unread = read_by_some(given)
     shape = shape_of(given)
     if shape is None:
         block = block_of(given, kind)
@@ -364,7 +379,8 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         others,
         listener,
     )  # fmt: skip
-    remarks = [*(() if taken else warnings_about(shape.block, finding)), *listener.remarks]
+    remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
+    remarks += listener.remarks
     remarks += [*shape.remarks, *unread]
     across_m = 2.0 * shape.block.r3_m
     if not LEAST_M <= across_m <= MOST_M:

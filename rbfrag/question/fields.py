@@ -269,6 +269,31 @@ class PlaneFields(TypedDict, Generic[V], total=False):
     ]
 
 
+class SpaceFields(TypedDict, total=False):
+    """What describes the planes of a block in space, as dip/dip direction."""
+
+    base: Annotated[
+        str | None,
+        Field(
+            "Plane of the base as dip/dip direction in deg, 25/102, with {face}, instead of "
+            "{beta_deg}",
+            is_text=True,
+        ),
+    ]
+    back: Annotated[
+        str | None,
+        Field(
+            "Plane of the back likewise, with {s1_m} and {s2_m} along the normals of the planes, "
+            "instead of {gamma_deg}",
+            is_text=True,
+        ),
+    ]
+    face: Annotated[
+        str | None,
+        Field("Plane of the slope's face likewise: its dip direction is the section", is_text=True),
+    ]
+
+
 class ScatterFields(TypedDict, Generic[V], total=False):
     """How well a block is known: what is stated is the median, and P the mean over it."""
 
@@ -400,7 +425,7 @@ _KIND = Field(
 )
 
 
-class WholeFields(TypedDict, total=False):
+class WholeFields(SpaceFields, total=False):
     """What holds for all blocks of a question."""
 
     block: Annotated[Block | None, Field("A block by its corners, a rbfrag.Block")]
@@ -598,7 +623,7 @@ def keywords_in_words(fields: Any) -> str:
 
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
-    return names_of(BlockFields, ShakingFields, RowFields)
+    return names_of(BlockFields, ShakingFields, RowFields, SpaceFields)
 
 
 def column_of(name: str) -> str:

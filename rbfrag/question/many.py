@@ -33,6 +33,7 @@ from rbfrag.question.shapes import (
     PLANES,
     RECTANGLE,
     SHAPES,
+    SPACE,
     ModeShapes,
     check_ranges,
     numbers_of_shape,
@@ -77,10 +78,21 @@ def many_blocks(
     Raises:
         InputError: they are described twice or in part.
     """
+    planes = given.keys() & set(SPACE)
+    wrong: Mapping[int, str] = {}
+    notes: tuple[str, ...] = ()
+    if planes:
+        from rbfrag.question.sections import in_sections
+
+        given, wrong, notes = in_sections(given, size)
+    known, unread = (given, ()) if rows else read_by_some(given)
+    sorting = _Sorted(known, size, rows)
+    for place, why in wrong.items():
+        _Some(sorting, np.array([place])).refuse(True, "{why}", why=why)
+    blocks = sorting.blocks(kinds, modes)
+    blocks = blocks._replace(remarks=(*notes, *blocks.remarks), read=blocks.read | planes)
     if rows:
-        return _Sorted(given, size, rows).blocks(kinds, modes)
-    known, unread = read_by_some(given)
-    blocks = _Sorted(known, size, rows).blocks(kinds, modes)
+        return blocks
     others = given.keys() - known.keys()
     return blocks._replace(remarks=(*blocks.remarks, *unread), read=blocks.read | others)
 

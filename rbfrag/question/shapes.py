@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import PlaneFields, column_of, declared, names_of
+from rbfrag.question.fields import PlaneFields, SpaceFields, column_of, declared, names_of
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
@@ -190,6 +190,8 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     return first
 
 
+SPACE = names_of(SpaceFields)
+
 BOND = ("cohesion_pa", "density_kg_m3")
 
 PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND)
@@ -197,7 +199,7 @@ PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND)
 
 SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
 
-OF_A_SHAPE = ("block", *SIDES_AND_PLANES)
+OF_A_SHAPE = ("block", *SPACE, *SIDES_AND_PLANES)
 """Fields that describe a block by its shape and its planes."""
 
 IS_PLANE = frozenset({"beta_deg", *PLANES_OF_A_SHAPE})

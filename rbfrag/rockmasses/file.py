@@ -20,6 +20,10 @@ TOML::
     size_factor = 1.0
     back_fracture = true
 
+With ``[face] plane = "70/090"`` base and back may be planes in space (dip/dip direction) in the
+place of their dips: ``plane = "25/102"``, a list of measured ones, or a CSV of dip and dip
+direction beside the file.
+
 CSV: the columns ``variable,distribution`` and, as needed, ``value, mean, median, sd, sd_ln, kappa,
 low, high, values``, one variable a row such as ``base.dip_deg,normal``; measurements stand in
 ``values`` with blanks between them. ``realisations``, ``seed`` and ``block.back_fracture`` are rows
@@ -31,10 +35,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text, toml_document
 from rbfrag.rockmasses.joint_sets import RockMass
+from rbfrag.rockmasses.orientations import read_planes
 
 COLUMNS = (
     "variable", "distribution", "value", "mean", "median", "sd", "sd_ln", "kappa", "low", "high",
@@ -42,7 +48,7 @@ COLUMNS = (
 )  # fmt: skip
 """Columns of the CSV form; only the first is always needed."""
 
-_SECTIONS = ("base", "back", "friction", "block")
+_SECTIONS = ("face", "base", "back", "friction", "block")
 _LARGEST_BYTES = 10_000_000
 
 
@@ -62,9 +68,20 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
         raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
     text = source_text(source, "a rock mass", _LARGEST_BYTES)
     try:
-        return rock_mass_of_toml(text) if suffix == ".toml" else rock_mass_of_csv(text)
+        if suffix == ".csv":
+            return rock_mass_of_csv(text)
+        return rock_mass_of_tables(_with_measured(toml_document(text), source.parent))
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+
+
+def _with_measured(document: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a document with the planes of the tables that it names."""
+    for content in document.values():
+        plane = content.get("plane") if isinstance(content, dict) else None
+        if isinstance(plane, str) and plane.lower().endswith(".csv"):
+            content["plane"] = read_planes(folder / plane)
+    return document
 
 
 def rock_mass_of_toml(text: str) -> RockMass:

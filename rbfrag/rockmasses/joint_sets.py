@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.rockmasses.distributions import Distribution
+from rbfrag.rockmasses.orientations import in_section
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
@@ -103,12 +104,14 @@ class RockMass:
         back_fracture: False for blocks that no plane supports from behind.
         realisations: number of blocks that the description asks for.
         seed: seed of the random numbers that the description asks for.
+        remarks: what is to be said of its planes in space.
     """
 
     variables: Mapping[str, Distribution]
     back_fracture: bool = True
     realisations: int = REALISATIONS
     seed: int = SEED
+    remarks: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, description: Mapping[str, object]) -> RockMass:
@@ -119,11 +122,13 @@ class RockMass:
                 :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
                 ``friction.cohesion_pa``, ``block.density_kg_m3`` (needed with a cohesion),
                 ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
-                and ``seed`` may be left out.
+                and ``seed`` may be left out. ``face.plane``, ``base.plane`` and ``back.plane``,
+                each dip/dip direction or a list of such, stand for the dips.
 
         Raises:
             InputError: a key is missing, unknown or has an impossible value; it is named.
         """
+        description, remarks = in_section(description)
         for key in description:
             if key not in VARIABLES and key not in _SETTINGS:
                 known = ", ".join((*VARIABLES, *_SETTINGS))
@@ -152,6 +157,7 @@ class RockMass:
             back_fracture,
             checked_count(description.get("realisations", REALISATIONS), "realisations"),
             checked_seed(description.get("seed", SEED), "seed"),
+            remarks,
         )
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:

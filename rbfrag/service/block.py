@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Query
@@ -35,7 +36,9 @@ def add_routes(routes: APIRouter) -> None:
         from rbfrag.solver.stability.single import stability, stability_as_dict
 
         shape = on_planes(query.given())
-        return stability_as_dict(shape.block, stability(shape.block, **shape.planes))
+        result = stability(shape.block, **shape.planes)
+        warnings = tuple(dict.fromkeys((*shape.remarks, *result.warnings)))
+        return stability_as_dict(shape.block, replace(result, warnings=warnings))
 
     @routes.get(
         "/v1/drawing",

@@ -23,6 +23,7 @@ from rbfrag.question.fields import (
     RequestFields,
     ShakingFields,
     ShapeFields,
+    SpaceFields,
     WholeFields,
     by_field,
     declared,
@@ -44,6 +45,9 @@ Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, f
 
 COLUMNS = frozenset(names_of(BlockFields, ShakingFields))
 """Fields of which many blocks have one each."""
+
+_TEXTS = frozenset(names_of(SpaceFields))
+"""Texts of which many blocks have one each."""
 
 _NOT_SENT = frozenset({"block", "db", "gmm"})
 """Fields that no request can state."""
@@ -84,6 +88,8 @@ def asking(
             default = False
         elif about.is_text:
             of = Text | None
+            if many and name in _TEXTS:
+                of = Annotated[list[Text | None], Field(min_length=1)] | of
         elif many and name in COLUMNS:
             of = Column | None
         else:
@@ -121,7 +127,7 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (*names_of(ShapeFields, PlaneFields), "back_fracture")
+_SHAPE = (*names_of(ShapeFields, PlaneFields, SpaceFields), "back_fracture")
 _AT_REST = (*_SHAPE, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
 _BLOCK = names_of(BlockFields, WholeFields)
 _QUESTION = (*_BLOCK, *names_of(ShakingFields, RequestFields))

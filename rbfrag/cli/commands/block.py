@@ -75,8 +75,9 @@ def block(
     from rbfrag.solver.stability.single import stability, stability_as_dict
 
     with given.named():
-        body, planes, *_ = on_planes(given)
+        body, planes, _, remarks = on_planes(given)
     result = stability(body, **planes)
+    result = replace(result, warnings=tuple(dict.fromkeys((*remarks, *result.warnings))))
     unbacked = planes.get("back_fracture") is False
     if unbacked and kind_of_mode(result.mode, back_fracture=False).free_standing:
         result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))

@@ -13,7 +13,7 @@ from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.question.fields import PlaneFields, ShapeFields, WholeFields
+from rbfrag.question.fields import PlaneFields, ShapeFields, SpaceFields, WholeFields
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -64,8 +64,11 @@ def plot_chart(
     out: Out,
     held: Held,
     model: str | None = option(
-        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm). Default: the "
-        "one that answers for PGV."
+        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm); of another kind "
+        "than toppling any. Default: the one that answers for PGV."
+    ),
+    displacement: float | None = option(
+        "Sliding: displacement [m] that is too far. Default: the middle of the fitted range."
     ),
     db: options.Db = None,
 ) -> None:
@@ -75,7 +78,15 @@ def plot_chart(
     """
     from rbfrag.plots import plot
 
-    plot.chart(out, model=model, p2=held.p2, pga_g=held.pga, tm_s=held.tm, db=db)
+    plot.chart(
+        out,
+        model=model,
+        p2=held.p2,
+        pga_g=held.pga,
+        tm_s=held.tm,
+        displacement_m=displacement,
+        db=db,
+    )
     print(out)
 
 
@@ -207,6 +218,27 @@ def plot_response(
     )  # fmt: skip
     print_warnings([*about, *remarks])
     print(out)
+
+
+@app.command(
+    "planes",
+    epilog="Example:  rbfrag plot planes --base 25/102 --back 65/075 --face 70/090 --out a.png",
+)
+@stacked
+def plot_planes(
+    *,
+    planes: Annotated[Given, fields_of(SpaceFields)],
+    out: Out,
+) -> None:
+    """Draw base, back and face of a block on a stereonet: lower hemisphere, equal area.
+
+    Shaded are the poles of planes that strike too far off the face for a section.
+    """
+    from rbfrag.plots import plot
+
+    picture = plot.planes(out, **planes)
+    print(out)
+    print_warnings(picture.warnings)
 
 
 @app.command(
