@@ -351,7 +351,7 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     planes = shape.rough()
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
-    finding, _ = judged(shape.block, **planes)
+    finding, *_ = judged(shape.block, **planes)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     listener = _One(shape.remarks)
     numbers_read = numbers_of_shape(
