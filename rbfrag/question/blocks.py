@@ -15,6 +15,7 @@ from rbfrag.fragility.lookup import block_of, check_numbers
 from rbfrag.question.fields import (
     BlockFields,
     FailureFields,
+    JointFields,
     NumberFields,
     PlaneFields,
     ScatterFields,
@@ -25,10 +26,12 @@ from rbfrag.question.fields import (
     names_of,
 )
 from rbfrag.question.shapes import (
+    AFTER_SLIP,
     BOND,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
+    JOINT,
     LEAST_M,
     MOST_M,
     NO_MODEL,
@@ -36,6 +39,8 @@ from rbfrag.question.shapes import (
     PLANES,
     SHAPES,
     SIDES_AND_PLANES,
+    SLIPS_ON,
+    UNSTABLE_AT_REST,
     WAYS,
     ModeShapes,
     check_ranges,
@@ -45,6 +50,7 @@ from rbfrag.question.shapes import (
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
+from rbfrag.solver.stability.modes import words_of_mode
 
 if TYPE_CHECKING:
     import numpy as np
@@ -235,8 +241,9 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
 
 
 def bond_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return cohesion and density where they are stated, or refuse what is out of its range."""
-    bond = {name: number(given[name], name, "a number") for name in BOND if name in given}
+    """Return what a joint is like where that is stated, or refuse what is out of its range."""
+    names = (*BOND, *JOINT)
+    bond = {name: number(given[name], name, "a number") for name in names if name in given}
     check_ranges(bond, _One())
     return bond
 
@@ -268,6 +275,18 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name != "kv"}
 
 
+def slipped(planes: Mapping[str, Any], residual_deg: float) -> dict[str, Any]:
+    """Return planes after the first slip: dry, without bond or roughness.
+
+    Args:
+        planes: planes by field.
+        residual_deg: friction angle that is left on base and back [deg].
+    """
+    ended = {*BOND, *JOINT, "phi_back_deg"}
+    left = {name: value for name, value in planes.items() if name not in ended}
+    return {**left, "phi_deg": residual_deg}
+
+
 class _One:
     """Raises the first reason against a single block, with what is suspicious about its angles."""
 
@@ -294,6 +313,7 @@ _READ = frozenset(
         FailureFields,
         ShapeFields,
         PlaneFields,
+        JointFields,
         ScatterFields,
         ShakingFields,
         WholeFields,
@@ -351,14 +371,23 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     planes = shape.rough()
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
+    residual_deg = planes.pop("phi_residual_deg", None)
     finding, *_ = judged(shape.block, **planes)
-    facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     listener = _One(shape.remarks)
+    if residual_deg is not None:
+        told = {"k": finding.k, "mode": words_of_mode(finding.mode)}
+        listener.unstable(finding.k <= 0.0, UNSTABLE_AT_REST, **told)
+        planes = slipped(planes, residual_deg)
+        finding, *_ = judged(shape.block, **planes)
+        listener.refuse(finding.k <= 0.0, SLIPS_ON, "phi_residual_deg", **told)
+        listener.remark(True, AFTER_SLIP)
+    facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     numbers_read = numbers_of_shape(
         facts,
         ModeShapes(
             shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
             finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
+            bool(planes.get("jrc")), bool(planes.get("water_m")),
         ),
         math.nan if displacement_m is None else displacement_m,
         others,

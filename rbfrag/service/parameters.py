@@ -18,6 +18,7 @@ from rbfrag.question.fields import (
     AnsweringFields,
     AtRestFields,
     BlockFields,
+    JointFields,
     PlaneFields,
     RequestFields,
     ShakingFields,
@@ -120,8 +121,9 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (*names_of(ShapeFields, PlaneFields), "back_fracture")
-_AT_REST = (*_SHAPE, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
+_SHAPE = (*names_of(ShapeFields, PlaneFields, JointFields), "back_fracture")
+_BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
+_AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
 _BLOCK = names_of(BlockFields, WholeFields)
 _QUESTION = (*_BLOCK, *names_of(ShakingFields, RequestFields))
 
