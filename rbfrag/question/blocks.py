@@ -334,12 +334,15 @@ def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str
     return {name: value for name, value in given.items() if name in known}, tuple(remarks)
 
 
-def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
+def one_block(
+    given: Mapping[str, Any], kind: str | None = None, pga_g: float | None = None
+) -> Blocks:
     """Return a single block as answers read it.
 
     Args:
         given: fields of it that are stated; ``block`` may be a :class:`Block`.
         kind: how it is asked to fail; None for what its shape or its numbers say.
+        pga_g: PGA at which it is said whether the toe of a block that topples holds [g].
 
     Raises:
         InputError: it is described twice or in part, is of another kind than is requested, slides
@@ -395,6 +398,10 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     )  # fmt: skip
     remarks = [*(() if taken else warnings_about(shape.block, finding)), *listener.remarks]
     remarks += [*shape.remarks, *unread]
+    if pga_g is not None and facts.kind == "toppling" and not taken and pga_g > finding.k:
+        from rbfrag.solver.stability.toe import about_toe
+
+        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))
     across_m = 2.0 * shape.block.r3_m
     if not LEAST_M <= across_m <= MOST_M:
         remarks.append(f"the block measures some {across_m:.2g} m: lengths are in m")

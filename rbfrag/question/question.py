@@ -141,7 +141,8 @@ def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownF
 
 def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
     """Return the single block of a question as answers read it; its measures are left aside."""
-    return one_block({n: value for n, value in given.items() if n not in MEASURES}, kind)
+    block = {n: value for n, value in given.items() if n not in MEASURES}
+    return one_block(block, kind, given.get("pga_g"))
 
 
 def _answer_motion(

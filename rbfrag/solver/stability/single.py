@@ -50,6 +50,7 @@ from rbfrag.solver.stability.modes import (
     words_of_mode,
     yield_coefficient,
 )
+from rbfrag.solver.stability.toe import toe_slips_g
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,8 @@ class Stability(Tabular):
         cohesion: the effect of cohesion, or None if there is none.
         joint: the effect of roughness, or None if there is none.
         water_m: height of the water above the heel [m].
+        toe_slips_g: of a dry topple, the acceleration at which its toe gives way as it starts to
+            turn [g]; None where it holds at any, and for other modes.
         warnings: sentences on what the answer takes for granted.
     """
 
@@ -118,6 +121,7 @@ class Stability(Tabular):
     warnings: tuple[str, ...]
     joint: JointStrength | None = None
     water_m: float = 0.0
+    toe_slips_g: float | None = None
 
 
 def stability(
@@ -189,6 +193,9 @@ def stability(
         warnings=warnings_about(block, finding),
         joint=joint,
         water_m=float(water_m),
+        toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg)
+        if finding.mode == "topple" and planes.water is None
+        else None,
     )
 
 
@@ -379,7 +386,8 @@ def rough_deg(block: Block) -> float:
 KEYS = (
     "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
     "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
-    "delta_deg", "margins", "cohesion", "joint", "water_m", "warnings",
+    "delta_deg", "margins", "cohesion", "joint", "water_m", "toe_slips_g",
+    "warnings",
 )  # fmt: skip
 """What the JSON contract has of a stability and of its block."""
 
