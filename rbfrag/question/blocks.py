@@ -378,11 +378,11 @@ def one_block(
     finding, *_ = judged(shape.block, **planes)
     listener = _One(shape.remarks)
     if residual_deg is not None:
-        told = {"k": finding.k, "mode": words_of_mode(finding.mode)}
-        listener.unstable(finding.k <= 0.0, UNSTABLE_AT_REST, **told)
+        first_slip = {"k": finding.k, "mode": words_of_mode(finding.mode)}
+        listener.unstable(finding.k <= 0.0, UNSTABLE_AT_REST, **first_slip)
         planes = slipped(planes, residual_deg)
         finding, *_ = judged(shape.block, **planes)
-        listener.refuse(finding.k <= 0.0, SLIPS_ON, "phi_residual_deg", **told)
+        listener.refuse(finding.k <= 0.0, SLIPS_ON, "phi_residual_deg", **first_slip)
         listener.remark(True, AFTER_SLIP)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     numbers_read = numbers_of_shape(
@@ -398,7 +398,13 @@ def one_block(
     )  # fmt: skip
     remarks = [*(() if taken else warnings_about(shape.block, finding)), *listener.remarks]
     remarks += [*shape.remarks, *unread]
-    if pga_g is not None and facts.kind == "toppling" and not taken and pga_g > finding.k:
+    if (
+        pga_g is not None
+        and "kr" in numbers_read
+        and not facts.free_standing
+        and not taken
+        and pga_g > finding.k
+    ):
         from rbfrag.solver.stability.toe import about_toe
 
         remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))

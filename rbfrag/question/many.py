@@ -254,7 +254,7 @@ class _Sorted:
 
     def _sort_numbers(self, places: Any) -> None:
         """Sort blocks that are given by numbers."""
-        # a restitution has told already
+        # a restitution has first_slip already
         names = [name for name in self.given if not name.startswith("restitution")]
         if (self.kinds < 0).any():
             for facts in kinds_by_numbers(names):
@@ -344,8 +344,10 @@ class _Sorted:
         left = np.broadcast_to(~np.isnan(residual), (n,))
         if left.any():
             first = judged_all
-            told = {"k": first.yield_acceleration, "mode": first.mode}
-            listener.unstable(left & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **told)
+            first_slip = {"k": first.yield_acceleration, "mode": first.mode}
+            listener.unstable(
+                left & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
+            )
             phi, back = (np.where(left, residual, each) for each in (phi, back))
             strength = {
                 name: each if name in ("density_kg_m3", "jcs_mpa") else np.where(left, 0.0, each)
@@ -353,7 +355,7 @@ class _Sorted:
             }
             judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
             fails = left & (judged_all.yield_acceleration <= 0.0)
-            listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **told)
+            listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
             listener.remark(left, AFTER_SLIP)
         codes = np.broadcast_to(judged_all.mode_code, (n,))
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
