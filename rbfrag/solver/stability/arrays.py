@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,7 @@ from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.joint import (
     LAB_M,
     NO_FRACTURE,
+    OnJoint,
     refuse_half,
     roughened,
     roughness_at,
@@ -134,11 +135,8 @@ def stability_arrays(
     back_fracture: bool = True,
     cohesion_pa: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None,
-    water_m: ArrayLike | None = None,
-    jrc: ArrayLike | None = None,
-    jcs_mpa: ArrayLike | None = None,
-    joint_length_m: ArrayLike | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
+    **joint: Unpack[OnJoint[ArrayLike]],
 ) -> StabilityArray:
     """Return the failure modes, states and yield accelerations of many parallelogram blocks.
 
@@ -154,12 +152,9 @@ def stability_arrays(
         back_fracture: False for blocks that no plane supports or hinders from behind.
         cohesion_pa: cohesions of the bases, from 0 [Pa]; None for none.
         density_kg_m3: densities of the rock, needed with cohesion, water or roughness [kg/m³].
-        water_m: heights of the water in the back fractures above the heels [m]; None for none.
-        jrc: joint roughness coefficients of the bases, 0 for smooth ones; None for none.
-        jcs_mpa: compressive strengths of their walls, needed with `jrc` [MPa].
-        joint_length_m: lengths of the joints that shear as one, 0 for that of the base [m].
         nan: ``propagate`` answers NaN with its reason where the input cannot be used,
             ``raise`` refuses it.
+        joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
         InputError: shapes that do not go together, or unusable input that was to be refused.
@@ -169,17 +164,14 @@ def stability_arrays(
     given = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
         given["phi_back_deg"] = phi_back_deg
-    refuse_half(jrc, jcs_mpa, joint_length_m)
-    on_base = {
-        "cohesion_pa": cohesion_pa, "water_m": water_m, "jrc": jrc, "jcs_mpa": jcs_mpa,
-        "joint_length_m": joint_length_m,
-    }  # fmt: skip
-    strength = {name: value for name, value in on_base.items() if value is not None}
+    refuse_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
+    on_base = {"cohesion_pa": cohesion_pa, **joint}
+    strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
     if strength:
         if density_kg_m3 is None:
             raise InputError(f"{next(iter(strength))} needs density_kg_m3, the density of the rock")
         given |= {**strength, "density_kg_m3": density_kg_m3}
-    if water_m is not None and not back_fracture:
+    if joint.get("water_m") is not None and not back_fracture:
         raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
 

@@ -15,12 +15,32 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Generic, NamedTuple
+from typing import Any, Generic, NamedTuple, TypedDict, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.formulas import Elementwise, N, tan_deg
 from rbfrag.solver.stability.modes import Planes, Water
+
+V = TypeVar("V")
+
+
+class OnJoint(TypedDict, Generic[V], total=False):
+    """Water and roughness; numbers, or arrays of one a block.
+
+    Args:
+        water_m: height of the water in the back fracture above the heel [m].
+        jrc: joint roughness coefficient of the base, of samples of 10 cm; 0 or None: smooth.
+        jcs_mpa: compressive strength of its walls, of such samples, needed with `jrc` [MPa].
+        joint_length_m: length of the joint that shears as one [m]; None, or in arrays 0, for that
+            of the base.
+    """
+
+    water_m: V
+    jrc: V | None
+    jcs_mpa: V | None
+    joint_length_m: V | None
+
 
 WATER_N_M3 = 9810.0
 """Unit weight of water, γw [N/m³]."""

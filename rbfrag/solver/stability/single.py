@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
@@ -28,6 +28,7 @@ from rbfrag.solver.stability.joint import (
     NOT_OF_OUTLINES,
     SPILLS_OVER,
     JointStrength,
+    OnJoint,
     refuse_half,
     roughened,
     roughness_at,
@@ -134,10 +135,7 @@ def stability(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    water_m: float = 0.0,
-    jrc: float | None = None,
-    jcs_mpa: float | None = None,
-    joint_length_m: float | None = None,
+    **joint: Unpack[OnJoint[float]],
 ) -> Stability:
     """Return the failure mode of a block, its state and its yield acceleration.
 
@@ -153,19 +151,15 @@ def stability(
         back_fracture: False for a block that no plane supports or hinders from behind.
         cohesion_pa: cohesion of the base [Pa]; the back plane has none.
         density_kg_m3: density of the rock [kg/m³], needed with cohesion, water or roughness.
-        water_m: height of the water in the back fracture above the heel [m].
-        jrc: joint roughness coefficient of the base, of samples of 10 cm; None for a smooth one.
-        jcs_mpa: compressive strength of its walls, of such samples [MPa].
-        joint_length_m: length of the joint that shears as one, above 0 [m]; None for the base's.
+        joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
         InputError: a value outside its range; the message names the range; or water that lifts
             the block off its base.
     """
-    finding, planes, joint = judged(
+    finding, planes, strength = judged(
         block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, kv=kv,
-        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3,
-        water_m=water_m, jrc=jrc, jcs_mpa=jcs_mpa, joint_length_m=joint_length_m,
+        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3, **joint,
     )  # fmt: skip
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
     own = {mode: k if mode == finding.mode else None for mode in MODES}
@@ -191,8 +185,8 @@ def stability(
         ),
         cohesion=_cohesion(planes, bond) if bond else None,
         warnings=warnings_about(block, finding),
-        joint=joint,
-        water_m=float(water_m),
+        joint=strength,
+        water_m=float(joint.get("water_m") or 0.0),
         toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg)
         if finding.mode == "topple" and planes.water is None
         else None,
@@ -209,10 +203,7 @@ def judged(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    water_m: float = 0.0,
-    jrc: float | None = None,
-    jcs_mpa: float | None = None,
-    joint_length_m: float | None = None,
+    **joint: Unpack[OnJoint[float]],
 ) -> tuple[MarginFacts, Planes[float], JointStrength | None]:
     """Return the mode and yield of a block, its planes and what roughness makes of its friction.
 
@@ -227,13 +218,14 @@ def judged(
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
     planes = Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR, bond or None)
     t1, t3 = block.tan_alpha1, block.tan_alpha3
-    if not_negative(water_m, "water_m", "m") > 0.0:
-        planes = _wet(block, planes, float(water_m), density_kg_m3, back_fracture)
-    joint = None
-    refuse_half(jrc, jcs_mpa, joint_length_m)
+    if (water_m := not_negative(joint.get("water_m") or 0.0, "water_m", "m")) > 0.0:
+        planes = _wet(block, planes, water_m, density_kg_m3, back_fracture)
+    strength = None
+    jrc, jcs_mpa, length_m = (joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m"))
+    refuse_half(jrc, jcs_mpa, length_m)
     if jrc is not None:
-        planes, joint = _rough(block, planes, phi_deg, jrc, jcs_mpa, joint_length_m, density_kg_m3)
-        phi_deg = joint.secant_deg
+        planes, strength = _rough(block, planes, phi_deg, jrc, jcs_mpa, length_m, density_kg_m3)
+        phi_deg = strength.secant_deg
     code = int(planes.mode(t1, t3, block.confines, back_fracture=back_fracture))
     # the weight passes upslope of the heel, and nothing stands there to lean on
     backward = not back_fracture and tb < t1
@@ -245,7 +237,7 @@ def judged(
         MODES[code], STATES[int(state_code(k, SCALAR))], k, beta_deg, phi_deg, phi_back_deg,
         back_fracture, backward, untenable and back_fracture, lifts,
     )  # fmt: skip
-    return finding, planes, joint
+    return finding, planes, strength
 
 
 def _weighed(density_kg_m3: object, name: str, value: float) -> float:
