@@ -199,10 +199,10 @@ def _answer(
             what = "an option and a column of" if name in given else "empty in the first rows of"
             raise InputError(f"{column_of(name)} is {what} {table.name}: give it once, or of all")
     for name in SPACE:
-        if (texts := table.text(part, name)) is not None:
+        if (planes := table.text(part, name)) is not None:
             if name in given:
                 raise InputError(f"{name} is an option and a column of {table.name}: give it once")
-            values[name] = np.array(texts, dtype=object)
+            values[name] = np.array(planes, dtype=object)
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
     with table.named():

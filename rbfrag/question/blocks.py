@@ -15,6 +15,7 @@ from rbfrag.fragility.lookup import block_of, check_numbers
 from rbfrag.question.fields import (
     BlockFields,
     FailureFields,
+    JointFields,
     NumberFields,
     PlaneFields,
     ScatterFields,
@@ -25,10 +26,12 @@ from rbfrag.question.fields import (
     names_of,
 )
 from rbfrag.question.shapes import (
+    AFTER_SLIP,
     BOND,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
+    JOINT,
     LEAST_M,
     MOST_M,
     NO_MODEL,
@@ -36,7 +39,9 @@ from rbfrag.question.shapes import (
     PLANES,
     SHAPES,
     SIDES_AND_PLANES,
+    SLIPS_ON,
     SPACE,
+    UNSTABLE_AT_REST,
     WAYS,
     ModeShapes,
     check_ranges,
@@ -46,6 +51,7 @@ from rbfrag.question.shapes import (
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
+from rbfrag.solver.stability.modes import words_of_mode
 
 if TYPE_CHECKING:
     import numpy as np
@@ -249,8 +255,9 @@ def sectioned(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, .
 
 
 def bond_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return cohesion and density where they are stated, or refuse what is out of its range."""
-    bond = {name: number(given[name], name, "a number") for name in BOND if name in given}
+    """Return what a joint is like where that is stated, or refuse what is out of its range."""
+    names = (*BOND, *JOINT)
+    bond = {name: number(given[name], name, "a number") for name in names if name in given}
     check_ranges(bond, _One())
     return bond
 
@@ -282,6 +289,18 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name != "kv"}
 
 
+def slipped(planes: Mapping[str, Any], residual_deg: float) -> dict[str, Any]:
+    """Return planes after the first slip: dry, without bond or roughness.
+
+    Args:
+        planes: planes by field.
+        residual_deg: friction angle that is left on base and back [deg].
+    """
+    ended = {*BOND, *JOINT, "phi_back_deg"}
+    left = {name: value for name, value in planes.items() if name not in ended}
+    return {**left, "phi_deg": residual_deg}
+
+
 class _One:
     """Raises the first reason against a single block, with what is suspicious about its angles."""
 
@@ -308,6 +327,7 @@ _READ = frozenset(
         FailureFields,
         ShapeFields,
         PlaneFields,
+        JointFields,
         ScatterFields,
         ShakingFields,
         WholeFields,
@@ -328,12 +348,15 @@ def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str
     return {name: value for name, value in given.items() if name in known}, tuple(remarks)
 
 
-def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
+def one_block(
+    given: Mapping[str, Any], kind: str | None = None, pga_g: float | None = None
+) -> Blocks:
     """Return a single block as answers read it.
 
     Args:
         given: fields of it that are stated; ``block`` may be a :class:`Block`.
         kind: how it is asked to fail; None for what its shape or its numbers say.
+        pga_g: PGA at which it is said whether the toe of a block that topples holds [g].
 
     Raises:
         InputError: it is described twice or in part, is of another kind than is requested, slides
@@ -366,14 +389,23 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     planes = shape.rough()
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
-    finding, _ = judged(shape.block, **planes)
-    facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
+    residual_deg = planes.pop("phi_residual_deg", None)
+    finding, *_ = judged(shape.block, **planes)
     listener = _One(shape.remarks)
+    if residual_deg is not None:
+        first_slip = {"k": finding.k, "mode": words_of_mode(finding.mode)}
+        listener.unstable(finding.k <= 0.0, UNSTABLE_AT_REST, **first_slip)
+        planes = slipped(planes, residual_deg)
+        finding, *_ = judged(shape.block, **planes)
+        listener.refuse(finding.k <= 0.0, SLIPS_ON, "phi_residual_deg", **first_slip)
+        listener.remark(True, AFTER_SLIP)
+    facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     numbers_read = numbers_of_shape(
         facts,
         ModeShapes(
             shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
             finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
+            bool(planes.get("jrc")), bool(planes.get("water_m")),
         ),
         math.nan if displacement_m is None else displacement_m,
         others,
@@ -382,6 +414,16 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
     remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
     remarks += listener.remarks
     remarks += [*shape.remarks, *unread]
+    if (
+        pga_g is not None
+        and "kr" in numbers_read
+        and not facts.free_standing
+        and not taken
+        and pga_g > finding.k
+    ):
+        from rbfrag.solver.stability.toe import about_toe
+
+        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))
     across_m = 2.0 * shape.block.r3_m
     if not LEAST_M <= across_m <= MOST_M:
         remarks.append(f"the block measures some {across_m:.2g} m: lengths are in m")

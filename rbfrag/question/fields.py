@@ -294,6 +294,47 @@ class SpaceFields(TypedDict, total=False):
     ]
 
 
+class JointFields(TypedDict, Generic[V], total=False):
+    """What ends with the first slip of a block, and what is left then."""
+
+    water_m: Annotated[
+        V,
+        Field(
+            "Height of the water in the back fracture above the heel, with {density_kg_m3}",
+            "m", ("water", "water_level"), least=0.0,
+        ),
+    ]  # fmt: skip
+    jrc: Annotated[
+        V,
+        Field(
+            "Joint roughness coefficient of the base, of samples of 10 cm, with {jcs_mpa} and "
+            "{density_kg_m3}; {phi_deg} is then the residual friction angle",
+            least=0.0, most=20.0,
+        ),
+    ]  # fmt: skip
+    jcs_mpa: Annotated[
+        V,
+        Field(
+            "Compressive strength of the walls of the base, of samples of 10 cm", "MPa", ("jcs",),
+            word="jcs", above=0.0,
+        ),
+    ]  # fmt: skip
+    joint_length_m: Annotated[
+        V,
+        _length(
+            "Length of the joint that shears as one; default: that of the base", "joint_length"
+        ),
+    ]
+    phi_residual_deg: Annotated[
+        V,
+        _friction(
+            "Friction angle of base and back that is left after the first slip, which ends "
+            "cohesion, water and roughness",
+            "phi_residual",
+        ),
+    ]
+
+
 class ScatterFields(TypedDict, Generic[V], total=False):
     """How well a block is known: what is stated is the median, and P the mean over it."""
 
@@ -308,7 +349,13 @@ class ScatterFields(TypedDict, Generic[V], total=False):
 
 
 class BlockFields(
-    NumberFields[V], FailureFields[V], ShapeFields[V], PlaneFields[V], ScatterFields[V], total=False
+    NumberFields[V],
+    FailureFields[V],
+    ShapeFields[V],
+    PlaneFields[V],
+    JointFields[V],
+    ScatterFields[V],
+    total=False,
 ):
     """What may be said of a block: numbers, or its sides and planes."""
 

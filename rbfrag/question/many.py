@@ -25,15 +25,19 @@ from rbfrag.question.blocks import (
     requested_kind,
 )
 from rbfrag.question.shapes import (
+    AFTER_SLIP,
     BOND,
     FRICTION_MISSING,
+    JOINT,
     LEAST_M,
     MOST_M,
     NO_MODEL,
     PLANES,
     RECTANGLE,
     SHAPES,
+    SLIPS_ON,
     SPACE,
+    UNSTABLE_AT_REST,
     ModeShapes,
     check_ranges,
     numbers_of_shape,
@@ -262,7 +266,7 @@ class _Sorted:
 
     def _sort_numbers(self, places: Any) -> None:
         """Sort blocks that are given by numbers."""
-        # a restitution has told already
+        # a restitution has first_slip already
         names = [name for name in self.given if not name.startswith("restitution")]
         if (self.kinds < 0).any():
             for facts in kinds_by_numbers(names):
@@ -295,7 +299,7 @@ class _Sorted:
 
     def _sort_shapes(self, shape: tuple[str, ...], places: Places) -> None:
         """Sort blocks that are given by their shape."""
-        planes = [name for name in PLANES if name in self.given]
+        planes = [name for name in (*PLANES, *JOINT) if name in self.given]
         self.read |= {*shape, *planes, *self.of_all}
         stated = {name: _at(self.given[name], places) for name in (*shape, *planes)}
         if shape != RECTANGLE:
@@ -305,7 +309,10 @@ class _Sorted:
         elif self.rows and "beta_deg" in stated:
             stated["beta_deg"] = np.nan_to_num(stated["beta_deg"], nan=0.0, posinf=np.inf)
         listener = _Some(self, places)
-        check_ranges(stated, listener, columns=self.rows)
+        # an empty cell states nothing, nor does what has a default
+        unsaid = JOINT if self.rows else ("joint_length_m", "phi_residual_deg")
+        there = {n: np.nan_to_num(v, nan=1.0) if n in unsaid else v for n, v in stated.items()}
+        check_ranges(there, listener, columns=self.rows)
         stated.setdefault("beta_deg", np.zeros(1))
         stated.setdefault("phi_deg", np.full(1, np.nan))
         stated.setdefault("phi_back_deg", stated["phi_deg"])
@@ -330,14 +337,41 @@ class _Sorted:
         # a friction angle that leaves a rectangle no choice: between that of its toe and 90°
         phi = np.where(taken, 0.5 * (blocks.alpha3_deg + 90.0), phi)
         back = np.where(np.isnan(back), phi, back)
-        judged_all = stability_arrays(
-            blocks, beta_deg=stated["beta_deg"], phi_deg=phi, phi_back_deg=back,
-            back_fracture=not free_standing, **self.bond,
-        )  # fmt: skip
+        strength, listener = dict(self.bond), _Some(self, places)
+        for name in ("water_m", "jrc", "joint_length_m"):
+            if name in stated:
+                strength[name] = np.nan_to_num(stated[name])
+        if "jrc" in stated:
+            # what is smooth needs no strength of its walls
+            jcs = stated.get("jcs_mpa", np.full(1, np.nan))
+            listener.refuse(
+                (strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa"
+            )
+            strength["jcs_mpa"] = np.nan_to_num(jcs, nan=1.0)
+        if free_standing:
+            strength.pop("water_m", None)
+        on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
+        judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
+        residual = stated.get("phi_residual_deg", np.full(1, np.nan))
+        left = np.broadcast_to(~np.isnan(residual), (n,))
+        if left.any():
+            first = judged_all
+            first_slip = {"k": first.yield_acceleration, "mode": first.mode}
+            listener.unstable(
+                left & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
+            )
+            phi, back = (np.where(left, residual, each) for each in (phi, back))
+            strength = {
+                name: each if name in ("density_kg_m3", "jcs_mpa") else np.where(left, 0.0, each)
+                for name, each in strength.items()
+            }
+            judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
+            fails = left & (judged_all.yield_acceleration <= 0.0)
+            listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
+            listener.remark(left, AFTER_SLIP)
         codes = np.broadcast_to(judged_all.mode_code, (n,))
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
         k = np.broadcast_to(judged_all.yield_acceleration, (n,))
-        listener = _Some(self, places)
         for code in np.unique(reasons[reasons > 0]).tolist():
             listener.refuse(reasons == code, REASONS[code])
         self.modes[places] = codes
@@ -370,7 +404,10 @@ class _Sorted:
             self.kinds[of_these] = _FACTS.index(facts)
             judged = ModeShapes(
                 blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
-                _at(back, here), _at(taken, here), self.backed, bool(self.bond.get("cohesion_pa")),
+                _at(back, here), _at(taken, here), self.backed,
+                ~left[here] & bool(self.bond.get("cohesion_pa")),
+                _at(np.asarray(strength.get("jrc", np.zeros(1))) > 0.0, here),
+                _at(np.asarray(strength.get("water_m", np.zeros(1))) > 0.0, here),
             )  # fmt: skip
             names = [
                 name for name in _numbers_of(facts)

@@ -147,7 +147,8 @@ OF_SHAKING = frozenset({*names_of(ShakingFields), *MEASURES})
 
 def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
     """Return the single block of a question as answers read it; its measures are left aside."""
-    return one_block({n: value for n, value in given.items() if n not in OF_SHAKING}, kind)
+    block = {n: value for n, value in given.items() if n not in OF_SHAKING}
+    return one_block(block, kind, given.get("pga_g"))
 
 
 def _answer_motion(

@@ -11,7 +11,14 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import PlaneFields, SpaceFields, column_of, declared, names_of
+from rbfrag.question.fields import (
+    JointFields,
+    PlaneFields,
+    SpaceFields,
+    column_of,
+    declared,
+    names_of,
+)
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
@@ -70,9 +77,34 @@ SLIDES = (
     "the block slides (yield {k:.2g} g): state displacement_m, the displacement that is too far"
 )
 
+_LEFT = "state phi_residual_deg, the friction angle that is left, for the answer after it"
+
 COHESIVE = (
     "cohesion_pa does not go with {kind}: the first motion breaks a bond, which the model does not "
-    "describe"
+    f"describe: {_LEFT}"
+)
+
+UPLIFT = (
+    "water_m does not go with a probability of {kind}: uplift ends with the first slip (yield "
+    "{k:.4g} g, {mode}), which opens the fracture, and no displacement or probability follows from "
+    f"it: {_LEFT}"
+)
+
+ROUGH = (
+    "jrc does not go with a probability of {kind}: roughness ends with the first slip (yield "
+    "{k:.4g} g, {mode}), and no displacement or probability follows from it: "
+    f"{_LEFT}"
+)
+
+SLIPS_ON = (
+    "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "
+    "it fails where the motion exceeds that yield, and no model is needed"
+)
+
+AFTER_SLIP = (
+    "the answer is that of the block after its first slip, dry and without bond or roughness, on "
+    "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
+    "and a motion below that does nothing"
 )
 
 NO_UNIQUE_MOTION = (
@@ -140,7 +172,9 @@ class ModeShapes(NamedTuple):
         phi_back_deg: those of the back planes [deg].
         taken: whether the friction is not known, and they are taken not to slide.
         backed: whether a plane is behind them.
-        bonded: whether their bases have cohesion.
+        bonded: whether, or which of, their bases have cohesion.
+        rough: whether, or which of, their bases are rough.
+        wet: whether, or in which of them, water stands behind them.
     """
 
     body: Block | BlockArray
@@ -151,7 +185,9 @@ class ModeShapes(NamedTuple):
     phi_back_deg: Any
     taken: Any
     backed: bool
-    bonded: bool = False
+    bonded: Any = False
+    rough: Any = False
+    wet: Any = False
 
 
 def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
@@ -194,7 +230,9 @@ SPACE = names_of(SpaceFields)
 
 BOND = ("cohesion_pa", "density_kg_m3")
 
-PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND)
+JOINT = names_of(JointFields)
+
+PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND, *JOINT)
 """Fields that describe a block only beside its shape; the dip stands with numbers too."""
 
 SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
@@ -263,8 +301,11 @@ def numbers_of_shape(
         listener.refuse(True, NO_MODEL_OF_MODE, **words)
         return {}
     listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
-    if judged.bonded and (facts.free_standing or "p2" not in facts.parameters):
-        listener.refuse(True, COHESIVE, "cohesion_pa", **words)
+    listener.refuse(judged.wet, UPLIFT, "water_m", "phi_residual_deg", **words)
+    # a topple turns about its toe whatever its base
+    if facts.free_standing or "p2" not in facts.parameters:
+        listener.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
+        listener.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
     if "ky" in facts.parameters:
         listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
         return {"ky": k, "beta_deg": judged.beta_deg, "displacement_m": displacement_m, **stated}

@@ -27,6 +27,7 @@ FACTORS = {
     "deg": {"deg": 1.0, "°": 1.0, "degrees": 1.0},
     "1/s²": {"1/s2": 1.0, "s-2": 1.0, "rad2/s2": 1.0},
     "s": {"s": 1.0, "ms": 0.001},
+    "MPa": {"mpa": 1.0},
     "": {"": 1.0, "-": 1.0, "g": 1.0, "%": 0.01},
 }  # fmt: skip
 """By the unit of a field the units that a column may state, and what turns them into it."""

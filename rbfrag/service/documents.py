@@ -20,6 +20,7 @@ from rbfrag.question.document import OF_EACH_MODEL
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.reports import STRENGTH_VALUES
 from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.stability.joint import JointStrength
 from rbfrag.solver.stability.single import KEYS, Cohesion, Stability
 
 T = TypeVar("T", bound=BaseModel)
@@ -135,6 +136,11 @@ class CohesionAnswer(_Document):
     ky_equivalent: float | None
 
 
+@keys_of(JointStrength)
+class JointAnswer(_Document):
+    """What roughness makes of the friction of the base at the normal stress of its yield."""
+
+
 @keys_of(Stability, Block, names=KEYS)
 class BlockAnswer(_Document):
     """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply."""
@@ -142,6 +148,7 @@ class BlockAnswer(_Document):
     ky: float | None
     yield_acceleration: float | None
     cohesion: CohesionAnswer | None
+    joint: JointAnswer | None
 
 
 class DrawingAnswer(_Document):

@@ -18,6 +18,7 @@ from rbfrag.question.fields import (
     AnsweringFields,
     AtRestFields,
     BlockFields,
+    JointFields,
     MeasureFields,
     PlaneFields,
     RequestFields,
@@ -127,8 +128,9 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (*names_of(ShapeFields, PlaneFields, SpaceFields), "back_fracture")
-_AT_REST = (*_SHAPE, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
+_SHAPE = (*names_of(ShapeFields, PlaneFields, SpaceFields, JointFields), "back_fracture")
+_BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
+_AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
 _BLOCK = names_of(BlockFields, WholeFields)
 _QUESTION = (*_BLOCK, *names_of(ShakingFields, RequestFields))
 

@@ -17,7 +17,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import MeshOptions
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import block_in_words
-from rbfrag.question.fields import AtRestFields, PlaneFields, ShapeFields, WholeFields
+from rbfrag.question.fields import AtRestFields, JointFields, PlaneFields, ShapeFields, WholeFields
 
 FREE_STANDING = (
     "rbfrag predict --kind rocking  with the same options and a measure of the motion (--pgv 0.6) "
@@ -35,7 +35,15 @@ SHORT = ("mode", "p2", "kr", "ky", "ks", "kct", "alpha1_deg", "alpha3_deg", "gam
 def block(
     *,
     given: Annotated[
-        Given, fields_of(ShapeFields, PlaneFields, WholeFields, AtRestFields, without=("kind",))
+        Given,
+        fields_of(
+            ShapeFields,
+            PlaneFields,
+            JointFields,
+            WholeFields,
+            AtRestFields,
+            without=("kind", "phi_residual_deg"),
+        ),
     ],
     mesh: MeshOptions,
     plot: str | None = option(
@@ -93,6 +101,7 @@ def block(
     margins = answer.pop("margins")
     bond = answer.pop("cohesion")
     answer |= {f"cohesion_{name}": value for name, value in (bond or {}).items()}
+    answer |= {f"joint_{name}": value for name, value in (answer.pop("joint") or {}).items()}
     print(block_in_words(answer))
     print()
     if printing.verbose:

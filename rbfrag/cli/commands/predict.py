@@ -115,7 +115,7 @@ def predict(
         numbers = {**draws, **given}
         kind = numbers.pop("kind", None)
     else:
-        kind, numbers, question["remarks"] = numbers_of(given)
+        kind, numbers, question["remarks"] = numbers_of(given, pga_g=measures.get("pga_g"))
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 

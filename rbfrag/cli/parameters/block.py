@@ -124,13 +124,14 @@ class BlocksOptions(TableOptions):
 
 
 def numbers_of(
-    given: Given, kind: str | None = None
+    given: Given, kind: str | None = None, pga_g: float | None = None
 ) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
     """Return the kind of the one block that options describe, its numbers, and warnings.
 
     Args:
         given: what they say, by field.
         kind: how it fails where they do not say so; None for what they say of it.
+        pga_g: PGA at which it is said whether the toe of a block that topples holds [g].
 
     Raises:
         InputError: it is described twice or in part, or is of another kind.
@@ -139,7 +140,7 @@ def numbers_of(
 
     stated = {field: value for field, value in given.items() if field != "kind"}
     with given.named():
-        blocks = one_block(stated, given.get("kind", kind))
+        blocks = one_block(stated, given.get("kind", kind), pga_g)
     (group,) = blocks.groups
     return group.kind, {**group.numbers}, blocks.remarks
 

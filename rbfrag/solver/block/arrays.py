@@ -86,6 +86,10 @@ REASONS = (
     "phi_deg or phi_back_deg is not a friction angle from 0 to below 90 degrees",
     "kv is not above -1: the ground falls away under the block (a jump)",
     "cohesion_pa is below zero, density_kg_m3 is not above zero, or either is not finite",
+    "water_m, jrc or joint_length_m is below zero, jcs_mpa is not above zero, or one is not finite",
+    "water_m stands above the top of the back fracture, or the fracture does not rise from the "
+    "heel",
+    "the water lifts the block off its base: it floats",
 )
 """Why there is no answer for an element, by its reason code; 0 for none."""
 

@@ -9,7 +9,8 @@ TOML holds one of the three descriptions of a block::
                                                     gamma_deg = 90.0
 
 and, where a command needs them, ``beta_deg``, ``phi_deg``, ``phi_back_deg``, ``kv``,
-``cohesion_pa``, ``density_kg_m3`` and ``back_fracture``.
+``cohesion_pa``, ``density_kg_m3``, ``water_m``, ``jrc``, ``jcs_mpa``, ``joint_length_m`` and
+``back_fracture``.
 
 CSV holds an outline: the columns ``x_m,y_m,contact``, one vertex a row in counter-clockwise
 order, ``heel``, ``toe`` and ``back`` in the third column where a vertex is a contact. The other
@@ -33,6 +34,7 @@ FRACTURES = ("s1_m", "s2_m", "gamma_deg")
 POLYGON = ("vertices_m", "heel", "back", "toe", "gamma_deg")
 CONDITIONS = (
     "beta_deg", "phi_deg", "phi_back_deg", "kv", "back_fracture", "cohesion_pa", "density_kg_m3",
+    "water_m", "jrc", "jcs_mpa", "joint_length_m",
 )  # fmt: skip
 """What a file may say about the block's planes; the keywords of `stability`."""
 

@@ -1,7 +1,8 @@
 """Formulas of block shape, written once for single numbers and for arrays (eqs. 3.1-3.15).
 
 Only the functions of :class:`Elementwise`, the four operations and comparisons are used, and all of
-them round correctly, so that single numbers and arrays give the same bits. No numpy is loaded until
+them but the logarithm round correctly, so that single numbers and arrays give the same bits. No
+numpy is loaded until
 an array is asked for. The libraries' tangents differ in the last bit between processors; a block on
 a boundary between two modes must not change mode for that, so the tangent is made here. All of a
 parallelogram follows from the tangents of its angles, t1 = tan α1 and t3 = tan α3, and from half
@@ -32,17 +33,19 @@ class Elementwise(Generic[N]):
 
     Args:
         where: ``where(condition, a, b)`` is a where the condition holds, else b.
+        log10: the logarithm, which alone may differ in the last bit between numbers and arrays.
     """
 
     sqrt: Callable[[N], N]
     where: Callable[[Any, Any, Any], Any]
+    log10: Callable[[N], N]
 
 
 def _choose(condition: bool, yes: float, no: float) -> float:
     return yes if condition else no
 
 
-SCALAR: Elementwise[float] = Elementwise(sqrt=math.sqrt, where=_choose)
+SCALAR: Elementwise[float] = Elementwise(sqrt=math.sqrt, where=_choose, log10=math.log10)
 """The functions for single numbers."""
 
 
@@ -51,7 +54,7 @@ def array_elementwise() -> Elementwise[Any]:
     """Return the functions for numpy arrays."""
     import numpy as np
 
-    return Elementwise(sqrt=np.sqrt, where=np.where)
+    return Elementwise(sqrt=np.sqrt, where=np.where, log10=np.log10)
 
 
 _RADIAN = math.pi / 180.0

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.arrays import REASONS, BlockArray, CodeArray, common_shape, in_chunks
 from rbfrag.solver.block.formulas import (
     SCALAR,
@@ -24,13 +25,24 @@ from rbfrag.solver.block.formulas import (
     tan_deg,
 )
 from rbfrag.solver.results import FloatArray
+from rbfrag.solver.stability.joint import (
+    LAB_M,
+    NO_FRACTURE,
+    OnJoint,
+    refuse_half,
+    roughened,
+    roughness_at,
+    water_at,
+)
 from rbfrag.solver.stability.modes import (
     CONFINED_TOPPLE,
     MODES,
+    SLIDE,
     SLUMP,
     STATES,
     TOPPLE,
     Planes,
+    Water,
     state_code,
 )
 
@@ -44,8 +56,14 @@ _USABLE: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
     "phi_back_deg": (6, lambda phi: (phi >= 0.0) & (phi < 90.0)),
     "cohesion_pa": (8, lambda cohesion: (cohesion >= 0.0) & (cohesion < math.inf)),
     "density_kg_m3": (8, lambda density: (density > 0.0) & (density < math.inf)),
+    "water_m": (9, lambda water: (water >= 0.0) & (water < math.inf)),
+    "jrc": (9, lambda jrc: (jrc >= 0.0) & (jrc < math.inf)),
+    "jcs_mpa": (9, lambda jcs: (jcs > 0.0) & (jcs < math.inf)),
+    "joint_length_m": (9, lambda length: (length >= 0.0) & (length < math.inf)),
 }
 """Which values can be used, and the reason code of the others, by argument."""
+
+_SPILLS, _FLOATS = 10, 11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,11 +136,12 @@ def stability_arrays(
     cohesion_pa: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
+    **joint: Unpack[OnJoint[ArrayLike]],
 ) -> StabilityArray:
     """Return the failure modes, states and yield accelerations of many parallelogram blocks.
 
     The formulas are those of :func:`rbfrag.solver.stability.single.stability`, and the answers are
-    the same to the last bit.
+    the same to the last bit, those with roughness to rounding.
 
     Args:
         blocks: the blocks; the other arguments broadcast with them.
@@ -132,9 +151,10 @@ def stability_arrays(
         kv: vertical acceleration of the ground, up positive, above -1 [g].
         back_fracture: False for blocks that no plane supports or hinders from behind.
         cohesion_pa: cohesions of the bases, from 0 [Pa]; None for none.
-        density_kg_m3: densities of the rock, needed with a cohesion [kg/m³].
+        density_kg_m3: densities of the rock, needed with cohesion, water or roughness [kg/m³].
         nan: ``propagate`` answers NaN with its reason where the input cannot be used,
             ``raise`` refuses it.
+        joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
         InputError: shapes that do not go together, or unusable input that was to be refused.
@@ -144,10 +164,15 @@ def stability_arrays(
     given = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
         given["phi_back_deg"] = phi_back_deg
-    if cohesion_pa is not None:
+    refuse_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
+    on_base = {"cohesion_pa": cohesion_pa, **joint}
+    strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
+    if strength:
         if density_kg_m3 is None:
-            raise InputError("cohesion_pa needs density_kg_m3, the density of the rock")
-        given |= {"cohesion_pa": cohesion_pa, "density_kg_m3": density_kg_m3}
+            raise InputError(f"{next(iter(strength))} needs density_kg_m3, the density of the rock")
+        given |= {**strength, "density_kg_m3": density_kg_m3}
+    if joint.get("water_m") is not None and not back_fracture:
+        raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
 
     def formula(
@@ -160,7 +185,7 @@ def stability_arrays(
             ok = reason == 0
             t1, t3, h = (np.where(ok, value, math.nan) for value in (t1, t3, h))
             there = {name: np.where(ok, value, 0.0) for name, value in there.items()}
-        bond = None
+        bond = water = None
         if "cohesion_pa" in there:
             base = h * t3 - h * t1
             bond = np.asarray(
@@ -168,11 +193,30 @@ def stability_arrays(
             )
         tb, mu1 = _tangent(there["beta_deg"]), _tangent(there["phi_deg"])
         mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
-        planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], array_elementwise(), bond)
-        mode, k, ky, lifts = _yields(t1, t3, planes, back_fracture)
+        functions = array_elementwise()
+        if "water_m" in there:
+            water, holds = water_at(
+                water_m=there["water_m"], density_kg_m3=there["density_kg_m3"], half_s1_m=h,
+                tan_alpha1=t1, tan_alpha3=t3, cot=cot_gamma(t1, t3), tan_beta=tb,
+                functions=functions,
+            )  # fmt: skip
+            reason[(reason == 0) & (holds ^ True) & (there["water_m"] > 0.0)] = _SPILLS
+            water = Water(
+                *(np.where(there["water_m"] > 0.0, each, 0.0) for each in vars(water).values())
+            )
+        planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], functions, bond, water)
+        if "jrc" in there:
+            base, length = h * t3 - h * t1, there.get("joint_length_m", 0.0)
+            length = np.maximum(np.where(np.asarray(length) > 0.0, length, base), LAB_M)
+            weight = there["density_kg_m3"] * STANDARD_GRAVITY_M_S2 * 2.0 * h
+            rough = roughness_at(there["jrc"], there["jcs_mpa"], length, weight, np.power)
+            planes, *_ = roughened(planes, rough, there["phi_deg"])
+        mode, k, ky, lifts, floats = _yields(t1, t3, planes, back_fracture)
+        reason[(reason == 0) & floats] = _FLOATS
         state = state_code(k, planes.functions)
         p2 = frequency_parameter(shape_factor(t1, t3), corner_distance(h, t3, planes.functions))
         if reason.any():
+            ok = reason == 0
             mode, state = np.where(ok, mode, NOTHING), np.where(ok, state, NOTHING)
             k, ky, p2 = (np.where(ok, value, math.nan) for value in (k, ky, p2))
             lifts = lifts & ok
@@ -204,10 +248,11 @@ def _tangent(angle_deg: Any) -> Any:
 
 def _yields(
     t1: FloatArray, t3: FloatArray, planes: Planes[Any], back_fracture: bool
-) -> tuple[NDArray[Any], FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return modes, their yields, those of sliding, and where a bond lets the toe lift."""
+) -> tuple[NDArray[Any], FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return modes, their yields, those of sliding, where a toe lifts and where blocks float."""
     cot, ky = cot_gamma(t1, t3), planes.ky
     k, lifts = np.array(np.broadcast_to(ky, t1.shape)), np.zeros(t1.shape, dtype=np.bool_)
+    floats = np.array(np.broadcast_to(planes.floats(k, SLIDE, cot), t1.shape))
     mode = planes.mode(t1, t3, cot < 0.0, back_fracture=back_fracture)
     for code in (TOPPLE, SLUMP, CONFINED_TOPPLE):
         here = np.flatnonzero(mode == code)
@@ -215,11 +260,13 @@ def _yields(
             a1, a3 = t1[here], t3[here]
             # in units of half the S1, as `Block.arms` has them
             arms = (a1, -1.0), (-a3, 1.0), (a3, -1.0), (a1, -1.0)
-            k[here], _, lifts[here] = _at(planes, here).yield_of(code, arms, cot[here])
+            own = _at(planes, here)
+            k[here], _, lifts[here] = own.yield_of(code, arms, cot[here])
+            floats[here] = own.floats(k[here], code, cot[here])
     if not back_fracture:
         # the weight passes upslope of the heel, and nothing stands there to lean on
         k[planes.tan_beta < t1] = -math.inf
-    return mode, k, ky, lifts
+    return mode, k, ky, lifts, floats
 
 
 def _at(planes: Planes[Any], here: NDArray[np.intp]) -> Planes[Any]:
@@ -229,6 +276,8 @@ def _at(planes: Planes[Any], here: NDArray[np.intp]) -> Planes[Any]:
     parts: dict[str, Any] = {
         name: value[here] for name, value in values.items() if isinstance(value, np.ndarray)
     }
+    if planes.water is not None:
+        parts["water"] = Water(*(each[here] for each in vars(planes.water).values()))
     return replace(planes, **parts)
 
 

@@ -194,43 +194,6 @@ def state_code(k: N, functions: Elementwise[N]) -> N:
     return result
 
 
-def slump_bond(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu2: N) -> N:
-    """Return what a bond of the base, 1 m g strong, adds to the numerator of a slump's yield.
-
-    The bond pulls the base up the slope along its plane; moments about the centroid leave
-    -(r2 - r1) x u2 of it. The arguments are those of :func:`slump`.
-    """
-    return (back_y - heel_y) * (1.0 - cot * mu2) - (back_x - heel_x) * (cot + mu2)
-
-
-def confined_bond(toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu2: N) -> N:
-    """Return the same of confined toppling; the arguments are those of that function."""
-    return (low_x - toe_x) * (cot - mu2) - (low_y - toe_y) * (1.0 + cot * mu2)
-
-
-def sliding_limit(
-    mu1: N, tan_beta: N, weight: N | float, ky: N, bond: N, functions: Elementwise[N]
-) -> N:
-    """Return the tangent of the resultant's angle at which the base slides.
-
-    Args:
-        mu1: tangent of the friction angle of the base.
-        tan_beta: tangent of the dip of the base.
-        weight: 1 + k_v.
-        ky: yield acceleration coefficient of sliding, with the bond.
-        bond: strength of the base's bond over the weight; without one the limit is `mu1`.
-        functions: the functions for this kind of number.
-    """
-    where = functions.where
-    # weight and inertia at the yield, normal and along the base, each over cos β
-    normal = weight - ky * tan_beta
-    # a bond may hold until the inertial force lifts the block off its base
-    pressed = normal > 0.0
-    limit = where(pressed, (weight * tan_beta + ky) / where(pressed, normal, 1.0), math.inf)
-    result: N = where((bond == 0.0) | (abs(ky) == math.inf), mu1, limit)
-    return result
-
-
 def toe_lifts(
     k: N,
     r_base: N,
@@ -258,6 +221,21 @@ def toe_lifts(
     return ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
 
 
+@dataclass(frozen=True)
+class Water(Generic[N]):
+    """The push of water on a block, over its weight.
+
+    Args:
+        along: down the base.
+        normal: off the base.
+        moment: about the centroid, counter-clockwise with x down the base, in the unit of the arms.
+    """
+
+    along: N
+    normal: N
+    moment: N
+
+
 Arms = tuple[tuple[N, Any], tuple[N, Any], tuple[N, Any], tuple[N, Any]]
 """Contacts from the centroid, along the base and normal to it."""
 
@@ -273,6 +251,7 @@ class Planes(Generic[N]):
         weight: 1 + k_v.
         functions: the functions for this kind of number.
         bond: strength of the base's bond over the weight, c L/(ρ g A); None without cohesion.
+        water: the push of water in the back fracture; None for a dry one.
     """
 
     tan_beta: N
@@ -281,32 +260,93 @@ class Planes(Generic[N]):
     weight: N | float
     functions: Elementwise[N]
     bond: N | None = None
+    water: Water[N] | None = None
 
-    def bonded(self, share: N | float) -> N | float:
-        """Return what the bond adds to the numerator of a yield, of which 1 m g adds `share`."""
-        if self.bond is None:
-            return 0.0
+    @cached_property
+    def _slope(self) -> N:
+        """1/cos β."""
+        return self.functions.sqrt(1.0 + self.tan_beta * self.tan_beta)
+
+    def coefficient(
+        self, sine: N, cosine: N | float, turn: N | float = 0.0, bond_y: N | float | None = None
+    ) -> N:
+        """Return :func:`yield_coefficient` on these planes.
+
+        Of a mechanism whose reactions have no power, a force e on the block with the moment m
+        about the centroid adds -(cosine e_x + sine e_y + turn m) to the numerator: its power as
+        the mechanism moves.
+
+        Args:
+            sine: as there.
+            cosine: as there.
+            turn: rotation rate of the mechanism in this scale.
+            bond_y: height of the base over the centroid, where its bond resists; None where the
+                mechanism does not slide on it.
+        """
+        adds: N | float = 0.0
         # over cos β, as the numerator is
-        return self.bond * self.functions.sqrt(1.0 + self.tan_beta * self.tan_beta) * share
-
-    def coefficient(self, sine: N, cosine: N | float, share: N | float = 0.0) -> N:
-        """Return :func:`yield_coefficient` on these planes; arguments as there and of `bonded`."""
-        bond = self.bonded(share)
-        return yield_coefficient(sine, cosine, self.tan_beta, self.weight, self.functions, bond)
+        if self.bond is not None and bond_y is not None:
+            adds = self.bond * self._slope * (cosine - turn * bond_y)
+        if self.water is not None:
+            push = self.water
+            power = cosine * push.along + sine * push.normal + turn * push.moment
+            adds = adds - self._slope * power
+        return yield_coefficient(sine, cosine, self.tan_beta, self.weight, self.functions, adds)
 
     @cached_property
     def ky(self) -> N:
         """Yield acceleration coefficient of sliding (eq. 3.17): δ* = φ1."""
-        return self.coefficient(self.mu1, 1.0, 1.0)
+        return self.coefficient(self.mu1, 1.0, bond_y=0.0)
+
+    def pressed_by(self, k: N) -> N:
+        """Return the normal force on both planes' block across its base at k, over the weight."""
+        normal = (self.weight - k * self.tan_beta) / self._slope
+        return normal if self.water is None else normal - self.water.normal
 
     @property
     def limit(self) -> N:
-        """Tangent of the angle of the resultant at which the base slides; see :func:`mode_code`."""
-        if self.bond is None:
+        """Tangent at which the base's reaction stands as it slides; see :func:`mode_code`.
+
+        Dry and without a bond that of φ1: otherwise what its place over half the thickness is.
+        """
+        if self.bond is None and self.water is None:
             return self.mu1
-        return sliding_limit(
-            self.mu1, self.tan_beta, self.weight, self.ky, self.bond, self.functions
-        )
+        where = self.functions.where
+        ky, differs = self.ky, abs(self.mu1) < 0.0
+        along = (self.weight * self.tan_beta + ky) / self._slope
+        normal = self.pressed_by(ky)
+        if self.bond is not None:
+            differs = differs | (self.bond != 0.0)
+        if self.water is not None:
+            along = along + self.water.along - self.water.moment
+            differs = differs | (self.water.normal != 0.0)
+        # a bond may hold until the inertial force lifts the block off its base
+        pressed = normal > 0.0
+        limit = where(pressed, along / where(pressed, normal, 1.0), math.inf)
+        result: N = where(differs & (abs(ky) < math.inf), limit, self.mu1)
+        return result
+
+    def floats(self, k: N, code: int, cot: N) -> Any:
+        """Return whether water leaves the base nothing to carry at the yield of a mode.
+
+        Args:
+            k: the yield; infinite ones do not float.
+            code: the mode.
+            cot: cot γ.
+        """
+        if self.water is None:
+            return False
+        carried = self.pressed_by(k)
+        if code in (SLUMP, CONFINED_TOPPLE):  # a part of it rests on the back plane
+            mu2 = self.mu2 if code == SLUMP else -self.mu2
+            u_x, u_y = 1.0 - cot * mu2, cot + mu2
+            along = (self.weight * self.tan_beta + k) / self._slope + self.water.along
+            along = along if self.bond is None else along - self.bond
+            across = u_x + self.mu1 * u_y
+            there = abs(across) > _SQUARE
+            base = (along * u_y + carried * u_x) / self.functions.where(there, across, 1.0)
+            carried = self.functions.where(there, base, carried)
+        return (carried <= 0.0) & (abs(k) < math.inf)
 
     def slump(self, heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N) -> tuple[N, Any]:
         """Return k_s, and whether the back contact cannot hold the block, which is then unstable.
@@ -315,8 +355,8 @@ class Planes(Generic[N]):
         """
         contacts, where = (heel_x, heel_y, back_x, back_y, cot), self.functions.where
         sine, cosine, r_base, _ = slump(*contacts, self.mu1, self.mu2)
-        share = 0.0 if self.bond is None else slump_bond(*contacts, self.mu2)
-        k = self.coefficient(sine, cosine, share)
+        turn = 1.0 - cot * self.mu2 + self.mu1 * (cot + self.mu2)
+        k = self.coefficient(sine, cosine, turn, heel_y)
         k = on_its_branch(k, self.ky, back_is_rougher(cot, self.mu1, self.mu2), self.functions)
         # moments balance only if the base pulls: nothing holds the block
         untenable = r_base <= 0.0
@@ -329,8 +369,8 @@ class Planes(Generic[N]):
         """
         contacts, where = (toe_x, toe_y, low_x, low_y, cot), self.functions.where
         sine, cosine, r_base, _ = confined_topple(*contacts, self.mu1, self.mu2)
-        share = 0.0 if self.bond is None else confined_bond(*contacts, self.mu2)
-        k = self.coefficient(sine, cosine, share)
+        turn = -(1.0 + cot * self.mu2 + self.mu1 * (cot - self.mu2))
+        k = self.coefficient(sine, cosine, turn, toe_y)
         k = on_its_branch(k, self.ky, wedges(cot, self.mu1, self.mu2), self.functions)
         # α1 + γ + φ2 >= 180°: the heel jams, whatever pushes it
         k = where(r_base <= 0.0, math.inf, k)
@@ -366,8 +406,9 @@ class Planes(Generic[N]):
         if code == CONFINED_TOPPLE:
             k, lifts = self.confined_topple(toe_x, toe_y, *lowest, cot)
             return k, False, lifts
-        # (3.16): δ* = α3
-        return (self.coefficient(toe_x / -toe_y, 1.0) if code == TOPPLE else self.ky), False, False
+        if code == TOPPLE:  # (3.16): δ* = α3
+            return self.coefficient(toe_x / -toe_y, 1.0, 1.0 / toe_y), False, False
+        return self.ky, False, False
 
 
 def words_of_mode(mode: str) -> str:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
@@ -19,6 +19,20 @@ from rbfrag.solver.quantity import (
     not_negative,
     positive,
     vertical_g,
+)
+from rbfrag.solver.stability.joint import (
+    AFLOAT,
+    LAB_M,
+    NEEDS_DENSITY,
+    NO_FRACTURE,
+    NOT_OF_OUTLINES,
+    SPILLS_OVER,
+    JointStrength,
+    OnJoint,
+    refuse_half,
+    roughened,
+    roughness_at,
+    water_at,
 )
 from rbfrag.solver.stability.margins import (
     Margin,
@@ -37,6 +51,7 @@ from rbfrag.solver.stability.modes import (
     words_of_mode,
     yield_coefficient,
 )
+from rbfrag.solver.stability.toe import toe_slips_g
 
 
 @dataclass(frozen=True)
@@ -76,12 +91,16 @@ class Stability(Tabular):
         delta_deg: angle of the resultant at yield, from the inward normal of the base,
             positive downslope [deg]; None where no finite k is the yield.
         beta_deg: dip of the base [deg].
-        phi_deg: friction angle of the base [deg].
+        phi_deg: friction angle of the base [deg], of a rough one the secant angle at its yield.
         phi_back_deg: friction angle of the back plane [deg].
         kv: vertical acceleration of the ground, up positive [g].
         back_fracture: whether there is a back plane.
         margins: nearest boundaries to other modes.
         cohesion: the effect of cohesion, or None if there is none.
+        joint: the effect of roughness, or None if there is none.
+        water_m: height of the water above the heel [m].
+        toe_slips_g: of a dry topple, the acceleration at which its toe gives way as it starts to
+            turn [g]; None where it holds at any, and for other modes.
         warnings: sentences on what the answer takes for granted.
     """
 
@@ -101,6 +120,9 @@ class Stability(Tabular):
     margins: tuple[Margin, ...]
     cohesion: Cohesion | None
     warnings: tuple[str, ...]
+    joint: JointStrength | None = None
+    water_m: float = 0.0
+    toe_slips_g: float | None = None
 
 
 def stability(
@@ -113,28 +135,31 @@ def stability(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
+    **joint: Unpack[OnJoint[float]],
 ) -> Stability:
     """Return the failure mode of a block, its state and its yield acceleration.
 
     Gibson's dissertation, eqs. 3.16-3.34, with (3.28) and (3.29) corrected and the vertical
-    acceleration included.
+    acceleration included; with water and roughness as `rbfrag.solver.stability.joint` has them.
 
     Args:
         block: the block.
         beta_deg: dip of the base plane, out of the slope positive, between -90 and 90 [deg].
-        phi_deg: friction angle of the base, from 0 and below 90 [deg].
+        phi_deg: friction angle of the base, from 0 and below 90, of a rough one the residual [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
         kv: vertical acceleration of the ground, up positive, above -1 [g].
         back_fracture: False for a block that no plane supports or hinders from behind.
         cohesion_pa: cohesion of the base [Pa]; the back plane has none.
-        density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
+        density_kg_m3: density of the rock [kg/m³], needed with cohesion, water or roughness.
+        joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
-        InputError: a value outside its range; the message names the range.
+        InputError: a value outside its range; the message names the range; or water that lifts
+            the block off its base.
     """
-    finding, planes = judged(
+    finding, planes, strength = judged(
         block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, kv=kv,
-        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3,
+        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3, **joint,
     )  # fmt: skip
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
     own = {mode: k if mode == finding.mode else None for mode in MODES}
@@ -155,11 +180,16 @@ def stability(
         margins=margins(
             block,
             finding,
-            degrees_of(planes.limit) if bond else finding.phi_deg,
-            partial(_friction_that_slides_at, beta_deg=beta_deg, weight=planes.weight, bond=bond),
+            degrees_of(planes.limit) if bond or planes.water else finding.phi_deg,
+            partial(_friction_that_slides_at, beta_deg=beta_deg, planes=planes),
         ),
         cohesion=_cohesion(planes, bond) if bond else None,
         warnings=warnings_about(block, finding),
+        joint=strength,
+        water_m=float(joint.get("water_m") or 0.0),
+        toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg)
+        if finding.mode == "topple" and planes.water is None
+        else None,
     )
 
 
@@ -173,8 +203,12 @@ def judged(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-) -> tuple[MarginFacts, Planes[float]]:
-    """Return the mode and yield of a block and its planes; arguments as for :func:`stability`."""
+    **joint: Unpack[OnJoint[float]],
+) -> tuple[MarginFacts, Planes[float], JointStrength | None]:
+    """Return the mode and yield of a block, its planes and what roughness makes of its friction.
+
+    Arguments as for :func:`stability`.
+    """
     if not isinstance(block, Block):
         raise InputError(f"block = {block!r}: make one with Block.from_angles or its siblings")
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
@@ -184,16 +218,71 @@ def judged(
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
     planes = Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR, bond or None)
     t1, t3 = block.tan_alpha1, block.tan_alpha3
+    if (water_m := not_negative(joint.get("water_m") or 0.0, "water_m", "m")) > 0.0:
+        planes = _wet(block, planes, water_m, density_kg_m3, back_fracture)
+    strength = None
+    jrc, jcs_mpa, length_m = (joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m"))
+    refuse_half(jrc, jcs_mpa, length_m)
+    if jrc is not None:
+        planes, strength = _rough(block, planes, phi_deg, jrc, jcs_mpa, length_m, density_kg_m3)
+        phi_deg = strength.secant_deg
     code = int(planes.mode(t1, t3, block.confines, back_fracture=back_fracture))
     # the weight passes upslope of the heel, and nothing stands there to lean on
     backward = not back_fracture and tb < t1
     k, untenable, lifts = planes.yield_of(code, block.arms, block.cot_gamma)
     k = -math.inf if backward else k
+    if planes.floats(k, code, block.cot_gamma):
+        raise InputError(AFLOAT, fields=("water_m",))
     finding = MarginFacts(
         MODES[code], STATES[int(state_code(k, SCALAR))], k, beta_deg, phi_deg, phi_back_deg,
         back_fracture, backward, untenable and back_fracture, lifts,
     )  # fmt: skip
-    return finding, planes
+    return finding, planes, strength
+
+
+def _weighed(density_kg_m3: object, name: str, value: float) -> float:
+    """Return the density of the rock, or refuse what acts against its weight without it."""
+    if density_kg_m3 is None:
+        text = NEEDS_DENSITY.format(name=name, value=value)
+        raise InputError(text, fields=("density_kg_m3", name))
+    return positive(density_kg_m3, "density_kg_m3", "kg/m³")
+
+
+def _wet(
+    block: Block, planes: Planes[float], water_m: float, density_kg_m3: object, backed: bool
+) -> Planes[float]:
+    """Return the planes with the push of water on a block."""
+    density = _weighed(density_kg_m3, "water_m", water_m)
+    if not backed:
+        raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
+    if not block.is_parallelogram:
+        raise InputError(NOT_OF_OUTLINES, fields=("water_m",))
+    water, holds = water_at(
+        water_m=water_m, density_kg_m3=density, half_s1_m=block.half_s1_m,
+        tan_alpha1=block.tan_alpha1, tan_alpha3=block.tan_alpha3, cot=block.cot_gamma,
+        tan_beta=planes.tan_beta, functions=SCALAR,
+    )  # fmt: skip
+    if not holds:
+        beta = math.atan(planes.tan_beta)
+        top_m = block.s1_m * (math.cos(beta) + block.cot_gamma * math.sin(beta))
+        text = SPILLS_OVER.format(water=water_m, top=max(top_m, 0.0))
+        raise InputError(text, fields=("water_m",))
+    return replace(planes, water=water)
+
+
+def _rough(
+    block: Block, planes: Planes[float], phi_deg: float, jrc: object, jcs_mpa: object,
+    joint_length_m: object, density_kg_m3: object,
+) -> tuple[Planes[float], JointStrength]:  # fmt: skip
+    """Return the planes with a rough base, and its strength."""
+    coefficient = not_negative(jrc, "jrc", "")
+    density = _weighed(density_kg_m3, "jrc", coefficient)
+    length_m = block.base_m if joint_length_m is None else joint_length_m
+    length_m = max(positive(length_m, "joint_length_m", "m"), LAB_M)
+    weight_pa = density * STANDARD_GRAVITY_M_S2 * block.area_m2 / block.base_m
+    rough = roughness_at(coefficient, positive(jcs_mpa, "jcs_mpa", "MPa"), length_m, weight_pa)
+    planes, secant_deg, stress_pa = roughened(planes, rough, phi_deg)
+    return planes, JointStrength.of(rough, secant_deg, stress_pa)
 
 
 def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
@@ -201,27 +290,32 @@ def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
     cohesion = not_negative(cohesion_pa, "cohesion_pa", "Pa")
     if density_kg_m3 is None:
         if cohesion > 0.0:
-            raise InputError(
-                f"cohesion_pa = {cohesion:g} needs density_kg_m3, the density of the rock "
-                "(about 2700 kg/m³): its effect is that of a stress over the weight"
-            )
+            raise InputError(NEEDS_DENSITY.format(name="cohesion_pa", value=cohesion))
         return 0.0
     density = positive(density_kg_m3, "density_kg_m3", "kg/m³")
     return bond_over_weight(cohesion, density, block.base_m, block.area_m2)
 
 
-def _friction_that_slides_at(
-    alpha_deg: float, beta_deg: float, weight: float, bond: float
-) -> float:
-    """Return the friction angle with which the base slides when the resultant is at alpha_deg."""
-    if bond == 0.0:
+def _friction_that_slides_at(alpha_deg: float, beta_deg: float, planes: Planes[float]) -> float:
+    """Return the friction angle with which the base slides when its reaction is at alpha_deg.
+
+    The reaction stands there at the k that balances what acts on the block about that point of the
+    base; the friction is what the bond leaves of the thrust along it.
+    """
+    bond, water = planes.bond or 0.0, planes.water
+    if bond == 0.0 and water is None:
         return alpha_deg
-    tilt = math.radians(alpha_deg - beta_deg)
+    along, off, moment = (water.along, water.normal, water.moment) if water else (0.0, 0.0, 0.0)
+    alpha, beta = math.radians(alpha_deg), math.radians(beta_deg)
+    tilt = alpha - beta
     if math.cos(tilt) <= 0.0:
         return math.copysign(90.0, tilt)
-    # of (1 + k_v) (T cos β - sin β) + C = k (cos β + T sin β) with k = (1 + k_v) tan(α - β)
-    alpha = math.radians(alpha_deg)
-    return degrees_of(math.tan(alpha) - bond * math.cos(tilt) / (weight * math.cos(alpha)))
+    # over cos α: (1 + k_v) sin(α - β) less the power of the water, and k cos(α - β)
+    pushed = (along - moment) * math.cos(alpha) + off * math.sin(alpha)
+    k = (planes.weight * math.sin(tilt) - pushed) / math.cos(tilt)
+    normal = planes.pressed_by(k)
+    thrust = planes.weight * math.sin(beta) + k * math.cos(beta) + along - bond
+    return math.degrees(math.atan2(thrust, normal))
 
 
 def _cohesion(planes: Planes[float], bond: float) -> Cohesion:
@@ -284,7 +378,8 @@ def rough_deg(block: Block) -> float:
 KEYS = (
     "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
     "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
-    "delta_deg", "margins", "cohesion", "warnings",
+    "delta_deg", "margins", "cohesion", "joint", "water_m", "toe_slips_g",
+    "warnings",
 )  # fmt: skip
 """What the JSON contract has of a stability and of its block."""
 

@@ -1,0 +1,240 @@
+"""Water in the back fracture and the roughness of the base, as yields read them.
+
+Formulas for single numbers and for arrays; no numpy is loaded for a single number. Water presses
+on the wetted part of the back plane, V = γw z l/2 at l/3 from the heel with l = z/sin(β + γ), and
+lifts the base, U = γw z L/2 at L/3 from the heel: hydrostatic at the heel and drained at the toe.
+Both end with the first slip, which opens the fracture and shears the roughness off.
+
+References:
+    Barton and Bandis (1982), 23rd US Symposium on Rock Mechanics, 739-760.
+    Barton and Choubey (1977), Rock Mechanics 10, 1-54.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Generic, NamedTuple, TypedDict, TypeVar
+
+from rbfrag.errors import InputError
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.formulas import Elementwise, N, tan_deg
+from rbfrag.solver.stability.modes import Planes, Water
+
+V = TypeVar("V")
+
+
+class OnJoint(TypedDict, Generic[V], total=False):
+    """Water and roughness; numbers, or arrays of one a block.
+
+    Args:
+        water_m: height of the water in the back fracture above the heel [m].
+        jrc: joint roughness coefficient of the base, of samples of 10 cm; 0 or None: smooth.
+        jcs_mpa: compressive strength of its walls, of such samples, needed with `jrc` [MPa].
+        joint_length_m: length of the joint that shears as one [m]; None, or in arrays 0, for that
+            of the base.
+    """
+
+    water_m: V
+    jrc: V | None
+    jcs_mpa: V | None
+    joint_length_m: V | None
+
+
+WATER_N_M3 = 9810.0
+"""Unit weight of water, γw [N/m³]."""
+
+SPILLS = 1.0001
+"""Level over the top of the back fracture, beyond rounding, at which it would spill over."""
+
+LAB_M = 0.1
+"""Length of the samples on which JRC and JCS are measured [m]."""
+
+STEEPEST_DEG = 70.0
+"""Greatest secant friction angle that roughness gives (Barton and Choubey 1977) [deg]."""
+
+_ROUNDS = 60
+
+MEGA = 1e6
+
+
+def water_at(
+    *,
+    water_m: N,
+    density_kg_m3: N,
+    half_s1_m: N,
+    tan_alpha1: N,
+    tan_alpha3: N,
+    cot: N,
+    tan_beta: N,
+    functions: Elementwise[N],
+) -> tuple[Water[N], Any]:
+    """Return the push of the water on a parallelogram, and whether its fracture can hold it.
+
+    Args:
+        water_m: height of the water above the heel [m].
+        density_kg_m3: density of the rock [kg/m³].
+        half_s1_m: half of the thickness normal to the base [m].
+        tan_alpha1: tan α1.
+        tan_alpha3: tan α3.
+        cot: cot γ.
+        tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
+
+    Returns:
+        The push, and whether the back plane rises from the heel and the water is not above its top.
+    """
+    where = functions.where
+    sine = 1.0 / functions.sqrt(1.0 + cot * cot)
+    cosine = cot * sine
+    # sin(β + γ) over sin γ
+    steep = (1.0 + cot * tan_beta) / functions.sqrt(1.0 + tan_beta * tan_beta)
+    holds = (steep > 0.0) & (water_m <= SPILLS * 2.0 * half_s1_m * steep)
+    wetted = water_m / (where(holds, steep, 1.0) * sine) / half_s1_m
+    base = tan_alpha3 - tan_alpha1
+    # over the weight, of which half_s1_m² 2 base is the area
+    weight = density_kg_m3 * STANDARD_GRAVITY_M_S2 * 2.0 * base * half_s1_m
+    v = 0.5 * WATER_N_M3 * water_m * wetted / weight
+    u = 0.5 * WATER_N_M3 * water_m * base / weight
+    along, normal = v * sine, v * cosine
+    at_x, at_y = tan_alpha1 - wetted * cosine / 3.0, -1.0 + wetted * sine / 3.0
+    moment = at_x * normal - at_y * along + (tan_alpha1 + base / 3.0) * u
+    return Water(along, normal + u, moment), holds
+
+
+class Roughness(NamedTuple, Generic[N]):
+    """The roughness of a base at its own length.
+
+    Args:
+        jrc: joint roughness coefficient JRCn.
+        jcs_pa: compressive strength of the joint's walls JCSn [Pa].
+        weight_pa: weight of the block over its base [Pa].
+    """
+
+    jrc: N
+    jcs_pa: N
+    weight_pa: N
+
+
+def roughness_at(
+    jrc: N, jcs_mpa: N, length_m: N, weight_pa: N, power: Callable[[Any, Any], Any] = pow
+) -> Roughness[N]:
+    """Return JRCn = JRC (L/L0)^(-0.02 JRC) and JCSn = JCS (L/L0)^(-0.03 JRC), L0 = 0.1 m.
+
+    Args:
+        jrc: joint roughness coefficient of samples of 10 cm.
+        jcs_mpa: compressive strength of their walls [MPa].
+        length_m: length of the joint that shears as one, from 0.1 m [m].
+        weight_pa: weight of the block over its base [Pa].
+        power: the power function.
+    """
+    longer = length_m / LAB_M
+    jrc_n = jrc * power(longer, -0.02 * jrc)
+    return Roughness(jrc_n, MEGA * jcs_mpa * power(longer, -0.03 * jrc), weight_pa)
+
+
+def roughened(planes: Planes[N], rough: Roughness[N], phi_deg: N) -> tuple[Planes[N], N, N]:
+    """Return planes whose base has the secant friction angle at the normal stress of its yield.
+
+    φ = φr + JRC log10(JCS/σ) with σ at the yield of sliding, which φ decides: repeated halfway to
+    the answer, which converges for all dips because φ is at most :data:`STEEPEST_DEG`.
+
+    Args:
+        planes: the planes, with water if there is any.
+        rough: the roughness of the base.
+        phi_deg: residual friction angle of the base φr [deg].
+
+    Returns:
+        The planes, the secant angle [deg] and the normal stress [Pa].
+    """
+    where, log10 = planes.functions.where, planes.functions.log10
+    secant, stress = phi_deg, rough.weight_pa
+    for _ in range(_ROUNDS):
+        planes = replace(planes, mu1=tan_deg(secant, planes.functions))
+        stress = rough.weight_pa * planes.pressed_by(planes.ky)
+        weaker = (stress > 0.0) & (stress < rough.jcs_pa)
+        over = log10(rough.jcs_pa / where(weaker, stress, rough.jcs_pa))
+        steep = phi_deg + rough.jrc * over
+        steep = where(steep > STEEPEST_DEG, where(phi_deg > STEEPEST_DEG, phi_deg, STEEPEST_DEG),
+                      steep)  # fmt: skip
+        secant = 0.5 * (secant + steep)
+    return planes, secant, stress
+
+
+@dataclass(frozen=True)
+class JointStrength:
+    """What roughness makes of the friction of a base, at the normal stress of its yield.
+
+    Args:
+        jrc: joint roughness coefficient at the length of the joint.
+        jcs_mpa: compressive strength of its walls at that length [MPa].
+        normal_stress_pa: normal stress at the yield of sliding [Pa].
+        secant_deg: φ = φr + JRC log10(JCS/σ) [deg].
+        tangent_deg: slope of the envelope there [deg].
+        intercept_pa: the tangent's instantaneous cohesion [Pa].
+    """
+
+    jrc: float
+    jcs_mpa: float
+    normal_stress_pa: float
+    secant_deg: float
+    tangent_deg: float
+    intercept_pa: float
+
+    @classmethod
+    def of(cls, rough: Roughness[float], secant_deg: float, stress_pa: float) -> JointStrength:
+        """Return the strength at a secant angle [deg] and a normal stress [Pa]."""
+        secant = math.tan(math.radians(secant_deg))
+        falls = 0.0
+        if 0.0 < stress_pa < rough.jcs_pa and secant_deg < STEEPEST_DEG:
+            falls = math.radians(rough.jrc) / math.log(10.0) * (secant * secant + 1.0)
+        tangent = secant - falls
+        return cls(
+            rough.jrc, rough.jcs_pa / MEGA, stress_pa, secant_deg,
+            math.degrees(math.atan(tangent)), stress_pa * falls,
+        )  # fmt: skip
+
+
+OF_ROUGHNESS = ("jrc", "jcs_mpa")
+
+NEEDS_DENSITY = (
+    "{name} = {value:g} needs density_kg_m3, the density of the rock (about 2700 kg/m³): its "
+    "effect is that of a stress over the weight"
+)
+
+NO_FRACTURE = (
+    "water_m does not go with a block without a back fracture: that is where the water stands"
+)
+
+NOT_OF_OUTLINES = (
+    "water_m is known of blocks between two pairs of fractures (rectangles, angles, spacings), not "
+    "of outlines"
+)
+
+SPILLS_OVER = (
+    "water_m = {water:g} stands above the top of the back fracture, {top:.4g} m above the heel, or "
+    "the fracture does not rise from the heel: give the height that it holds"
+)
+
+AFLOAT = (
+    "the water lifts the block off its base (the reaction of the base at the yield is below zero): "
+    "it floats, and no yield acceleration describes it; lower water_m"
+)
+
+
+def refuse_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
+    """Refuse a roughness of which a part is missing.
+
+    Raises:
+        InputError: JRC without JCS, JCS without JRC, or a length without both.
+    """
+    given = {"jrc": jrc, "jcs_mpa": jcs_mpa, "joint_length_m": joint_length_m}
+    there = [name for name, value in given.items() if value is not None]
+    for name in OF_ROUGHNESS:
+        if there and given[name] is None:
+            raise InputError(
+                f"{name} is missing: the roughness of a joint is jrc with jcs_mpa, and phi_deg is "
+                "then its residual friction angle",
+                fields=(name, *there),
+            )
