@@ -39,7 +39,9 @@ def annual_loss(segments: pd.DataFrame, db: str | None) -> tuple[pd.DataFrame, l
     for curve_file, some in segments.groupby("curve", sort=False):
         (curve,) = rbfrag.read_hazard_curves(HERE / str(curve_file))
         each = some.loc[some.index.repeat(some["blocks"])]
-        found = rbfrag.hazard(curve, each["p2_1_s2"], each["kr"], component="geometric_mean", db=db)
+        found = rbfrag.hazard(
+            curve, each["p2_1_s2"], each["kr"], component="geometric_mean", joint=True, db=db
+        )
         for text in found.warnings:
             print(f"{curve_file}: {text}", file=sys.stderr)
         rates = pd.DataFrame(

@@ -140,14 +140,14 @@ def _not_known(answer: LossAnswer) -> Iterator[str]:
     of, level = answer.uncertainty["average_annual_failures"], f"{100.0 * answer.level:g} %"
 
     def ends(interval: tuple[float, float]) -> str:
-        return f"{rounded(interval[0])} to {rounded(interval[1])}"
+        return f"between {rounded(interval[0])} and {rounded(interval[1])}"
 
     another = "other ground motions of it" if answer.events.is_scenario else "another event set"
     yield f"Counting: {another} as long would give {ends(of.counting)} ({level})."
     if of.knowledge is not None:
-        yield f"Knowledge: the data leave the model open between {ends(of.knowledge)} ({level})."
+        yield f"Knowledge: the data leave the model open {ends(of.knowledge)} ({level})."
     if of.branches is not None:
-        yield f"Branches: 90 % of the logic tree lies between {ends(of.branches)}."
+        yield f"Branches: 90 % of the logic tree lies {ends(of.branches)}."
     elif len(answer.events.realization_weights) > 1:
         yield (
             "Branches: counting makes most of what the realizations differ by; hazard curves of "

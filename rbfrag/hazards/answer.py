@@ -493,11 +493,12 @@ def _numbers_in_words(result: _Rates) -> Iterator[str]:
             f"quadrature of a rate may be off by {100.0 * worst:.2g} %: its P changes abruptly "
             "between levels of the curve"
         )
-    outside = np.nan_to_num(result.outside).max(initial=0.0)
-    if outside > NOTABLE:
+    outside = np.nan_to_num(result.outside)
+    if (outside > NOTABLE).any():
+        of = "" if outside.size == 1 else f" of {int((outside > NOTABLE).sum()):,} blocks"
         yield (
-            f"up to {100.0 * outside:.3g} % of the rate comes from blocks and shaking outside the "
-            "ranges that the model was fitted on"
+            f"up to {100.0 * outside.max():.3g} % of the rate{of} comes from blocks and shaking "
+            "outside the ranges that the model was fitted on"
         )
 
 

@@ -21,7 +21,8 @@ _LOWEST = 0.05  # of one event in the effective time
 def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     """Draw the curves of exceedance of failures and, where there is one, of the loss.
 
-    Bands are those of the counting error of the event set. Of years, the sum is drawn beside the
+    Bands are those of the counting error of the event set, of the model's parameters and of the
+    branches of the logic tree, each by itself. Of years, the sum is drawn beside the
     events; what happens less than once in the time that the events cover is shaded.
 
     Args:
@@ -51,9 +52,9 @@ def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
 
 
 _BANDS: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("knowledge", "by the model's parameters", {"color": "#2b6cac", "alpha": 0.18}),
-    ("counting", "by the number of events", {"fc": "none", "ec": "#555555", "hatch": "////"}),
-    ("branches", "over the logic tree", {"color": "#c2410c", "alpha": 0.16}),
+    ("counting", "by the number of events", {"fc": "#00000014", "ec": "#777777", "ls": ":"}),
+    ("branches", "over the logic tree", {"fc": "#c2410c30", "ec": "none"}),
+    ("knowledge", "by the model's parameters", {"fc": "#2b6cac66", "ec": "none"}),
 )
 """What is not known: its name, its words, and how its band is drawn."""
 
@@ -78,7 +79,7 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
         for what, words, style in _BANDS:
             ends = [getattr(one, what) or (math.nan, math.nan) for one in curve]
             low, high = zip(*ends, strict=True)
-            if not math.isnan(low[0]):
+            if not all(map(math.isnan, low)):
                 percent = 90.0 if what == "branches" else 100.0 * answer.level
                 axes.fill_between(
                     x, low, high, lw=0.9, **style,
