@@ -12,6 +12,7 @@ from urllib.parse import parse_qsl
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from python_multipart.exceptions import FormParserError
 
 from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
@@ -249,8 +250,12 @@ async def sent_file(request: Request) -> bytes:
     """Return the file that a request sends: its body, or the one file of a form."""
     if media_type(request) != MULTIPART:
         return await request.body()
-    async with request.form(max_files=1, max_fields=1) as form:
-        files = [each for _, each in form.multi_items() if not isinstance(each, str)]
-        if len(files) != 1 or len(form.multi_items()) != 1:
-            raise MalformedError("the form does not hold one file and nothing else")
-        return await files[0].read()
+    try:
+        async with request.form(max_files=1, max_fields=1) as form:
+            files = [each for _, each in form.multi_items() if not isinstance(each, str)]
+            if len(files) != 1 or len(form.multi_items()) != 1:
+                raise MalformedError("the form does not hold one file and nothing else")
+            return await files[0].read()
+    # which starlette passed on before 1.8
+    except FormParserError as error:
+        raise MalformedError(f"the form cannot be read: {error}") from None
