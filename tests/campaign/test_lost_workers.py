@@ -57,7 +57,7 @@ def test_losses_are_those_of_one_process(
     folder = formats_dir / "openquake_event_based" / "three_realizations"
     blocks = {
         "block_id": ["a", "b", "c"], "site_id": ["0012", "Z9", "SLIDE-A"],
-        "p2_1_s2": [4.0] * 3, "kr": [0.1, 0.2, 0.3], "kind": ["toppling_backed"] * 3,
+        "p2_1_s2": [4.0] * 3, "kr": [0.1, 0.2, 0.3], "kind": ["toppling"] * 3,
     }  # fmt: skip
     alone = losses(folder, blocks, samples=20, component="rotd50")
     other = losses(folder, blocks, samples=20, component="rotd50", run=deadly(count_years))
