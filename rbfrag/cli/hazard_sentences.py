@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.sentences import rounded
 from rbfrag.fragility.words import percent
+from rbfrag.hazards import between_measures
 from rbfrag.hazards.report import once_in
 
 if TYPE_CHECKING:
@@ -146,6 +147,8 @@ def _not_known(answer: LossAnswer) -> Iterator[str]:
     yield f"Counting: {another} as long would give {ends(of.counting)} ({level})."
     if of.knowledge is not None:
         yield f"Knowledge: the data leave the model open {ends(of.knowledge)} ({level})."
+    if answer.tau is not None:
+        yield between_measures.in_words(answer.tau)
     if of.branches is not None:
         yield f"Branches: 90 % of the logic tree lies {ends(of.branches)}."
     elif len(answer.events.realization_weights) > 1:

@@ -13,13 +13,23 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
 from rbfrag.exchange.given_blocks import given_blocks
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake_events import JobFiles, measures_in, read_events, read_magnitudes
 from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS
+from rbfrag.hazards.between_measures import (
+    LAW_TAU,
+    PGA_ALONE,
+    PREFERRED,
+    TAU,
+    component_of_velocity,
+    velocity_of,
+)
+from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
+from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
@@ -46,7 +56,7 @@ def losses(
     samples: int = 100,
     expected: bool = False,
     seed: int = 0,
-    imt: Sequence[str] = ("PGV",),
+    imt: Sequence[str] | None = None,
     component: str | None = None,
     within_km: float = WITHIN_KM,
     run: Run | None = None,
@@ -75,8 +85,10 @@ def losses(
         samples: samples of each event.
         expected: do without samples; then there are no curves of exceedance.
         seed: of the samples; the answer does not depend on the number of workers.
-        imt: intensity measures that the models read, as OpenQuake names them. Several are drawn
-            independently by the engine, which a warning tells of.
+        imt: intensity measures that the models read, as OpenQuake names them; None for the first
+            of PGV and SA(1.0) that the job has. Of PGA alone PGV is taken by the magnitudes of the
+            ruptures, unless `model` is named. Several measures, of which `model` names the model,
+            are drawn independently by the engine, which a warning tells of.
         component: what the measures mean: single, geometric_mean, rotd50 or larger; None for
             single, with a warning. Its scatter is common to the blocks of one site and event.
         within_km: farthest distance from a block to its site [km], where they are joined by place.
@@ -99,10 +111,8 @@ def losses(
     rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("single" if component is None else component)
-    events = read_events(job, imts=imt, **lasted)
-    rows, models = _with_models(
-        _at_sites(rows, events, within_km), tuple(events.measures), answering
-    )
+from rbfrag.exchange.openquake_events import JobFiles, measures_in, read_events, read_magnitudes
+from rbfrag.exchange.site_join import WITHIN_KM, join_sites
     portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
         "the measures are taken as those of single components, which the models are fitted on; "
@@ -115,6 +125,7 @@ def losses(
         *_without_loss(rows),
         *events.warnings,
         *doubts_about(events.measures),
+        *remark,
         about,
     )
     answer = event_losses(
@@ -123,7 +134,41 @@ def losses(
     )  # fmt: skip
     if "loss" in rows.blocks:
         answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
-    return replace(answer, refused=rows.refused_by_row())
+    return replace(answer, refused=rows.refused_by_row(), tau=tau)
+
+
+def _best(job: JobFiles) -> tuple[str, ...]:
+    """Return the measure of a job that answers best."""
+    present = {requested_measure(name)[0]: name for name in measures_in(job)}
+    return (next((present[n] for n in (*PREFERRED, "pga_g") if n in present), "PGV"),)
+
+
+def _by_one_measure(
+    events: EventSet, job: JobFiles, meaning: Component, answering: AnsweringFields
+) -> tuple[EventSet, Component, float | None, tuple[str, ...]]:
+    """Return the events by the measure that answers, what it means, tau, and what is to be said."""
+    name, *more = events.measures
+    if more and answering.get("model") is None:
+        raise InputError(
+            "several measures are answered by a model that is named alone: one measure answers "
+            "better, PGV before SA(1.0)",
+            fields=("imt", "model"),
+        )
+    if more or name != "pga_g":
+        return events, meaning, None if more else TAU.get(name), ()
+    if answering.get("model") is not None or events.is_scenario:
+        return events, meaning, None, (PGA_ALONE,)
+    magnitudes = read_magnitudes(job)
+    if magnitudes is None:
+        raise InputError(
+            f"{PGA_ALONE}; give PGV or SA(1.0), or the file of ruptures, whose magnitudes tell the "
+            "PGV, or name a model of PGA",
+            fields=("imt", "model"),
+        )
+    velocity = velocity_of(events.measures[name], magnitudes[events.event])
+    remark = "PGV is taken from PGA and the magnitudes of the ruptures: PGV itself is better"
+    by_velocity = replace(events, measures={"pgv_m_s": velocity})
+    return by_velocity, component_of_velocity(meaning), LAW_TAU, (remark,)
 
 
 def _at_sites(rows: BlockRows, events: EventSet, within_km: float) -> BlockRows:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.files import as_path, reading
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
-from rbfrag.hazards.measure_type import IntensityType, openquake_type, requested_measure
+from rbfrag.hazards.measure_type import IntensityType, is_read, openquake_type, requested_measure
 from rbfrag.solver.results import FloatArray
 
 FILES = {
@@ -32,6 +32,7 @@ FILES = {
 """The files of a job by what they hold; of a scenario there is no file of ruptures."""
 
 _EVENT = ("event_id", "eid")
+_RUPTURE = ("rup_id", "rupid")
 _REALIZATION = ("rlz_id", "rlzi")
 _SITE_NAME = "custom_site_id"
 _SITE_NUMBER = ("site_id", "sid")
@@ -301,6 +302,38 @@ def read_events(
         sites, event, site, measures, duration, weights, tuple(remarks),
         _places(heads["sitemesh"]),
     )  # fmt: skip
+
+
+def measures_in(files: JobFiles) -> tuple[str, ...]:
+    """Return the measures of a job's ground motion that models read, as OpenQuake names them."""
+    names = (_MEASURE.fullmatch(column) for column in _Head.of(files.gmf_data).names)
+    return tuple(name.group(1) for name in names if name and is_read(name.group(1)))
+
+
+def read_magnitudes(files: JobFiles) -> FloatArray | None:
+    """Return the magnitude of every event by rising number; None without a file of ruptures.
+
+    Raises:
+        InputError: a column is missing, or an event is of a rupture that the file does not have.
+    """
+    if files.ruptures is None:
+        return None
+    ruptures, events = _Head.of(files.ruptures), _Head.of(files.events)
+    ruptures.column(("mag",))
+    known = ruptures.whole({str(ruptures.column(_RUPTURE)): int, "mag": float})
+    number, magnitude = known.values()
+    event = str(events.column(_EVENT))
+    own = events.whole({event: int, (of := str(events.column(_RUPTURE))): int})
+    order = np.argsort(number, kind="stable")
+    at = np.minimum(np.searchsorted(number[order], own[of]), number.size - 1)
+    absent = np.full(own[of].size, True) if not number.size else number[order][at] != own[of]
+    if absent.any():
+        row = int(np.flatnonzero(absent)[0])
+        raise InputError(
+            f"{events.line(row)}: the rupture {own[of][row]} is not in {files.ruptures.name}, "
+            "which has the magnitudes: are both of one job?"
+        )
+    return np.asarray(magnitude[order][at][np.argsort(own[event], kind="stable")])
 
 
 def _refuse_other_jobs(heads: Mapping[str, _Head]) -> None:

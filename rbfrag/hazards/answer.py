@@ -10,6 +10,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
@@ -19,7 +20,9 @@ from rbfrag.fragility.unusable import (
     unusable_in_words,
 )
 from rbfrag.frames import Tabular
+from rbfrag.hazards import between_measures
 from rbfrag.hazards.annual_rate import checked_years, probability_in
+from rbfrag.hazards.between_measures import TAU
 from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
@@ -120,6 +123,8 @@ class HazardAnswer(Tabular):
         warnings: what to know about the answer.
         reason: why a block cannot be used, shape (m,); empty text elsewhere.
         kinds: how each block fails, shape (m,); empty text where it cannot be used.
+        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
+            not known.
     """
 
     annual_rate: FloatArray
@@ -150,6 +155,7 @@ class HazardAnswer(Tabular):
     warnings: tuple[str, ...]
     reason: NDArray[np.object_]
     kinds: NDArray[np.object_]
+    tau: float | None = None
 
     @property
     def modes(self) -> NDArray[np.object_]:
@@ -284,6 +290,13 @@ def hazard_at_sites(
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
     reading = LevelShaking.of(first[0], **meaning)
+    alone = (between_measures.PGA_ALONE,) if reading.name == "pga_g" else ()
+    if alone and answering.get("model") is None:
+        raise InputError(
+            f"{first[0].source}: {alone[0]}; give a curve of PGV or SA(1.0), or name a model of "
+            "PGA",
+            fields=("curve", "imt", "model"),
+        )
     parts, remarks, reason = parts_by_model(given, reading.name, answering)
     refuse_elements(reason, fields=BlockFields.__optional_keys__)
     sound = np.asarray(reason == "", dtype=bool)
@@ -309,7 +322,7 @@ def hazard_at_sites(
         joints, of_joints = joint_at_sites(each, mass, at_least, years, level)
     ends = _beyond(result, mass, where)
     texts = [
-        *remarks, *_unusable(reason, sound, one_class=one_class), *reading.warnings,
+        *remarks, *_unusable(reason, sound, one_class=one_class), *reading.warnings, *alone,
         *_of_curves(sites), *(part.model.form.advice for part in parts if part.model.form.advice),
         *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
         *_numbers_in_words(result), *of_joints,
@@ -357,6 +370,7 @@ def hazard_at_sites(
         warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
+        tau=None if meaning.get("convert") else TAU.get(reading.name),
     )
 
 

@@ -66,6 +66,18 @@ class EventYears(NamedTuple):
     shifted: tuple[Portfolio, ...] = ()
 
 
+class SomeYears(NamedTuple):
+    """Events of whole years alone, which travel without what all parts have in common.
+
+    Args:
+        number: place of the part in the order of all.
+        events: the events.
+    """
+
+    number: int
+    events: EventSet
+
+
 class Curves(NamedTuple):
     """How often numbers are reached: sums of weights, and of their squares.
 
@@ -156,8 +168,18 @@ def shift_error(rates: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((0.25 * (log[1::2] - log[2::2]) ** 2).sum(axis=0)))
 
 
+def count_years(common: EventYears, some: SomeYears) -> PartCounts:
+    """Return what fails in the events of a part; a function of a module, for worker processes.
+
+    Args:
+        common: the portfolio and what is asked, of no events.
+        some: the events.
+    """
+    return count_part(common._replace(number=some.number, events=some.events))
+
+
 def count_part(part: EventYears) -> PartCounts:
-    """Return what fails in the events of a part; a function of a module, for worker processes."""
+    """Return what fails in the events of a part."""
     events, portfolio = part.events, part.portfolio
     n, laws = events.event_id.size, len(laws_of(portfolio))
     cost, number = portfolio.mean_loss, portfolio.count

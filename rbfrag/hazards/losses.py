@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.frames import Tabular
+from rbfrag.hazards import between_measures
 from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
     Curves,
     EventYears,
     PartCounts,
-    count_part,
+    SomeYears,
+    count_years,
     laws_of,
     shift_error,
 )
@@ -42,8 +44,11 @@ from rbfrag.hazards.uncertainty import (
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
-Run = Callable[[Iterator[EventYears], int], Iterator[PartCounts]]
-"""Does the parts of the work, of which the number is given, and yields the results in any order."""
+Run = Callable[[Iterator[SomeYears], int, EventYears], Iterator[PartCounts]]
+"""Does the parts of the work by `count_years` and yields the results in any order.
+
+Given are the parts, their number, and what all have in common.
+"""
 
 EACH_COUNT_TO = 20
 """Numbers of failures up to which each is given; beyond them steps of equal ratio."""
@@ -138,6 +143,8 @@ class LossAnswer(Tabular):
         warnings: what to know about the answer.
         refused: rows of the table that could not be used, by their index: ``block_id``, ``site_id``
             and ``reason``.
+        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
+            not known.
     """
 
     events: EventSet
@@ -158,6 +165,7 @@ class LossAnswer(Tabular):
     quantiles: FloatArray
     warnings: tuple[str, ...]
     refused: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
+    tau: float | None = None
 
     def mean(self, values: FloatArray) -> float:
         """Return the weighted sum over the events: a rate [1/a], or a mean given the event."""
@@ -222,6 +230,7 @@ class LossAnswer(Tabular):
                 means |= {given_event: mean, f"{given_event}_error": error}
         if scenario:
             means |= self._quantiles()
+        means["between_measures"] = between_measures.as_dict(self.tau)
         means["uncertainty"] = {name: one.as_dict() for name, one in self.uncertainty.items()}
         what = "probability_any" if scenario else "annual_rate_any"
         bounds = {
@@ -367,14 +376,13 @@ def event_losses(
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
     shifted = shifted_portfolios(portfolio) if samples else ()
     groups = _groups(events, portfolio, samples) if samples or means is None else []
-    parts = (
-        EventYears(number, portfolio, _only(events, group), *ends, samples, seed, shifted)
-        for number, group in enumerate(groups)
-    )
-    do: Run = run or (lambda work, _: map(count_part, work))
+    none = _only(events, np.empty(0, dtype=np.intp))
+    common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted)
+    parts = (SomeYears(number, _only(events, group)) for number, group in enumerate(groups))
+    do: Run = run or (lambda work, _, shared: (count_years(shared, some) for some in work))
     done = 0
     results: dict[int, PartCounts] = {}
-    for result in do(parts, len(groups)) if groups else ():
+    for result in do(parts, len(groups), common) if groups else ():
         results[result.number] = result
         done += groups[result.number].size
         if on_progress is not None:

@@ -62,3 +62,12 @@ def requested_measure(imt: str) -> tuple[str, IntensityType]:
         text = f"imt = {imt}: no model reads it: use one of {known}"
         raise InputError(text, fields=("imt",))
     return name, kind
+
+
+def is_read(imt: str) -> bool:
+    """Return whether models read a measure, as OpenQuake names it."""
+    try:
+        requested_measure(imt)
+    except InputError:
+        return False
+    return True

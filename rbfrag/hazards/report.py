@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility.words import percent
+from rbfrag.hazards import between_measures
 from rbfrag.hazards.answer import HazardAnswer
 
 
@@ -45,6 +46,7 @@ def as_dict(
         "method": answer.method,
         "imt": answer.curves[0].imt,
         "curve_kind": answer.curve_kind,
+        "between_measures": between_measures.as_dict(answer.tau),
     }
     warnings = [*remarks, *answer.warnings]
     branches = {"branches": [one.as_dict() for one in answer.branches]} if answer.branches else {}

@@ -11,7 +11,7 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.exchange.event_losses import losses
-from rbfrag.hazards.event_counts import count_part
+from rbfrag.hazards.event_counts import count_years
 from tests.cli.conftest import Refuses, Shell
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import model_row
@@ -138,7 +138,7 @@ def test_workers_give_the_same_answer(
 ) -> None:
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 1)  # a part for each year
     alone = losses(job, "blocks.csv", samples=30)
-    two = losses(job, "blocks.csv", samples=30, run=WorkerOptions(jobs=2).runner(count_part))
+    two = losses(job, "blocks.csv", samples=30, run=WorkerOptions(jobs=2).runner(count_years))
     assert two.as_dict() == alone.as_dict()
     assert two.loss_variance.tolist() == alone.loss_variance.tolist()
 

@@ -42,7 +42,10 @@ def probability(model: Any, measure: str, level: float) -> float:
 @pytest.mark.parametrize("term", CURVES)
 def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) -> None:
     measure, period, name = CURVES[term]
-    found = hazard(power_law(measure, period), 3.0, 0.1, component="single", db=measures_db)
+    model = "bounded-pga" if term == "pga" else None
+    about: dict[str, Any] = {"component": "single", "db": measures_db, "model": model}
+    found = hazard(power_law(measure, period), 3.0, 0.1, **about)
+    assert found.tau == (None if term == "pga" else 0.15)
     assert (found.term, found.measure) == (term, measure)
     row = measure_row(term)
     # λ_f = ∫ P K B x^-B d(ln x), past the lowest level at which the block may fail
@@ -90,7 +93,7 @@ def test_the_scatter_of_a_conversion_is_integrated(
 
 
 def test_one_class_of_blocks(measures_db: str) -> None:
-    curve = power_law("pga_g", None)
+    curve = power_law("sa_g", 1.0)
     each = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", db=measures_db)
     one = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", one_class=True, db=measures_db)
     assert one.annual_rate[0] == pytest.approx(each.annual_rate.mean(), rel=1e-4)
@@ -98,7 +101,10 @@ def test_one_class_of_blocks(measures_db: str) -> None:
 
 def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
     asked: dict[str, Any] = {"component": "single", "db": measures_db}
-    told = hazard(power_law("pga_g", None), 3.0, 0.1, **asked).warnings
+    with pytest.raises(InputError, match="PGA alone is biased"):
+        hazard(power_law("pga_g", None), 3.0, 0.1, **asked)
+    told = hazard(power_law("pga_g", None), 3.0, 0.1, model="bounded-pga", **asked).warnings
+    assert any("PGA alone is biased" in text for text in told)
     assert any("PGA alone says little" in text for text in told)
     quiet = hazard(power_law("sa_g", 1.0), 3.0, 0.1, **asked).warnings
     assert not any("says little" in text for text in quiet)

@@ -23,7 +23,7 @@ from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
-from rbfrag.hazards.event_counts import EventYears, count_part
+from rbfrag.hazards.event_counts import EventYears, SomeYears, count_years
 from rbfrag.hazards.losses import LossAnswer
 from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -266,8 +266,8 @@ def test_parts_of_the_work_change_nothing(
     assert seen == [(212, 212)] or seen[-1][0] == seen[-1][1]
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 7)
 
-    def backwards(parts: Iterator[EventYears], number: int) -> Iterator[Any]:
-        results = [count_part(part) for part in parts]
+    def backwards(parts: Iterator[SomeYears], number: int, common: EventYears) -> Iterator[Any]:
+        results = [count_years(common, part) for part in parts]
         assert len(results) == number > 20
         return iter(results[::-1])
 
@@ -304,6 +304,9 @@ def test_measures_that_the_engine_draws_independently_are_warned_of(
     (folder / "gmf-data_5.csv").write_text(
         (folder / "gmf-data_5.csv").read_text().replace("0,50.0,", "0,0.5,")
     )
+    with pytest.raises(InputError, match="a model that is named"):
+        losses(folder, blocks, expected=True, **shaking)  # type: ignore[arg-type]
+    shaking["model"] = "bounded-pga_sa10"
     answer = losses(folder, blocks, expected=True, **shaking)  # type: ignore[arg-type]
     kr = float(blocks["kr"][0])
     same = predict(

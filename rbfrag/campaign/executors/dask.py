@@ -62,9 +62,10 @@ def connected(address: str) -> Iterator[Any]:
 
 def run_on_cluster(
     client: Any,
-    run_work: Callable[[Work], Results],
+    run_work: Callable[..., Results],
     work: Iterator[Work],
     after_a_death: str = GO_ON,
+    shared: Any = None,
 ) -> Iterator[Results]:
     """Yield the answers as they come from a cluster.
 
@@ -76,6 +77,8 @@ def run_on_cluster(
         client: from :func:`connected`.
         run_work: does one chunk of work; a function of a module, which workers can find.
         after_a_death: what to do next when workers have died.
+        shared: what `run_work` takes before each chunk. Every worker is sent it once, so that the
+            loss of one loses nothing while another lives.
 
     Raises:
         WorkFailedError: workers died again and again, the scheduler was lost, or the workers
@@ -85,9 +88,11 @@ def run_on_cluster(
 
     waiting = distributed.as_completed(loop=client.loop)
     address = client.scheduler.address
+    # in a list, which scatter would else take apart: one future for whatever is shared
+    common = [] if shared is None else client.scatter([shared], broadcast=True, hash=False)
     try:
         for item in work:
-            waiting.add(client.submit(run_work, item, pure=False))
+            waiting.add(client.submit(run_work, *common, item, pure=False))
             while waiting.count() >= _most_under_way(client):
                 yield from _next_result(waiting, address, after_a_death)
         while waiting.count():

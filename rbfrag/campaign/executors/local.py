@@ -43,12 +43,13 @@ def check_workers(jobs: int | None, scheduler: str | None) -> None:
 
 @contextmanager
 def executor(
-    run_work: Callable[[W], R],
+    run_work: Callable[..., R],
     jobs: int | None,
     scheduler: str | None,
     stopped: Stopped = never,
     *,
     after_a_death: str = GO_ON,
+    shared: Any = None,
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
     """Offer, for a ``with`` block, a function that does work and yields answers in any order.
 
@@ -56,10 +57,12 @@ def executor(
 
     Args:
         run_work: does one chunk of work; a function of a module, which workers can find.
+            It takes what is shared, if anything is, and the chunk.
         jobs: worker processes; None for one per processor.
         scheduler: address of a Dask scheduler whose workers take their place.
         stopped: says whether to end after the chunks in hand.
         after_a_death: what to do next when workers have died.
+        shared: what all chunks have in common: each worker is sent it once.
     """
     if scheduler is None:
         yield lambda work, chunks: run_locally(
@@ -68,10 +71,13 @@ def executor(
             min(jobs or os.cpu_count() or 1, chunks),
             after_a_death=after_a_death,
             stopped=stopped,
+            shared=shared,
         )
         return
     with connected(scheduler) as client:
-        yield lambda work, _: _until(stopped, run_on_cluster(client, run_work, work, after_a_death))
+        yield lambda work, _: _until(
+            stopped, run_on_cluster(client, run_work, work, after_a_death, shared)
+        )
 
 
 def _until(stopped: Stopped, results: Iterator[R]) -> Iterator[R]:
@@ -83,12 +89,13 @@ def _until(stopped: Stopped, results: Iterator[R]) -> Iterator[R]:
 
 
 def run_locally(
-    do: Callable[[W], R],
+    do: Callable[..., R],
     work: Iterator[W],
     workers: int,
     *,
     after_a_death: str,
     stopped: Stopped = never,
+    shared: Any = None,
 ) -> Iterator[R]:
     """Yield the answers as they come, from worker processes or, for one worker, from here.
 
@@ -100,25 +107,28 @@ def run_locally(
         work: the chunks.
         after_a_death: what to do next when a worker process has died.
         stopped: says whether to end after the chunks in hand.
+        shared: what `do` takes before each chunk; each worker is sent it once, when it starts.
     """
     if workers <= 1:
         for item in work:
             if stopped():
                 return
-            yield do(item)
+            yield do(item) if shared is None else do(shared, item)
         return
     # spawn: the same on every system, and no lock or connection is inherited half-way
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=prepare, initargs=(callbacks, context.Lock())
-    )
+        workers, mp_context=context, initializer=prepare,
+        initargs=(callbacks, context.Lock(), shared),
+    )  # fmt: skip
+    task: Callable[[W], R] = do if shared is None else partial(_with_shared, do)
     running: set[Future[R]] = set()
     try:
         for item in work:
             if stopped():
                 break
             with held_back():  # the first of these starts the workers
-                running.add(pool.submit(do, item))
+                running.add(pool.submit(task, item))
             if len(running) >= workers * (1 + QUEUED_PER_WORKER):
                 finished, running = wait(running, return_when=FIRST_COMPLETED)
                 yield from _results(finished)
@@ -155,13 +165,24 @@ def _results(finished: set[Future[R]]) -> Iterator[R]:
         yield finished.pop().result()
 
 
-def prepare(tell: Sequence[Callable[[], None]] = (), first: Any = None) -> None:
+_shared: Any = None
+"""In a worker process what all its work has in common."""
+
+
+def _with_shared(do: Callable[..., R], item: Any) -> R:
+    return do(_shared, item)
+
+
+def prepare(tell: Sequence[Callable[[], None]] = (), first: Any = None, shared: Any = None) -> None:
     """Leave Ctrl-C to the main process, and end with it however it ends.
 
     Args:
         tell: functions of a module that the first worker to compile a kernel calls.
         first: the lock that only this one gets.
+        shared: what all its work has in common.
     """
+    global _shared
+    _shared = shared
     for callback in tell:
         on_compilation(partial(_call_once, callback, first))
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -163,12 +163,17 @@ def _print(
     *,
     verbose: bool,
 ) -> None:
+    from rbfrag.hazards import between_measures
+
     warnings = document.pop("warnings")
     branches = document.pop("branches", None)
+    spread = None if answer.tau is None else between_measures.in_words(answer.tau)
     rows = document.pop("blocks", None)
     if rows is not None:
         for sentence in (*_of_all(answer), most_often(names, answer.annual_rate.tolist())):
             print(sentence)
+        if spread is not None:
+            print(spread)
         document.pop("sites", None)
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
@@ -188,6 +193,8 @@ def _print(
         print(rate_in_words(document))
         for sentence in beyond_in_words(answer):
             print(sentence)
+        if spread is not None:
+            print(spread)
         print()
         print_pairs(document if verbose else _short(document))
         if document["annual_rate"] > 0.0:

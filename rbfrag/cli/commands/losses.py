@@ -82,10 +82,10 @@ class Sampling:
 class Meaning:
     """What shakes the blocks, and how they fail."""
 
-    imt: str = option(
-        "Measures that the models read: PGV, PGA, 'SA(1.0)', or several as PGV,PGA, which the "
-        "engine draws independently.",
-        "PGV",
+    imt: str | None = option(
+        "Measure that the models read: PGV, 'SA(1.0)', or PGA, turned into PGV by the magnitudes "
+        "of the ruptures; several as PGV,PGA, with their --model, which the engine draws "
+        "independently. Default: the first of PGV and SA(1.0) that the job has."
     )
     component: str | None = option(
         "What the measures mean: single, geometric_mean, rotd50 or larger."
@@ -140,7 +140,7 @@ def losses(
     """
     from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, read_blocks
     from rbfrag.exchange.event_losses import losses as answered
-    from rbfrag.hazards.event_counts import count_part
+    from rbfrag.hazards.event_counts import count_years
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     rows = read_blocks(table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet)
@@ -149,9 +149,9 @@ def losses(
             folder, rows, files=files.named(), samples=sampling.samples,
             expected=sampling.expected, seed=sampling.seed,
             investigation_time=time.investigation_time, ses=time.ses,
-            imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,
-            within_km=table.within_km, **answering, run=workers.runner(count_part),
-            on_progress=bar.show,
+            imt=None if meaning.imt is None else meaning.imt.split(","),
+            component=meaning.component, kind=meaning.kind, within_km=table.within_km,
+            **answering, run=workers.runner(count_years), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)

@@ -47,18 +47,21 @@ class WorkerOptions:
         "Dask scheduler whose workers take the place of local ones, tcp://host:8786.", metavar="URL"
     )
 
-    def runner(self, work: Callable[[Any], Any]) -> Callable[[Iterator[Any], int], Iterator[Any]]:
+    def runner(self, work: Callable[..., Any]) -> Callable[..., Iterator[Any]]:
         """Return what does the parts of some work, by local processes or by a cluster.
 
         Args:
-            work: does one part; a function of a module, which workers can find.
+            work: does one part, after what all have in common, if there is anything; a function of
+                a module, which workers can find.
         """
         from rbfrag.campaign.executors.local import check_workers, executor
 
         check_workers(self.jobs, self.scheduler)
 
-        def run(parts: Iterator[Any], number: int) -> Iterator[Any]:
-            with executor(work, self.jobs, self.scheduler, after_a_death=AFTER_A_DEATH) as execute:
+        def run(parts: Iterator[Any], number: int, shared: Any = None) -> Iterator[Any]:
+            with executor(
+                work, self.jobs, self.scheduler, after_a_death=AFTER_A_DEATH, shared=shared
+            ) as execute:
                 yield from execute(parts, number)
 
         return run

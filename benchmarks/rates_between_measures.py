@@ -1,0 +1,49 @@
+"""Rates of an event set by SA(1.0), and by PGA with and without magnitudes, over those by PGV.
+
+python benchmarks/rates_between_measures.py FOLDER, one job's exports of the OpenQuake engine with
+all these measures. Asked is for PGA with magnitudes a geometric mean within 0.75 to 1.3 and a
+standard deviation of ln of at most 0.35.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from rbfrag.exchange.event_losses import losses
+from rbfrag.exchange.openquake_events import JobFiles, read_events
+
+RAREST = 1e-4
+"""Rates below are not resolved by the events [1/a]."""
+
+ROUTES = {
+    "SA(1.0)": {"imt": ("SA(1.0)",)},
+    "PGA and magnitude": {"imt": ("PGA",)},
+    "PGA alone": {"imt": ("PGA",), "model": "bounded-pga"},
+}
+
+
+def main(folder: str) -> None:
+    """Print the ratios of one job."""
+    sites = read_events(JobFiles.of(folder)).site_ids
+    p2, kr = np.meshgrid([0.3, 1.0, 3.0, 10.0, 20.0, 30.0], [0.03, 0.05, 0.1, 0.2, 0.3, 0.4])
+    blocks = {
+        "p2_1_s2": np.tile(p2.ravel(), len(sites)),
+        "kr": np.tile(kr.ravel(), len(sites)),
+        "site_id": np.repeat(np.array(sites, dtype=object), p2.size),
+    }
+
+    def rates(**about: object) -> np.ndarray:
+        return losses(folder, blocks, component="rotd50", expected=True, **about).block_rates[0]
+
+    velocity = rates()
+    known = velocity > RAREST
+    print(f"{known.sum()} blocks that fail more than {RAREST:g} times a year by PGV")
+    for name, about in ROUTES.items():
+        ratio = np.log(rates(**about)[known] / velocity[known])
+        print(f"{name:20}{np.exp(ratio.mean()):6.2f}  sd of ln {ratio.std():.2f}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

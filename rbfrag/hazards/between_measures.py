@@ -1,0 +1,70 @@
+"""What rates by one measure of shaking differ from those by another, and PGV out of PGA.
+
+A model of PGA averages over the PGV that goes with a PGA in the reference, whose earthquakes are
+stronger than those that most often make such a PGA. PGV and SA(1.0) need no magnitude.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rbfrag.hazards.conversions import Component
+from rbfrag.solver.results import FloatArray
+
+TAU = {"pgv_m_s": 0.15, "sa10_g": 0.15}
+"""Standard deviation of ln rate between the measures that may be asked for."""
+
+LAW_TAU = 0.25
+"""The same where PGV is taken from PGA and magnitude."""
+
+PREFERRED = ("pgv_m_s", "sa10_g")
+"""The measures that answer by themselves, the better first."""
+
+PGA_ALONE = (
+    "a rate from PGA alone is biased: the model averages over the PGV that went with such a PGA in "
+    "its reference of strong earthquakes, and smaller ones of the same PGA have less"
+)
+
+_CONSTANT, _SLOPE, _BY_MAGNITUDE, _SCATTER, _SATURATION = -0.623, 0.873, 0.472, 0.434, 7.6
+
+
+def velocity_of(pga_g: FloatArray, magnitude: FloatArray) -> FloatArray:
+    """Return the median PGV [m/s] of a single component at a PGA [g] and magnitude.
+
+    ln PGV = -.623 + .873 ln PGA + .472 (min(M, 7.6) - 6), of the motions of the shipped reference.
+    """
+    with np.errstate(divide="ignore"):
+        log = _CONSTANT + _SLOPE * np.log(pga_g)
+    return np.asarray(np.exp(log + _BY_MAGNITUDE * (np.minimum(magnitude, _SATURATION) - 6.0)))
+
+
+def component_of_velocity(component: Component) -> Component:
+    """Return what PGV by :func:`velocity_of` is to a model where PGA is of a component."""
+    return Component(
+        component.name, component.title, component.ratio**_SLOPE,
+        math.hypot(_SCATTER, _SLOPE * component.scatter),
+    )  # fmt: skip
+
+
+def factors_between(tau: float) -> tuple[float, float]:
+    """Return by what rates of other measures differ from this one, 95 %: exp(±1.96 tau)."""
+    return math.exp(-1.96 * tau), math.exp(1.96 * tau)
+
+
+def as_dict(tau: float | None) -> dict[str, float] | None:
+    """Return the spread between measures under the keys of the JSON contract."""
+    if tau is None:
+        return None
+    low, high = factors_between(tau)
+    return {"tau": tau, "factor_low": low, "factor_high": high}
+
+
+def in_words(tau: float) -> str:
+    """Return the spread between measures in a sentence."""
+    low, high = factors_between(tau)
+    return (
+        f"Measures: other measures of the same shaking would give {low:.2f} to {high:.2f} times as "
+        "many, beside all intervals."
+    )
