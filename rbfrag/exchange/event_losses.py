@@ -111,8 +111,11 @@ def losses(
     rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("single" if component is None else component)
-from rbfrag.exchange.openquake_events import JobFiles, measures_in, read_events, read_magnitudes
-from rbfrag.exchange.site_join import WITHIN_KM, join_sites
+    events = read_events(job, imts=imt or _best(job), **lasted)
+    events, meaning, tau, remark = _by_one_measure(events, job, meaning, answering)
+    rows, models = _with_models(
+        _at_sites(rows, events, within_km), tuple(events.measures), answering
+    )
     portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
         "the measures are taken as those of single components, which the models are fitted on; "
