@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -180,7 +181,7 @@ def by_predict(
     return total
 
 
-DRAWS = 2000
+DRAWS = 200
 
 
 def drawn_models(model: FragilityModel, n: int, seed: int) -> list[FragilityModel]:
@@ -216,12 +217,12 @@ def intervals() -> list[list[str]]:
     return rows
 
 
-COUNTS = (1, 10, 20)
+COUNTS = (1, 10)
 
 
 def of_sums() -> list[list[str]]:
     """Return standard errors of ln of sums and exceedances by shifts, and by draws."""
-    events, portfolio = event_set(1500, 12, 120)
+    events, portfolio = event_set(500, 12, 120)
     start = time.process_time()
     answer = event_losses(events, portfolio, samples=100, level=0.6826894921370859)
     used = time.process_time() - start
@@ -229,26 +230,28 @@ def of_sums() -> list[list[str]]:
     by_count = {one.value: one for one in curve}
     model = portfolio.answering[0]
     total, reached = [], []
-    for one in drawn_models(model, DRAWS // 10, 5):
-        row = replace(
-            model.row, coefficients=dict(zip(model.row.coefficients, one.parameters, strict=True))
-        )
-        moved = event_losses(events, replace(portfolio, models=(row,)), samples=100)
-        total.append(moved.average_annual_failures)
-        (drawn,) = moved.exceedance.values()
-        known = {each.value: each.annual_rate for each in drawn}
-        reached.append([known.get(count, np.nan) for count in COUNTS])
+    with patch("rbfrag.hazards.losses.shifted_portfolios", return_value=()):
+        start = time.process_time()
+        event_losses(events, portfolio, samples=100)
+        alone = time.process_time() - start
+        for one in drawn_models(model, DRAWS, 5):
+            values = dict(zip(model.row.coefficients, one.parameters, strict=True))
+            moved = replace(portfolio, models=(replace(model.row, coefficients=values),))
+            found = event_losses(events, moved, samples=100)
+            total.append(found.average_annual_failures)
+            (drawn,) = found.exceedance.values()
+            known = {each.value: each.annual_rate for each in drawn}
+            reached.append([known.get(count, np.nan) for count in COUNTS])
     low, high = answer.uncertainty["average_annual_failures"].knowledge or (np.nan, np.nan)
     names = ["failures a year", *(f"{count} or more fail" for count in COUNTS)]
-    shifted = [0.5 * np.log(high / low)]
-    shifted += [
-        0.5 * np.log(by_count[count].knowledge[1] / by_count[count].knowledge[0])
-        for count in COUNTS
-    ]
+    ends = [(low, high), *(by_count[count].knowledge for count in COUNTS)]
     sds = [np.log(total).std(), *np.nanstd(np.log(reached), axis=0)]
-    return [
-        [name, f"{one:.3f}", f"{sd:.3f}"] for name, one, sd in zip(names, shifted, sds, strict=True)
-    ] + [["processor time of the answer", f"{used:.1f} s", ""]]
+    rows = [
+        [name, f"{0.5 * np.log(end[1] / end[0]):.3f}", f"{sd:.3f}"]
+        for name, end, sd in zip(names, ends, sds, strict=True)
+    ]
+    return [*rows, ["processor time, and without what the parameters leave open",
+                    f"{used:.1f} s", f"{alone:.1f} s"]]  # fmt: skip
 
 
 def thinned() -> list[list[str]]:

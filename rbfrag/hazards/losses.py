@@ -387,7 +387,9 @@ def event_losses(
         done += groups[result.number].size
         if on_progress is not None:
             on_progress(done, sum(group.size for group in groups))
-    return _answer(events, portfolio, ends, groups, results, means, samples, seed, level)
+    return _answer(
+        events, portfolio, ends, groups, results, means, samples, seed, level, len(shifted)
+    )
 
 
 def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
@@ -455,6 +457,7 @@ def _answer(
     samples: int,
     seed: int,
     level: float,
+    shifted: int,
 ) -> LossAnswer:
     n, laws, order = (
         events.event_id.size,
@@ -479,8 +482,7 @@ def _answer(
     if not order:  # known without samples alone where no law matters, as of single blocks
         one = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
         any_fails = means.bounds if len(laws) > 1 else one
-    axes = sum(len(row.coefficients) for row in portfolio.models) if samples else 0
-    rows, branches = len(laws) * (1 + 2 * axes), len(events.realization_weights)
+    rows, branches = len(laws) * (1 + shifted), len(events.realization_weights)
     curves = [
         reduce(Curves.plus, (part[i] for part in pairs), Curves.empty(rows, end.size, branches))
         for i, end in enumerate(ends)
