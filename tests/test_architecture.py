@@ -183,6 +183,7 @@ def test_every_folder_is_a_known_package() -> None:
         ("numba", {"solver"}),
         ("pyarrow", {"exchange"}),
         ("pyogrio", {"exchange"}),
+        ("h5py", {"exchange"}),
         ("trimesh", {"exchange"}),
         ("typer", {"cli"}),
         ("fastapi", {"service"}),

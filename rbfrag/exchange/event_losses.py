@@ -65,7 +65,8 @@ def losses(
 
     Args:
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
-            ruptures CSV), or None where `files` names them.
+            ruptures CSV), its datastore calc_N.hdf5 (extra ``hdf5``), or None where `files` names
+            them.
         blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: fields of blocks with
             ``site_id`` (text), or ``lon`` and ``lat`` [deg], and, if there are, ``block_id``,
             ``kind``, ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a

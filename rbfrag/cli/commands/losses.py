@@ -49,7 +49,10 @@ AFTER_A_DEATH = "run the same command again"
 class JobFileOptions:
     """The exports of one job."""
 
-    gmf_data: str | None = option("File of ground motion fields.", metavar="FILE")
+    gmf_data: str | None = option(
+        "File of ground motion fields, CSV or HDF5 (gmf-data, which names the sites too).",
+        metavar="FILE",
+    )
     events: str | None = option("File of all events.", metavar="FILE")
     sitemesh: str | None = option("File of all sites.", metavar="FILE")
     realizations: str | None = option("File of the logic tree's weights.", metavar="FILE")
@@ -118,7 +121,8 @@ class LossTable:
 def losses(
     *,
     folder: str | None = argument(
-        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV.",
+        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV; "
+        "or its datastore calc_N.hdf5 (extra hdf5).",
         None,
         metavar="[FOLDER]",
     ),
