@@ -94,8 +94,8 @@ def site_probability(
             not given by name.
         weight: weights of the blocks of a class, shape (m,); None for equal ones.
         own_block: every site has its own block; otherwise all blocks stand at every site.
-        std_ln: standard deviations of the measures' logarithms by name, shape (n,); where one that
-            the model reads is missing all values are taken as certain, but PGA beside PGV alone.
+        std_ln: standard deviations of the measures' logarithms by name, shape (n,); a measure
+            without one is taken as certain.
         question: the numbers of blocks that their one kind reads, NaN of an option for the
             blocks' own, and model, level and db as in :func:`rbfrag.predict`.
     """
@@ -112,6 +112,8 @@ def site_probability(
     blocks = 1 if own_block else size
     across = bool(shaking.integrated)
     widest = float(shaking.factors[:, 0, 0].max(initial=0.0))
+    # a first measure that is certain beside others that are not
+    widest = widest or float(shaking.deviations.max(initial=0.0))
 
     def answers(site: Indices, block: Indices, points: FloatArray) -> PredictionArray:
         """Return answers for pairs of site and block at normal scores, shape (pairs, points)."""

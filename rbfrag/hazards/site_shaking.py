@@ -44,7 +44,7 @@ class SiteShaking:
     ) -> SiteShaking:
         """Return the shaking of :func:`rbfrag.hazards.site_probability.site_probability`."""
         names = model.term.inputs
-        given = integrated_deviations(names, std_ln)
+        given = {name: std_ln[name] for name in names if name in std_ln}
         nothing = np.zeros(measures[names[0]].size)
         return cls(
             model=model,
@@ -76,20 +76,6 @@ class SiteShaking:
             name: self.median[site, None, i] * np.exp(logs[:, :, i])
             for i, name in enumerate(self.names)
         }
-
-
-def integrated_deviations(
-    names: tuple[str, ...], std_ln: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """Return the standard deviations that are integrated over of the measures that a model reads.
-
-    All or none, lest a measure varies while one that goes with it does not; PGA alone may be
-    missing beside PGV, which tells most.
-    """
-    needed = names[:1] if names[0] == "pgv_m_s" else names
-    if not all(name in std_ln for name in needed):
-        return {}
-    return {name: std_ln[name] for name in names if name in std_ln}
 
 
 def _cholesky(covariance: FloatArray) -> FloatArray:
