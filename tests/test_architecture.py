@@ -184,6 +184,7 @@ def test_every_folder_is_a_known_package() -> None:
         ("pyarrow", {"exchange"}),
         ("pyogrio", {"exchange"}),
         ("h5py", {"exchange"}),
+        ("rasterio", {"exchange"}),
         ("trimesh", {"exchange"}),
         ("typer", {"cli"}),
         ("fastapi", {"service"}),
@@ -220,7 +221,7 @@ def test_package_files_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "excel", "gis", "dask", "mesh", "service")
+    runtime = ("plot", "postgres", "parquet", "excel", "gis", "hdf5", "dask", "mesh", "service")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
 from rbfrag.exchange.given_blocks import given_blocks
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake.events import JobFiles, read_events
 from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS

@@ -11,7 +11,7 @@ import pytest
 
 import rbfrag
 from rbfrag.errors import InputError
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake.events import JobFiles, read_events
 from rbfrag.hazards.event_set import EventSet
 from tests.exchange.openquake_job import EVENTS, SITES, write_datastore, write_job
 
@@ -33,7 +33,7 @@ def test_datastore_and_exports_are_one_job(tmp_path: Path, monkeypatch: pytest.M
     store = write_datastore(tmp_path / "calc_5.hdf5")
     exported = read_events(JobFiles.of(folder))
     assert same(exported, read_events(JobFiles.of(store)))
-    monkeypatch.setattr("rbfrag.exchange.openquake_datastore.ROWS", 2)  # in parts
+    monkeypatch.setattr("rbfrag.exchange.openquake.datastore.ROWS", 2)  # in parts
     assert same(exported, read_events(JobFiles.of(store)))
     # files that are named go before the datastore
     mixed = read_events(JobFiles.of(store, {"events": folder / "events_5.csv"}))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.openquake_table import ROWS, Table
+from rbfrag.exchange.openquake.table import ROWS, Table
 from rbfrag.files import reading
 
 SUFFIXES = (".hdf5", ".h5")

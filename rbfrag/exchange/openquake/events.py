@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.openquake_datastore import SUFFIXES, stored_table
-from rbfrag.exchange.openquake_table import Table
+from rbfrag.exchange.openquake.datastore import SUFFIXES, stored_table
+from rbfrag.exchange.openquake.table import Table
 from rbfrag.files import as_path
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
 from rbfrag.hazards.measure_type import IntensityType, openquake_type, requested_measure
