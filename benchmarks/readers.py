@@ -45,7 +45,7 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
-from tests.exchange.openquake_job import write_datastore, write_job
+from tests.exchange.openquake_job import write_job
 from tests.meshes import box, write_obj
 
 
@@ -237,12 +237,6 @@ def _job(what: str) -> tuple[bytes, ...]:
         return (JobFiles.of(folder).paths()[what].read_bytes(),)
 
 
-@cache
-def _datastores() -> tuple[bytes, ...]:
-    with tempfile.TemporaryDirectory() as folder:
-        return (write_datastore(Path(folder) / "calc_5.hdf5").read_bytes(),)
-
-
 def _read_job(path: Path, what: str) -> object:
     return read_events(JobFiles.of(write_job(path.with_name("job")), {what: path}))
 
@@ -277,7 +271,6 @@ READERS: tuple[Reader, ...] = (
         Reader(f"OpenQuake {what}", ".csv", partial(_job, what), partial(_read_job, what=what))
         for what in FILES
     ),
-    Reader("OpenQuake datastore", ".hdf5", _datastores, lambda f: read_events(JobFiles.of(f))),
     Reader("database", ".db", _database, _read_database),
     Reader("token", ".txt", lambda: (b"0123456789abcdefABCDEF\n",), lambda f: read_token(str(f))),
 )

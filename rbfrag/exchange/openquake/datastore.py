@@ -23,6 +23,9 @@ _WHAT = "the datastore of an OpenQuake job"
 _TIMES = ("investigation_time", "ses_per_logic_tree_path")
 _JOBS = {"checksum": "checksum32", "start_date": "date"}
 """What tells jobs apart: names in the comments of exports, and those of the file's attributes."""
+_MOST_ROWS = 300
+"""Rows a byte of the file: packed ones of four bytes cannot take less; a damaged file states any
+number."""
 
 
 @dataclass(frozen=True)
@@ -115,18 +118,21 @@ def stored_table(path: Path, what: str) -> StoredTable | None:
 def _table(
     path: Path, what: str, size: int, members: Mapping[str, str | None], stated: Mapping[str, str]
 ) -> StoredTable:
+    if size > _MOST_ROWS * path.stat().st_size:
+        raise InputError(f"{path}, {what}: states {size:,} rows, more than the file can hold")
     return StoredTable(path, stated, tuple(members), 0, what, size, members)
 
 
 def _sites(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable:
     what = "complete" if "complete" in file else "sitecol"
     node = _node(path, file, what)
-    numbers = _member(node, "sids")[()]
-    if (numbers != np.arange(numbers.size)).any():
-        raise InputError(f"{path}, {what}: the sites are not numbered from 0 on")
     name = "custom_site_id" if "custom_site_id" in node else "sids"
     members = {"site_id" if name == "sids" else name: name, "lon": "lon", "lat": "lat"}
-    return _table(path, what, numbers.size, members, stated)
+    sids = _member(node, "sids")
+    table = _table(path, what, sids.size, members, stated)
+    if (sids[()] != np.arange(sids.size)).any():
+        raise InputError(f"{path}, {what}: the sites are not numbered from 0 on")
+    return table
 
 
 def _times(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable | None:
