@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from rbfrag.exchange.event_losses import losses
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake.events import JobFiles, read_events
 
 RAREST = 1e-4
 """Rates below are not resolved by the events [1/a]."""

@@ -31,7 +31,7 @@ from rbfrag.exchange.fragility_function import (
 )
 from rbfrag.exchange.mesh_file import block_from_mesh
 from rbfrag.exchange.nrml import nrml_text, read_nrml
-from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
+from rbfrag.exchange.openquake.events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table

@@ -183,6 +183,8 @@ def test_every_folder_is_a_known_package() -> None:
         ("numba", {"solver"}),
         ("pyarrow", {"exchange"}),
         ("pyogrio", {"exchange"}),
+        ("h5py", {"exchange"}),
+        ("rasterio", {"exchange"}),
         ("trimesh", {"exchange"}),
         ("typer", {"cli"}),
         ("fastapi", {"service"}),
@@ -219,7 +221,9 @@ def test_package_files_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "excel", "gis", "mseed", "dask", "mesh", "service")
+    runtime = (
+        "plot", "postgres", "parquet", "excel", "gis", "mseed", "hdf5", "dask", "mesh", "service"
+    )  # fmt: skip
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

@@ -13,7 +13,12 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, BlockRows, Blocks
 from rbfrag.exchange.given_blocks import given_blocks
-from rbfrag.exchange.openquake_events import JobFiles, measures_in, read_events, read_magnitudes
+from rbfrag.exchange.openquake.events import (
+    JobFiles,
+    measures_in,
+    read_events,
+    read_magnitudes,
+)
 from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS
@@ -75,7 +80,8 @@ def losses(
 
     Args:
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
-            ruptures CSV), or None where `files` names them.
+            ruptures CSV), its datastore calc_N.hdf5 (extra ``hdf5``), or None where `files` names
+            them.
         blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: fields of blocks with
             ``site_id`` (text), or ``lon`` and ``lat`` [deg], and, if there are, ``block_id``,
             ``kind``, ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a

@@ -10,9 +10,10 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, Blocks
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
-from rbfrag.exchange.shakemap import at_places, read_shakemap
+from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
@@ -120,14 +121,24 @@ def shakemap(
     own = "lon" in rows.blocks
     if own:
         measures, std_ln, on_map = at_places(shaken, rows.blocks["lon"], rows.blocks["lat"])
-        rows = rows.without(~on_map, lambda _: "the block lies off the map")
-        measures, std_ln = (
-            {name: values[on_map] for name, values in each.items()} for each in (measures, std_ln)
+        known = on_map & known_places(measures, std_ln)
+        rows = rows.without(
+            ~known,
+            lambda i: (
+                "the map has no number around the block"
+                if on_map[i]
+                else "the block lies off the map"
+            ),
         )
         lon, lat = rows.blocks["lon"], rows.blocks["lat"]
     else:
-        lon, lat = shaken.lon, shaken.lat
-        measures, std_ln = shaken.measures, shaken.std_ln
+        measures, std_ln, known = shaken.measures, shaken.std_ln, shaken.known
+        if not known.any():
+            raise InputError(f"{grid}: no node has a number in each field that is read")
+        lon, lat = shaken.lon[known], shaken.lat[known]
+    measures, std_ln = (
+        {name: values[known] for name, values in each.items()} for each in (measures, std_ln)
+    )
     table = rows.blocks
     warnings = [*rows.unusable_in_words(FROM_SUMS if own else FROM_MEAN), *shaken.warnings]
     warnings += doubts_about(measures)
@@ -150,9 +161,10 @@ def shakemap(
     if "pgv_m_s" not in measures:
         names = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
         warnings.append(f"the map has no PGV, which tells most: a model of {names} answers")
-    if not shaking.integrated:
+    certain = [name for name in shaking.names if name not in shaking.integrated]
+    if certain:
         warnings.append(
-            f"the map's uncertainty of {' and '.join(shaking.names)} is not given: its values "
+            f"the map's uncertainty of {' and '.join(certain)} is not given: its values "
             "are taken as certain; uncertainty.xml has it"
         )
     places = Places.of(lon, lat, table.get("site_id") if own else None)
@@ -208,7 +220,9 @@ def shakemap(
         title=f"{name}\n{_what(table, own)}; model {chosen.name}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
-        shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
+        shape=(shaken.rows, shaken.columns)
+        if shaken.is_whole and known.all() and not own
+        else None,
     )
 
 

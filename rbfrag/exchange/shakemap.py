@@ -185,6 +185,12 @@ class GridReading:
         for title in _FIELDS:
             if title in self.places:
                 fields[_FIELDS[title][0]] = self._field(table, title, warnings)
+        unknown = int(np.isnan(np.sum([*fields.values()], axis=0)).sum())
+        if unknown:
+            warnings.append(
+                f"{self.source}: {unknown:,} of {table.shape[0]:,} nodes of grid_data have no "
+                "number (NaN) in a field that is read: they are left out"
+            )
         return self._event(), fields, columns, rows, warnings
 
     def _count(self, name: str) -> int:
@@ -217,17 +223,17 @@ class GridReading:
                 f"{', '.join(units)}"
             )
         values = units[unit] * table[:, place]
-        bad = ~(values >= 0.0) | np.isinf(values)
+        bad = (values < 0.0) | np.isinf(values)
         if bad.any():
             node = int(np.flatnonzero(bad)[0])
             raise InputError(
                 f"{self.source}, node {node + 1} of grid_data: {title} = {table[node, place]:g}: "
                 "a finite number, not below zero, is wanted"
             )
-        if values.max() > _MOST.get(name, _MOST_STD):
+        if (values > _MOST.get(name, _MOST_STD)).any():
             warnings.append(
-                f"{self.source}: {title} reaches {table[:, place].max():g} {unit}: is that its "
-                "unit?"
+                f"{self.source}: {title} reaches {np.nanmax(table[:, place]):g} {unit}: is that "
+                "its unit?"
             )
         return values
 
@@ -260,7 +266,7 @@ class ShakeMapGrid:
         lon: longitudes [deg], shape (n,).
         lat: latitudes [deg], shape (n,).
         measures: what the map holds of PGV [m/s], PGA and spectral accelerations [g] by their
-            names in `predict`, each of shape (n,).
+            names in `predict`, each of shape (n,); NaN where the file has it.
         std_ln: standard deviations of their logarithms by the same names, as far as they are there.
         columns: declared number of nodes in a row.
         rows: declared number of rows.
@@ -280,6 +286,11 @@ class ShakeMapGrid:
     def is_whole(self) -> bool:
         """Whether there are as many nodes as declared."""
         return self.lon.size == self.columns * self.rows
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which nodes have a number in every field that was read, shape (n,)."""
+        return known_places(self.measures, self.std_ln)
 
 
 def read_shakemap(
@@ -345,6 +356,14 @@ def _with_uncertainty(
         std_ln={**grid.std_ln, **_deviations(fields)},
         warnings=(*grid.warnings, *warnings),
     )
+
+
+def known_places(*fields: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Return which places have a number of every field, shape (n,)."""
+    known: NDArray[np.bool_] = np.isfinite(
+        np.sum([values for each in fields for values in each.values()], axis=0)
+    )
+    return known
 
 
 def at_places(

@@ -81,6 +81,11 @@ def read_hazard_curves(
         InputError: the file cannot be used, or holds no such curve; the message names the
             line or the element.
     """
+    if str(path).lower().endswith(".npz"):
+        raise InputError(
+            f"{path} holds arrays of numpy, which are not read: export the curves of that job as "
+            "text:  oq export hcurves CALC_ID -e csv"
+        )
     return hazard_curves_in(source_text(path, "a hazard curve"), str(path), imt=imt, site=site)
 
 

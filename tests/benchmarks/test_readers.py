@@ -31,6 +31,7 @@ NO_READERS = {
     "__init__.py:_home_of_names": "the package's own stub",
     "cli/streams.py:end_unwritten": "opens what swallows output that cannot be written",
     "campaign/machine.py:_processor": "the computer's own description",
+    "exchange/openquake/datastore.py:_opened": "HDF5's own library, which damaged bytes may hang",
     "plots/coast.py:world": "the package's own coastline",
     "service/app.py:lifespan": "opens the pool of processes",
     "service/app.py:make_app": "its inner function opens the pool of processes",

@@ -20,6 +20,7 @@ from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
 
 SINGLE = ("--component", "single")
+ONE = ("--p2", "3", "--kr", "0.1")
 
 
 @pytest.fixture
@@ -112,10 +113,75 @@ def test_geopackage(shell: Shell, grid: Path) -> None:
     assert meta["crs"] == "EPSG:4326"
 
 
+def test_geotiff(shell: Shell, grid: Path) -> None:
+    rasterio = pytest.importorskip("rasterio", reason="the extra gis is not installed")
+    grid.write_text(grid.read_text().replace("20.5 40.0 20 10", "20.5 40.0 nan 10"))
+    told = shell.json("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.tif", *SINGLE)
+    shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.csv", *SINGLE)
+    rows = np.genfromtxt("a.csv", delimiter=",", names=True)
+    with rasterio.open("a.tif") as file:
+        assert file.crs.to_string() == "EPSG:4326"
+        assert np.isnan(file.nodata)
+        bands = dict(zip(file.descriptions, file.read(), strict=True))
+        assert [*bands][:2] == ["pgv_m_s", "pga_g"]
+        assert file.tags()["model"] == told["model"]
+        # outer edges: half a cell beyond the nodes
+        assert file.bounds == pytest.approx((19.75, 39.5, 21.25, 41.5))
+        for row in rows:  # where the map is read is where the table has it
+            i = [*bands].index("probability") + 1
+            (sampled,) = file.sample([(row["lon"], row["lat"])], indexes=[i])
+            assert sampled[0] == pytest.approx(row["probability"], rel=1e-6)
+    assert rows.size == 5
+    assert np.isnan(bands["probability"]).sum() == 1
+    assert np.isnan(bands["probability"][1, 1])
+
+
+def test_no_geotiff_of_what_is_no_grid(refuses: Refuses, grid: Path) -> None:
+    pytest.importorskip("rasterio", reason="the extra gis is not installed")
+    Path("b.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,20.0,40.5\n")
+    message = refuses("shakemap", grid, "--blocks", "b.csv", "--out", "a.tif")
+    assert "places of their own" in message
+    grid.write_text(grid.read_text().replace("20.5 41.0", "20.7 41.0"))
+    assert "a regular grid" in refuses("shakemap", grid, *ONE, "--out", "a.tif")
+    assert not Path("a.tif").exists()
+
+
+def test_the_deviation_that_a_grid_states_is_used(grid: Path) -> None:
+    # as grids of version 3 do: STDPGA among the fields
+    text = GRID.replace('name="PGV" units="cm/s"', 'name="STDPGA" units="ln(pctg)"')
+    grid.write_text(text.replace(" 10 5", " 0.6 50"))
+    told = rbfrag.shakemap(grid, 3.0, 0.1, component="single", db=REFERENCE)
+    assert told.about["measures"] == "pga_g"
+    assert told.about["uncertainty_integrated"]
+    assert not any("is not given" in text for text in told.warnings)
+    pga = 0.5 * np.exp(0.6 * np.random.default_rng(3).standard_normal(100_000))
+    sampled = rbfrag.predict(3.0, 0.1, pga_g=pga, db=REFERENCE).probability.mean()
+    assert told.columns["probability"][0] == pytest.approx(sampled, abs=0.004)
+
+
+def test_nodes_without_a_number_are_left_out_and_counted(shell: Shell, grid: Path) -> None:
+    whole = shell.json("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.csv", *SINGLE)
+    before = np.genfromtxt("a.csv", delimiter=",", names=True)["probability"]
+    grid.write_text(grid.read_text().replace("20.0 40.0 60 40", "20.0 40.0 NaN 40"))
+    told = shell.json("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", *SINGLE)
+    after = np.genfromtxt("b.csv", delimiter=",", names=True)["probability"]
+    assert (whole["places"], told["places"]) == (6, 5)
+    assert after == pytest.approx(np.delete(before, 3), rel=1e-12)
+    assert any("1 of 6 nodes of grid_data have no number" in text for text in told["warnings"])
+    # a block is answered by four nodes, of which one beside it may lack
+    rows = "A,3,0.1,20.2,40.5\nB,3,0.1,20.5,41.0\n"
+    Path("b.csv").write_text(f"block_id,p2_1_s2,kr,lon,lat\n{rows}")
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "c.csv", *SINGLE)
+    with Path("c.csv").open() as file:
+        first, second = csv.DictReader(file)
+    assert "no number around the block" in first["reason"]
+    assert float(second["probability"]) == pytest.approx(before[1], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--out", "a.tif"), "none of .geojson"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.jp2"), "none of .geojson"),
         (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"), "'x' is not known"),
         (("--out", "a.csv"), "--p2 is missing"),
         (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat go together"),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 ABOUT = "generated_by='OpenQuake engine 3.26.2', start_date='2026-01-02T03:04:05', checksum=77"
 
@@ -71,3 +73,42 @@ def write_job(
             about,
         )
     return folder
+
+
+def write_datastore(
+    path: Path, *, scenario: bool = False, alone: bool = False, changed: Any = None
+) -> Path:
+    """Write the job of `write_job` in the layout of the engine's own HDF5 file (3.26).
+
+    Args:
+        alone: ground motion and sites without events, as ``oq export gmf_data -e hdf5`` does.
+        changed: called with the open file at the end.
+    """
+    import h5py
+    import numpy as np
+
+    with h5py.File(path, "w") as file:
+        rows = sorted((event, SITES.index(name), pgv) for event, pgv, name in SHAKING)
+        events, sites, values = zip(*rows, strict=True)
+        file["gmf_data/eid"] = np.array(events, "u4")
+        file["gmf_data/sid"] = np.array(sites, "u4")
+        file["gmf_data/PGV"] = np.array(values, "f4")
+        file["gmf_data/sigma_epsilon"] = np.zeros(5, [("eid", "u4"), ("eps_inter_PGV", "f4")])
+        file["sitecol/sids"] = np.arange(len(SITES), dtype="u4")
+        file["sitecol/lon"] = 174.0 + np.arange(len(SITES))
+        file["sitecol/lat"] = np.full(len(SITES), -41.0)
+        file["sitecol/custom_site_id"] = np.array(SITES, "S8")
+        if not alone:
+            file.attrs["checksum32"], file.attrs["date"] = 77, "2026-01-02T03:04:05"
+            names = ("id", "<u4"), ("rup_id", "<i8"), ("rlz_id", "<u2"), ("year", "<u4")
+            stored = [(e, 2**30 + e, rlz, 0 if scenario else year) for e, rlz, year in EVENTS]
+            file["events"] = np.array(stored, dtype=list(names))
+            file["weights"] = np.array(WEIGHTS, "f4")
+            times = (None, None) if scenario else (TIME, SETS)
+            stated = dict(
+                zip(("investigation_time", "ses_per_logic_tree_path"), times, strict=True)
+            )
+            file["oqparam"] = json.dumps(stated)
+        if changed is not None:
+            changed(file)
+    return path

@@ -166,3 +166,10 @@ def test_maps_and_spectra_are_no_curves(tmp_path: Path, columns: str, what: str)
     path.write_text(f"{head}\nlon,lat,{columns}\n174.0,-41.0,0.1,0.2\n")
     with pytest.raises(InputError, match=f"is a column of {what}.*oq export hcurves"):
         read_hazard_curves(path)
+
+
+def test_arrays_of_curves_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "hcurves_4.npz"
+    np.savez(path, investigation_time=50.0)
+    with pytest.raises(InputError, match=r"oq export hcurves CALC_ID -e csv"):
+        read_hazard_curves(path)

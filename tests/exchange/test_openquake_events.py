@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake.events import JobFiles, read_events
 from rbfrag.hazards.event_set import EventSet
 from tests.exchange.openquake_job import EVENTS, SHAKING, write_csv, write_job
 
@@ -184,7 +184,7 @@ def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:
 
 def test_many_parts_are_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = read(write_job(tmp_path))
-    monkeypatch.setattr("rbfrag.exchange.openquake_events._ROWS", 2)
+    monkeypatch.setattr("rbfrag.exchange.openquake.table.ROWS", 2)
     parts = read(tmp_path)
     assert parts.measures["pgv_m_s"].tolist() == whole.measures["pgv_m_s"].tolist()
     replace_text(tmp_path, "gmf-data", "4,90.0,0012", "4,90.0,12")

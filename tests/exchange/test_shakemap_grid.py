@@ -111,7 +111,6 @@ def test_between_the_nodes(grid_file: Path) -> None:
         ("20.0 41.0 10 5\n", "20.0 41.0 10\n", "23 numbers, which is no multiple of the 4 fields"),
         ("20.0 41.0 10 5", "20.0 41.0 x 5", "node 1 of grid_data: 'x' is not a number"),
         ("20.5 40.0 20 10", "20.5 40.0 -2 10", "node 5 of grid_data: PGV = -2"),
-        ("20.5 40.0 20 10", "20.5 40.0 nan 10", "node 5 of grid_data: PGV = nan"),
         ("20.5 40.0", "200.5 40.0", "node 5 of grid_data: LON = 200.5 lies off the map"),
         ('units="cm/s"', 'units="knots"', "PGV in 'knots' is not known"),
         ('name="LAT"', 'name="MMI"', "there is no field LAT; the fields are LON, MMI, PGV, PGA"),

@@ -17,7 +17,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
-from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.exchange.openquake.events import JobFiles, read_events
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts

@@ -135,15 +135,26 @@ def test_uncertain_spectral_accelerations_are_the_mean(
     assert found.probability == pytest.approx(expected.mean(axis=1), abs=0.004)
 
 
-def test_values_without_all_deviations_are_certain(measures_db: str) -> None:
-    shaking, single = measured(*ALL), component("single")
-    block = (np.array([3.0]), np.array([0.1]))
-    certain = site_probability(shaking, *block, component=single, db=measures_db)
-    part = site_probability(
-        shaking, *block, component=single, db=measures_db, std_ln={"pga_g": np.array([0.5, 0.5])}
-    )
-    assert part.shaking.integrated == ()
-    assert part.probability.tolist() == certain.probability.tolist()
+@pytest.mark.parametrize(
+    ("names", "stated"),
+    [(ALL, "pga_g"), (("pga_g", "sa10_g"), "pga_g"), (("pga_g", "sa10_g"), "sa10_g")],
+)
+def test_one_deviation_alone_is_used(measures_db: str, names: tuple[str, ...], stated: str) -> None:
+    # grids of version 3 state that of PGA alone; the last case has a first measure that is certain
+    shaking, std = measured(*names), np.array([0.5, 0.5])
+    found = site_probability(
+        shaking, np.array([3.0]), np.array([0.1]), component=component("single"), db=measures_db,
+        std_ln={stated: std},
+    )  # fmt: skip
+    assert found.shaking.integrated == (stated,)
+    draws = np.exp(0.5 * np.random.default_rng(7).standard_normal((2, 100_000)))
+    shaken = {name: values[:, None] * np.ones_like(draws) for name, values in shaking.items()}
+    shaken[stated] = shaken[stated] * draws
+    chosen = found.shaking.model
+    own = {name: shaken[name] for name in chosen.term.inputs}
+    sampled = answer_given(chosen, {"p2": 3.0, "kr": 0.1, **own}, 0.95).probability
+    assert found.probability == pytest.approx(sampled.mean(axis=1), abs=0.004)
+    assert np.ptp(sampled, axis=1).min() > 0.1  # it matters
 
 
 def test_correlations_of_the_residuals() -> None:

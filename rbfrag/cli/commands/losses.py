@@ -44,7 +44,10 @@ OF_YEARS = ("largest_of_year", "sum_of_year", "beyond_effective_time")
 class JobFileOptions:
     """The exports of one job."""
 
-    gmf_data: str | None = option("File of ground motion fields.", metavar="FILE")
+    gmf_data: str | None = option(
+        "File of ground motion fields, CSV or HDF5 (gmf-data, which names the sites too).",
+        metavar="FILE",
+    )
     events: str | None = option("File of all events.", metavar="FILE")
     sitemesh: str | None = option("File of all sites.", metavar="FILE")
     realizations: str | None = option("File of the logic tree's weights.", metavar="FILE")
@@ -113,7 +116,8 @@ class LossTable:
 def losses(
     *,
     folder: str | None = argument(
-        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV.",
+        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV; "
+        "or its datastore calc_N.hdf5 (extra hdf5).",
         None,
         metavar="[FOLDER]",
     ),

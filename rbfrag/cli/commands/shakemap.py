@@ -17,13 +17,15 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.errors import InputError
 
 EXAMPLE = (
     "Example:  rbfrag shakemap grid.xml --height 2.4 --width 0.5 --out map.geojson --plot map.png"
 )
 
 TABLES = (".csv", ".xlsx", ".parquet")
-SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg")
+RASTERS = (".tif", ".tiff")
+SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg", *RASTERS)
 
 SHORT = (
     "event", "magnitude", "expected_failures", "probability_any", "places", "model", "file",
@@ -61,7 +63,9 @@ def shakemap(
     *,
     grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
     out: str = option(
-        "File to write: .geojson, .csv, .xlsx (extra excel), .parquet or .gpkg (extra gis).", ...
+        "File to write: .geojson, .csv, .xlsx (extra excel), .parquet, .gpkg or, of nodes, .tif "
+        "(extra gis).",
+        ...,
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     given: options.Block,
@@ -88,6 +92,11 @@ def shakemap(
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
     several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight"), one_kind=True)
+    if target.suffix.lower() in RASTERS and "lon" in several.columns:
+        raise InputError(
+            f"{target}: a GeoTIFF file takes the nodes of a grid, and these blocks have places of "
+            "their own: write .gpkg or .csv in its place"
+        )
     answer = answered(
         grid, blocks=several.question, uncertainty=meaning.uncertainty,
         component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
@@ -121,6 +130,10 @@ def _write(
         from rbfrag.exchange.points import write_geopackage
 
         write_geopackage(columns, "toppling_probability", target)
+    elif suffix in RASTERS:
+        from rbfrag.exchange.geotiff import write_geotiff
+
+        write_geotiff(columns, {**about, "warnings": None}, target)
     else:
         from rbfrag.exchange.points import write_points
 

@@ -1,13 +1,11 @@
-"""Event sets and scenarios as the OpenQuake engine exports them: five CSV files of one job."""
+"""Event sets and scenarios of the OpenQuake engine: five CSV files of one job, or its datastore."""
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import re
-import warnings
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.files import as_path, reading
+from rbfrag.exchange.openquake.datastore import SUFFIXES, stored_table
+from rbfrag.exchange.openquake.table import Table
+from rbfrag.files import as_path
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
 from rbfrag.hazards.measure_type import IntensityType, is_read, openquake_type, requested_measure
 from rbfrag.solver.results import FloatArray
@@ -37,41 +37,6 @@ _REALIZATION = ("rlz_id", "rlzi")
 _SITE_NAME = "custom_site_id"
 _SITE_NUMBER = ("site_id", "sid")
 _MEASURE = re.compile(r"gmv_(.+)")
-_STATED = re.compile(r"(\w+)\s*=\s*(?:'([^']*)'|([^,\s\"']+))")
-_ROWS = 1 << 18
-
-
-def _finite(text: str) -> float:
-    if not math.isfinite(value := float(text)):
-        raise ValueError(text)
-    return value
-
-
-def _whole(text: str) -> int:
-    if not -(2**63) <= (value := int(text)) < 2**63:
-        raise ValueError(text)
-    return value
-
-
-def _some(text: str) -> str:
-    if not text.strip():
-        raise ValueError(text)
-    return text
-
-
-_KINDS: Mapping[type, Callable[[str], object]] = {int: _whole, float: _finite, str: _some}
-_IN_WORDS = {int: "a whole number", float: "a number", str: "a name"}
-
-
-def _next(parts: Any, too_many_cells: type[Warning]) -> Any:
-    """Return the next part of a file, or None; a line with more cells than the first is an error.
-
-    pandas cuts such a line with a warning where it is the first of a part.
-    """
-    # numpy warns of a number beyond all integers, which pandas then refuses
-    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
-        warnings.simplefilter("error", too_many_cells)
-        return next(parts, None)
 
 
 @dataclass(frozen=True)
@@ -101,6 +66,7 @@ class JobFiles:
         """Return the files of a folder, or those that are named.
 
         Args:
+            folder: the folder, or in its place the datastore of the job, which holds everything.
             named: files that are named, by the fields of this class; they go before the folder.
 
         Raises:
@@ -109,11 +75,14 @@ class JobFiles:
         chosen = {name: Path(path) for name, path in (named or {}).items()}
         if folder is not None:
             place = as_path(folder, "folder", "the folder with the exports of one OpenQuake job")
-            if not place.is_dir():
+            if is_store := place.suffix.lower() in SUFFIXES and not place.is_dir():
+                chosen = {**dict.fromkeys(FILES, place), **chosen}
+            elif not place.is_dir():
                 raise InputError(
-                    f"{place} is no folder: name the folder with the exports of one OpenQuake job"
+                    f"{place} is no folder: name the folder with the exports of one OpenQuake job, "
+                    "or its datastore calc_N.hdf5"
                 )
-            present = sorted(path.name for path in place.iterdir())
+            present = [] if is_store else sorted(path.name for path in place.iterdir())
             for what, pattern in FILES.items():
                 if what in chosen:
                     continue
@@ -125,6 +94,8 @@ class JobFiles:
                     )
                 if fits:
                     chosen[what] = place / fits[0]
+        if (gmf_data := chosen.get("gmf_data")) and gmf_data.suffix.lower() in SUFFIXES:
+            chosen.setdefault("sitemesh", gmf_data)
         missing = [name for name in FILES if name not in chosen and name != "ruptures"]
         if missing:
             where = "" if folder is None else f" in {folder}"
@@ -137,130 +108,6 @@ class JobFiles:
     def paths(self) -> dict[str, Path]:
         """Return the files by what they hold."""
         return {name: path for name in FILES if (path := getattr(self, name)) is not None}
-
-
-@dataclass(frozen=True)
-class _Head:
-    """What stands above the data of a file.
-
-    Args:
-        path: the file.
-        stated: what the comment of its first line states, by name.
-        names: names of the columns.
-        lines: number of lines above the data.
-    """
-
-    path: Path
-    stated: Mapping[str, str]
-    names: tuple[str, ...]
-    lines: int
-
-    @classmethod
-    def of(cls, path: Path) -> _Head:
-        stated: dict[str, str] = {}
-        with reading(path, "an export of OpenQuake"), closing(_lines(path)) as lines:
-            for number, row in lines:
-                if row and row[0].lstrip().startswith("#"):
-                    matches = _STATED.finditer(",".join(row))
-                    stated |= {one.group(1): one.group(2) or one.group(3) or "" for one in matches}
-                    continue
-                names = tuple(cell.strip() for cell in row)
-                for name in names:
-                    if names.count(name) > 1:
-                        raise InputError(
-                            f"{path}, line {number}: the column {name!r} is there twice"
-                        )
-                return cls(path, stated, names, number)
-        raise InputError(f"{path}: ends before the names of the columns: export it again")
-
-    def column(self, choices: Sequence[str], *, needed: bool = True) -> str | None:
-        """Return which of some names a column has."""
-        name = next((name for name in choices if name in self.names), None)
-        if name is None and needed:
-            raise InputError(
-                f"{self.path}, line {self.lines}: there is no column {' or '.join(choices)}; the "
-                f"columns are {', '.join(self.names)}"
-            )
-        return name
-
-    def line(self, row: int | np.integer[Any]) -> str:
-        """Return the place of a row of data for messages."""
-        return f"{self.path}, line {self.lines + 1 + int(row)}"
-
-    def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
-        """Yield some columns, some hundred thousand rows at a time.
-
-        Raises:
-            InputError: a cell holds no such thing, or a line lacks cells; the message names it.
-        """
-        import pandas as pd
-
-        dtypes = {int: "int64", float: "float64", str: "str"}
-        kinds = {name: columns.get(name, str) for name in self.names}
-        with reading(self.path, "an export of OpenQuake"):
-            try:
-                with pd.read_csv(
-                    self.path, skiprows=self.lines, header=None, names=list(kinds),
-                    dtype={name: dtypes[kind] for name, kind in kinds.items()}, chunksize=_ROWS,
-                    keep_default_na=False, na_values=[], index_col=False, encoding="utf-8-sig",
-                ) as parts:  # fmt: skip
-                    while (part := _next(parts, pd.errors.ParserWarning)) is not None:
-                        cells = {name: part[name].to_numpy() for name in columns}
-                        for name in cells:
-                            if columns[name] is str:
-                                texts = part[name].fillna("").str.strip()
-                                cells[name] = texts.to_numpy(dtype=object)
-                                if (cells[name] == "").any():
-                                    raise ValueError(f"{name} is missing")
-                        yield cells
-            except pd.errors.EmptyDataError:
-                return
-            except (
-                ValueError,
-                OverflowError,
-                pd.errors.ParserError,
-                pd.errors.ParserWarning,
-            ) as error:
-                raise self._trouble(columns) or InputError(f"{self.path}: {error}") from None
-
-    def whole(self, columns: Mapping[str, type]) -> dict[str, NDArray[Any]]:
-        """Return some columns whole."""
-        with closing(self.read(columns)) as read:
-            parts = list(read)
-        empty = {int: np.int64, float: np.float64, str: object}
-        return {
-            name: np.concatenate([np.empty(0, dtype=empty[kind]), *(part[name] for part in parts)])
-            for name, kind in columns.items()
-        }
-
-    def _trouble(self, columns: Mapping[str, type]) -> InputError | None:
-        """Return the first line that cannot be read in words."""
-        place = {name: self.names.index(name) for name in columns}
-        for number, row in _lines(self.path):
-            where = f"{self.path}, line {number}"
-            if number <= self.lines or not row:
-                continue
-            if len(row) != len(self.names):
-                return InputError(f"{where}: {len(row)} cells under {len(self.names)} columns")
-            for name, kind in columns.items():
-                try:
-                    _KINDS[kind](row[place[name]])
-                except ValueError:
-                    return InputError(
-                        f"{where}: {name} is {row[place[name]]!r}, not {_IN_WORDS[kind]}"
-                    )
-        return None
-
-
-def _lines(path: Path) -> Generator[tuple[int, list[str]]]:
-    """Yield the rows of a file that may be large, each with the number of its last line."""
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.reader(file)
-        try:
-            for row in reader:
-                yield reader.line_num, row
-        except csv.Error as error:
-            raise InputError(f"{path}, line {reader.line_num}: not a CSV file: {error}") from None
 
 
 def read_events(
@@ -284,7 +131,11 @@ def read_events(
         InputError: the files are of different jobs, a file lacks a column, a row cannot be used, or
             nothing states how long the events took; the message names the line.
     """
-    heads = {name: _Head.of(path) for name, path in files.paths().items()}
+    heads = {
+        name: table
+        for name, path in files.paths().items()
+        if (table := _table(path, name)) is not None
+    }
     _refuse_other_jobs(heads)
     sites = _sites(heads["sitemesh"])
     weights, remarks = _weights(heads["realizations"])
@@ -306,7 +157,7 @@ def read_events(
 
 def measures_in(files: JobFiles) -> tuple[str, ...]:
     """Return the measures of a job's ground motion that models read, as OpenQuake names them."""
-    names = (_MEASURE.fullmatch(column) for column in _Head.of(files.gmf_data).names)
+    names = (_MEASURE.fullmatch(column) for column in _named(files.gmf_data, "gmf_data").names)
     return tuple(name.group(1) for name in names if name and is_read(name.group(1)))
 
 
@@ -318,7 +169,7 @@ def read_magnitudes(files: JobFiles) -> FloatArray | None:
     """
     if files.ruptures is None:
         return None
-    ruptures, events = _Head.of(files.ruptures), _Head.of(files.events)
+    ruptures, events = _named(files.ruptures, "ruptures"), _named(files.events, "events")
     ruptures.column(("mag",))
     known = ruptures.whole({str(ruptures.column(_RUPTURE)): int, "mag": float})
     number, magnitude = known.values()
@@ -336,19 +187,30 @@ def read_magnitudes(files: JobFiles) -> FloatArray | None:
     return np.asarray(magnitude[order][at][np.argsort(own[event], kind="stable")])
 
 
-def _refuse_other_jobs(heads: Mapping[str, _Head]) -> None:
+def _named(path: Path, what: str) -> Table:
+    table = _table(path, what)
+    if table is None:
+        raise InputError(f"{path} has no {what.replace('_', '-')}: name the file that has them")
+    return table
+
+
+def _table(path: Path, what: str) -> Table | None:
+    return stored_table(path, what) if path.suffix.lower() in SUFFIXES else Table.of(path)
+
+
+def _refuse_other_jobs(heads: Mapping[str, Table]) -> None:
     first = heads["gmf_data"]
     for head in heads.values():
         for name in ("checksum", "start_date"):
             one, other = first.stated.get(name), head.stated.get(name)
             if one is not None and other is not None and one != other:
                 raise InputError(
-                    f"{head.path}, line 1: {name} is {other}, and that of {first.path.name} is "
+                    f"{head.top}: {name} is {other}, and that of {first.path.name} is "
                     f"{one}: these are files of different jobs; name those of one"
                 )
 
 
-def _sites(head: _Head) -> tuple[str, ...]:
+def _sites(head: Table) -> tuple[str, ...]:
     name = head.column((_SITE_NAME, *_SITE_NUMBER), needed=False)
     if name is None:  # numbered from 0 on
         head.column((_SITE_NAME, *_SITE_NUMBER, "lon"))
@@ -366,7 +228,7 @@ def _sites(head: _Head) -> tuple[str, ...]:
     return tuple(ids)
 
 
-def _places(head: _Head) -> FloatArray | None:
+def _places(head: Table) -> FloatArray | None:
     """Return longitudes and latitudes of the sites [deg], shape (sites, 2); None without them."""
     if not {"lon", "lat"} <= {*head.names}:
         return None
@@ -374,7 +236,7 @@ def _places(head: _Head) -> FloatArray | None:
     return np.column_stack([columns["lon"], columns["lat"]])
 
 
-def _weights(head: _Head) -> tuple[dict[int, float], list[str]]:
+def _weights(head: Table) -> tuple[dict[int, float], list[str]]:
     name = str(head.column(_REALIZATION))
     head.column(("weight",))
     columns = head.whole({name: int, "weight": float})
@@ -396,7 +258,7 @@ def _weights(head: _Head) -> tuple[dict[int, float], list[str]]:
     return dict(zip(numbers, (values / total).tolist(), strict=True)), remarks
 
 
-def _events(head: _Head, weights: Mapping[int, float]) -> tuple[IntArray, IntArray, IntArray]:
+def _events(head: Table, weights: Mapping[int, float]) -> tuple[IntArray, IntArray, IntArray]:
     """Return number, realization and year of every event, by rising number."""
     names = [str(head.column(choices)) for choices in (_EVENT, _REALIZATION, ("year",))]
     columns = head.whole(dict.fromkeys(names, int))
@@ -422,7 +284,7 @@ def _events(head: _Head, weights: Mapping[int, float]) -> tuple[IntArray, IntArr
 
 
 def _duration(
-    heads: Mapping[str, _Head], year: IntArray, investigation_time: float | None, ses: int | None
+    heads: Mapping[str, Table], year: IntArray, investigation_time: float | None, ses: int | None
 ) -> Duration | None:
     """Return how long a realization lasts; None for a scenario, whose year is 0."""
     given = {"investigation_time": investigation_time, "ses_per_logic_tree_path": ses}
@@ -442,20 +304,19 @@ def _duration(
         try:
             value = float(text)
         except ValueError:
-            raise InputError(f"{ruptures.path}, line 1: {name} = {text!r} is no number") from None
+            raise InputError(f"{ruptures.top}: {name} = {text!r} is no number") from None
         if not 0.0 < value < math.inf:
-            raise InputError(f"{ruptures.path}, line 1: {name} = {text!r} is not above zero")
+            raise InputError(f"{ruptures.top}: {name} = {text!r} is not above zero")
         if known.setdefault(name, value) != value:
             raise InputError(
-                f"{ruptures.path}, line 1: {name} is {value:g}, given is {known[name]:g}: leave it "
-                "out"
+                f"{ruptures.top}: {name} is {value:g}, given is {known[name]:g}: leave it out"
             )
     missing = [name for name in given if name not in known]
     if missing:
         where = (
             "there is no file of ruptures"
             if ruptures is None
-            else f"{ruptures.path}, line 1 does not state {' and '.join(missing)}"
+            else f"{ruptures.top} does not state {' and '.join(missing)}"
         )
         raise InputError(
             f"{where}, which states how long the events took; without it no rate can be given: "
@@ -469,8 +330,8 @@ def _duration(
 
 
 def _shaking(
-    head: _Head,
-    mesh: _Head,
+    head: Table,
+    mesh: Table,
     sites: tuple[str, ...],
     event_id: IntArray,
     imts: Sequence[str],
@@ -517,7 +378,7 @@ def _shaking(
     return event[order], site[order], {name: values[order] for name, values in whole.items()}
 
 
-def _measure_columns(head: _Head, imts: Sequence[str]) -> dict[str, tuple[str, float]]:
+def _measure_columns(head: Table, imts: Sequence[str]) -> dict[str, tuple[str, float]]:
     """Return column and factor of each measure, by the name that `predict` has for it."""
     present: dict[IntensityType, str] = {}
     for column in head.names:
@@ -533,7 +394,7 @@ def _measure_columns(head: _Head, imts: Sequence[str]) -> dict[str, tuple[str, f
         if kind not in present:
             have = ", ".join(kind.imt for kind in present) or "none"
             raise InputError(
-                f"{head.path}, line {head.lines}: there is no column gmv_{kind.imt}; the measures "
+                f"{head.head}: there is no column gmv_{kind.imt}; the measures "
                 f"are {have}: choose with imt",
                 fields=("imt",),
             )
@@ -541,7 +402,7 @@ def _measure_columns(head: _Head, imts: Sequence[str]) -> dict[str, tuple[str, f
     return chosen
 
 
-def _event_places(head: _Head, numbers: IntArray, event_id: IntArray, row: int) -> IntArray:
+def _event_places(head: Table, numbers: IntArray, event_id: IntArray, row: int) -> IntArray:
     """Return which of the events, by rising number, each row is of."""
     places = np.searchsorted(event_id, numbers)
     absent = event_id[np.minimum(places, event_id.size - 1)] != numbers
@@ -555,7 +416,7 @@ def _event_places(head: _Head, numbers: IntArray, event_id: IntArray, row: int) 
 
 
 def _site_places(
-    head: _Head, texts: NDArray[Any], index: Mapping[str, int], row: int, mesh: _Head
+    head: Table, texts: NDArray[Any], index: Mapping[str, int], row: int, mesh: Table
 ) -> IntArray:
     """Return which of the sites each row is of."""
     places = np.fromiter((index.get(text, -1) for text in texts.tolist()), np.int64, texts.size)

@@ -1,0 +1,1 @@
+"""Jobs of the OpenQuake engine: what it exports, and what it stores."""

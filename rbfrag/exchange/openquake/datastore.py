@@ -1,0 +1,182 @@
+"""Tables of the OpenQuake engine, as its own HDF5 files hold them: calc_N.hdf5, gmf-data.hdf5."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.exchange.openquake.table import ROWS, Table
+from rbfrag.files import reading
+
+SUFFIXES = (".hdf5", ".h5")
+"""How names of HDF5 files end."""
+
+_WHAT = "the datastore of an OpenQuake job"
+_TIMES = ("investigation_time", "ses_per_logic_tree_path")
+_JOBS = {"checksum": "checksum32", "start_date": "date"}
+"""What tells jobs apart: names in the comments of exports, and those of the file's attributes."""
+_MOST_ROWS = 300
+"""Rows a byte of the file: packed ones of four bytes cannot take less; a damaged file states any
+number."""
+
+
+@dataclass(frozen=True)
+class StoredTable(Table):
+    """A table of an HDF5 file.
+
+    Args:
+        what: name of the group or dataset that it lies in.
+        size: number of rows.
+        members: where each column lies inside; an empty text is the dataset itself, None a number
+            from 0 on.
+    """
+
+    what: str = ""
+    size: int = 0
+    members: Mapping[str, str | None] = None  # type: ignore[assignment]
+
+    @property
+    def head(self) -> str:
+        """The place of the names of the columns."""
+        return f"{self.path}, {self.what}"
+
+    top = head
+
+    def line(self, row: int | np.integer[Any]) -> str:
+        """Return the place of a row of data for messages, from 1 on."""
+        return f"{self.head}, row {1 + int(row)}"
+
+    def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
+        """Yield some columns, some hundred thousand rows at a time.
+
+        Raises:
+            InputError: the file cannot be read, or a number is none; the message names the row.
+        """
+        with _opened(self.path) as file:
+            for start in range(0, self.size, ROWS):
+                some = slice(start, min(start + ROWS, self.size))
+                yield {name: self._cells(file, name, some, kind) for name, kind in columns.items()}
+
+    def _cells(self, file: Any, name: str, some: slice, kind: type) -> NDArray[Any]:
+        member, node = self.members[name], file[self.what]
+        if member is None:
+            return np.arange(some.start, some.stop)
+        values = np.asarray(_member(node, member)[some])
+        if kind is str:
+            texts = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
+            return texts.astype(str).astype(object)
+        if kind is float and not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise InputError(f"{self.line(some.start + row)}: {name} is {values[row]}, no number")
+        return values.astype(np.int64 if kind is int else np.float64)
+
+
+def stored_table(path: Path, what: str) -> StoredTable | None:
+    """Return a table of an HDF5 file by what it holds; None for the ruptures of a scenario.
+
+    The layout is that of the engine's version 3: ``gmf_data`` (one dataset a measure), ``events``
+    (compound), ``sitecol`` or ``complete`` (one dataset a column), ``weights`` of the realizations,
+    ``oqparam`` (JSON) with the times. A file of ground motion alone has the first and the sites.
+
+    Args:
+        path: calc_N.hdf5 or gmf-data.hdf5.
+        what: gmf_data, events, sitemesh, realizations or ruptures.
+
+    Raises:
+        InputError: no such file, or it does not hold that table.
+        MissingExtraError: h5py is not installed.
+    """
+    with _opened(path) as file:
+        stated = {name: str(file.attrs[own]) for name, own in _JOBS.items() if own in file.attrs}
+        if what == "ruptures":
+            return _times(path, file, stated)
+        if what == "sitemesh":
+            return _sites(path, file, stated)
+        node = _node(path, file, "weights" if what == "realizations" else what)
+        if what == "realizations":
+            if node.ndim != 1:
+                raise InputError(
+                    f"{path}, weights: of shape {node.shape}, one a realization wanted"
+                )
+            members: dict[str, str | None] = {"rlz_id": None, "weight": ""}
+            return _table(path, "weights", node.size, members, stated)
+        if what == "events":
+            members = {{"id": "event_id"}.get(name, name): name for name in node.dtype.names}
+            return _table(path, what, node.size, members, stated)
+        members = {name if name in ("eid", "sid") else f"gmv_{name}": name for name in node}
+        return _table(path, what, _member(node, "eid").size, members, stated)
+
+
+def _table(
+    path: Path, what: str, size: int, members: Mapping[str, str | None], stated: Mapping[str, str]
+) -> StoredTable:
+    if size > _MOST_ROWS * path.stat().st_size:
+        raise InputError(f"{path}, {what}: states {size:,} rows, more than the file can hold")
+    return StoredTable(path, stated, tuple(members), 0, what, size, members)
+
+
+def _sites(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable:
+    what = "complete" if "complete" in file else "sitecol"
+    node = _node(path, file, what)
+    name = "custom_site_id" if "custom_site_id" in node else "sids"
+    members = {"site_id" if name == "sids" else name: name, "lon": "lon", "lat": "lat"}
+    sids = _member(node, "sids")
+    table = _table(path, what, sids.size, members, stated)
+    if (sids[()] != np.arange(sids.size)).any():
+        raise InputError(f"{path}, {what}: the sites are not numbered from 0 on")
+    return table
+
+
+def _times(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable | None:
+    """Return the table of ruptures without its rows: what it states is how long events took."""
+    if "oqparam" not in file:
+        return None
+    settings = json.loads(file["oqparam"][()])
+    times = {name: str(settings[name]) for name in _TIMES if settings.get(name) is not None}
+    if not times:
+        return None
+    return _table(path, "oqparam", 0, {}, {**stated, **times})
+
+
+def _node(path: Path, file: Any, name: str) -> Any:
+    if name not in file:
+        what = "ground motion alone" if "gmf_data" in file else "another calculation"
+        raise InputError(
+            f"{path} has no {name!r}: it is a file of {what}; name calc_N.hdf5 of the event-based "
+            "or scenario job itself, or name the CSV files of what is missing (oq export … -e csv)"
+        )
+    return file[name]
+
+
+def _member(node: Any, name: str) -> Any:
+    """Return a column that slices can be taken of: of a group, or of a table in one dataset."""
+    if not name:
+        return node
+    return node.fields(name) if hasattr(node, "dtype") else node[name]
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtraError("HDF5 files of the OpenQuake engine need h5py", "hdf5") from None
+    with reading(path, _WHAT):
+        if not h5py.is_hdf5(path):
+            raise InputError(f"{path}: not an HDF5 file: name {_WHAT}, calc_N.hdf5")
+        try:
+            with h5py.File(path, "r") as file:
+                yield file
+        except InputError:
+            raise
+        # what h5py raises of a file that is damaged or of another layout
+        except (KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+            raise InputError(f"{path}: cannot be read as {_WHAT}: {error}") from None
