@@ -46,6 +46,7 @@ from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.recognise import read_motions
 from rbfrag.question.gmm_table import read_gmm_table
 from rbfrag.rockmasses.file import read_rock_mass
+from rbfrag.rockmasses.orientations import read_planes
 from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
 from tests.exchange.openquake_job import write_job
@@ -109,6 +110,7 @@ REALIZATIONS = (
     b"0,A~A,2.500000E-01\n1,B~A,7.500000E-01\n",
 )
 
+PLANES = (b"dip_deg,dip_direction_deg\n22,85\n18,97\n25,90\n",)
 GMM_TABLE = (b"rjb_km,PGV [cm/s],pgv_sigma,pgv_tau\n5,40,0.6,0.3\n20,20,0.65,0.35\n",)
 
 METADATA = (
@@ -266,6 +268,7 @@ READERS: tuple[Reader, ...] = (
     Reader("block CSV", ".csv", lambda: BLOCK_CSV, read_block),
     Reader("rock mass TOML", ".toml", lambda: ROCK_MASS_TOML, read_rock_mass),
     Reader("rock mass CSV", ".csv", lambda: ROCK_MASS_CSV, read_rock_mass),
+    Reader("measured planes", ".csv", lambda: PLANES, read_planes),
     Reader("hazard curve CSV", ".csv", lambda: HAZARD_CSV, read_hazard_curves),
     Reader("hazard curve JSON", ".json", lambda: HAZARD_JSON, read_hazard_curves),
     Reader("realizations", ".csv", lambda: REALIZATIONS, _read_weights),

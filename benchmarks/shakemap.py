@@ -18,8 +18,8 @@ import numpy as np
 
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.hazards.conversions import component
-from rbfrag.hazards.map_failures import DRAWS, Places, map_failures
-from rbfrag.hazards.site_probability import SiteProbability, site_probability
+from rbfrag.hazards.maps.map_failures import DRAWS, Places, map_failures
+from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
 
 T = TypeVar("T")
 

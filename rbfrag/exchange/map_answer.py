@@ -17,8 +17,8 @@ from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
-from rbfrag.hazards.map_failures import MapFailures, Places, map_failures
-from rbfrag.hazards.site_probability import site_probability
+from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
+from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of

@@ -145,7 +145,7 @@ class KernelBlocks:
         return high
 
 
-class Table(NamedTuple):
+class NodeTable(NamedTuple):
     """P of m blocks on nodes, and how it changes with the parameters.
 
     Args:
@@ -165,7 +165,7 @@ def _points(sigma: float) -> int:
 
 def table_of(
     blocks: KernelBlocks, grid: Grid, first: int, allowed: FloatArray, *, slopes: bool = True
-) -> Table:
+) -> NodeTable:
     """Return P of the blocks on the nodes of a grid from one on.
 
     Where P jumps at what mechanics allows, the two nodes about the jump get what makes a sum over
@@ -192,7 +192,7 @@ def table_of(
     def mean(each: FloatArray) -> FloatArray:
         return each[0] if draws == 1 else np.tensordot(blocks.weight, each, axes=1)
 
-    return Table(
+    return NodeTable(
         mean(p), tuple(mean(each) for each in by_parameter) if slopes else None, mean(outside)
     )
 
@@ -404,7 +404,7 @@ def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tu
         start += many
 
 
-def sums_of(blocks: KernelBlocks, table: Table, mass: SiteMass, first: int) -> list[FloatArray]:
+def sums_of(blocks: KernelBlocks, table: NodeTable, mass: SiteMass, first: int) -> list[FloatArray]:
     """Return rate, error, part from outside, gradient, rates in branches, and P at the ends.
 
     Args:

@@ -35,7 +35,7 @@ from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.hazards.uncertainty import (
     Ends,
-    Uncertainty,
+    MeanUncertainty,
     branch_ends,
     ends_by_name,
     rate_interval,
@@ -70,7 +70,7 @@ class Exceedance:
             of a scenario `share_interval`).
         knowledge: both ends of that by the uncertain parameters of the model.
         branches: rates that 5 and 95 % of the realizations do not exceed; None where that cannot
-            be told (:class:`~rbfrag.hazards.uncertainty.Uncertainty`).
+            be told (:class:`~rbfrag.hazards.uncertainty.MeanUncertainty`).
         largest_of_year: probability that the largest event of a year reaches it; None of a
             scenario.
         sum_of_year: probability that the sum over a year does; None of a scenario.
@@ -159,7 +159,7 @@ class LossAnswer(Tabular):
     any_fails: FloatArray
     bounds: FloatArray
     block_rates: FloatArray
-    uncertainty: Mapping[str, Uncertainty]
+    uncertainty: Mapping[str, MeanUncertainty]
     exceedance: Mapping[str, tuple[Exceedance, ...]]
     loss_exceedance: Mapping[str, tuple[Exceedance, ...]]
     quantiles: FloatArray
@@ -511,7 +511,7 @@ def _answer(
         bounds=means.bounds,
         block_rates=_of_rows(events, portfolio, means),
         uncertainty={
-            name: Uncertainty.of(events, values, half, level)
+            name: MeanUncertainty.of(events, values, half, level)
             for name, (values, half) in stated.items()
             if name != "annual_rate_any" or (len(laws) == 1 and not np.isnan(values).any())
         },

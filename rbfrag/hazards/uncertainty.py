@@ -24,7 +24,7 @@ _SEPARABLE = 0.5
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class MeanUncertainty:
     """What is not known of a mean of an event set.
 
     Args:
@@ -43,7 +43,7 @@ class Uncertainty:
     together: tuple[float, float, float] | None
 
     @classmethod
-    def of(cls, events: EventSet, values: FloatArray, half: float, level: float) -> Uncertainty:
+    def of(cls, events: EventSet, values: FloatArray, half: float, level: float) -> MeanUncertainty:
         """Return what is not known of the weighted sum of some values.
 
         Args:

@@ -155,7 +155,7 @@ def planes(
         base: plane of the base.
         back: plane of the back.
     """
-    from rbfrag.plots.stereonet import plot_planes
+    from rbfrag.plots.blocks.stereonet import plot_planes
     from rbfrag.solver.block.planes import plane_of
 
     if face is None or base is None:

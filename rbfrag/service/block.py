@@ -52,7 +52,7 @@ def add_routes(routes: APIRouter) -> None:
         It is described as for /v1/block, or by p2 and kr alone: then it is the rectangle on level
         ground that has them. A rectangle without phi is taken to be rough enough to topple.
         """
-        from rbfrag.plots.block import block_lines
+        from rbfrag.plots.blocks.block import block_lines
         from rbfrag.solver.stability.single import rectangle_r3_m, stability_as_dict
 
         body, result, kind, numbers = _drawn(query.given())

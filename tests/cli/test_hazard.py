@@ -385,4 +385,4 @@ def test_several_blocks_without_a_site_are_refused(refuses: Refuses, logic_tree:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA,3,0.1\nB,10,0.2\n")
     mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
     told = refuses("hazard", mean, "--blocks", "blocks.csv")
-    assert "it is not known which block stands where" in told
+    assert "nothing tells at which of them 2 of 2 blocks stand" in told

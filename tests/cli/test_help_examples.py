@@ -38,7 +38,7 @@ NO_SENTENCE = {
     "models check": "a table", "export nrml": "the file", "export pelicun": "the file",
     "motions add": "counts", **{f"plot {name}": "the file" for name in (
         "fit", "chart", "curve", "sensitivity", "calibration", "vertical", "spectrum", "response",
-        "modes", "rotation",
+        "modes", "rotation", "planes",
     )},
 }  # fmt: skip
 """Commands whose example prints something else, and what."""

@@ -105,7 +105,7 @@ def test_what_is_refused(refuses: Refuses, job: Path) -> None:
     )
     assert "--jobs" in refuses("losses", job, *blocks, "--jobs", "0")
     Path("blocks.csv").write_text("".join(BLOCKS.replace("0012", "12").splitlines(True)[:2]))
-    assert "stands at the site '12'" in refuses("losses", job, *blocks)
+    assert "stands at site '12'" in refuses("losses", job, *blocks)
 
 
 def test_a_scenario(shell: Shell, job: Path) -> None:

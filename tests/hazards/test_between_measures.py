@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
+from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
 from rbfrag.hazards.between_measures import component_of_velocity, factors_between, velocity_of
 from rbfrag.hazards.conversions import COMPONENTS
 

@@ -13,12 +13,12 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.conversions import component
-from rbfrag.hazards.map_failures import (
+from rbfrag.hazards.maps.map_failures import (
     MapFailures,
     Places,
     map_failures,
 )
-from rbfrag.hazards.site_probability import SiteProbability, site_probability
+from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row

@@ -12,7 +12,7 @@ from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.shaking_points import correlations
 from rbfrag.hazards import site_probability as site_module
 from rbfrag.hazards.conversions import component
-from rbfrag.hazards.site_probability import site_probability
+from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbfrag.hazards.spatial_field import EARTH_RADIUS_KM, SpatialField, correlation_range_km
+from rbfrag.hazards.maps.spatial_field import EARTH_RADIUS_KM, SpatialField, correlation_range_km
 
 FloatArray = NDArray[np.float64]
 

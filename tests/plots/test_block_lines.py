@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rbfrag.plots.block import block_lines
+from rbfrag.plots.blocks.block import block_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 

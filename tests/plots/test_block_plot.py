@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 
 from rbfrag.errors import InputError
 from rbfrag.plots import block as module
-from rbfrag.plots.block import plot_block
+from rbfrag.plots.blocks.block import plot_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 

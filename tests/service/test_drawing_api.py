@@ -2,7 +2,7 @@
 
 import pytest
 
-from rbfrag.plots.block import block_lines
+from rbfrag.plots.blocks.block import block_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 

@@ -90,7 +90,7 @@ def block(
     if unbacked and kind_of_mode(result.mode, back_fracture=False).free_standing:
         result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))
     if plot is not None:
-        from rbfrag.plots.block import plot_block
+        from rbfrag.plots.blocks.block import plot_block
 
         plot_block(body, result, plot)
     answer = stability_as_dict(body, result)
@@ -127,7 +127,7 @@ def _mesh(
     if about.out is not None:
         write_table(body.columns(), about.out, excel_text=about.excel_text)
     if plot is not None:
-        from rbfrag.plots.mesh_block import plot_mesh_block
+        from rbfrag.plots.blocks.mesh_block import plot_mesh_block
 
         plot_mesh_block(body, plot)
     answer = body.as_dict()

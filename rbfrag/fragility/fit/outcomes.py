@@ -62,6 +62,10 @@ class OutcomeRows:
         return grid
 
 
+_MOST_ALIKE = 1e11
+"""Condition number of the parameters' correlations from which on they are not told apart."""
+
+
 def fit_outcomes(
     data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
@@ -82,9 +86,13 @@ def fit_outcomes(
             variances = np.concatenate([np.diag(cr1), np.diag(naive)])
         except np.linalg.LinAlgError:
             variances = np.array([np.nan])
-    # a parameter that these blocks leave open has no variance that is one: rounding decides
-    # whether the matrix is singular
-    if not (np.isfinite(variances) & (variances >= 0.0)).all():
+    # a parameter that these blocks leave open has no variance that is one, or parameters vary
+    # together: rounding decides whether the matrix is singular
+    apart = bool((np.isfinite(variances) & (variances > 0.0)).all())
+    if apart:
+        sd = np.sqrt(np.diag(naive))
+        apart = float(np.linalg.cond(naive / np.outer(sd, sd))) < _MOST_ALIKE
+    if not apart:
         raise FitError(
             f"the blocks and {len(data.event_names)} earthquakes do not tell the {len(names)} "
             f"parameters of method {method.name} apart: simulate more block sizes (p²) or "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-from rbfrag.plots.block import draw_block
+from rbfrag.plots.blocks.block import draw_block
 from rbfrag.plots.chart import draw_chart
 from rbfrag.plots.curve import AXIS, draw_curve
 from rbfrag.plots.hazard import draw_contribution

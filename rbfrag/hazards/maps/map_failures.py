@@ -9,7 +9,7 @@ residual with the spatial correlation of Jayaram and Baker (2009), and s ξ the 
 component, independent from site to site. Residuals of several measures at a place correlate as in
 :func:`rbfrag.fragility.shaking.correlation`; they share the range of the first. Given the
 shaking the blocks fail by the copula of the model that answers, so that every block's P is the mean
-that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
+that :func:`rbfrag.hazards.maps.site_probability.site_probability` integrates.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.shaking_points import correlations
-from rbfrag.hazards.site_probability import SiteProbability
-from rbfrag.hazards.site_shaking import SiteShaking
-from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
+from rbfrag.hazards.maps.site_probability import SiteProbability
+from rbfrag.hazards.maps.site_shaking import SiteShaking
+from rbfrag.hazards.maps.spatial_field import SpatialField, correlation_range_km
 from rbfrag.hazards.standing_blocks import COPULA, normals_by_law
 from rbfrag.solver.results import FloatArray
 
@@ -198,7 +198,7 @@ def map_failures(
         draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
         between: β, 0 to 1.
         range_km: range of the within-event correlation [km]; None for that of the first measure
-            that the model reads (:func:`~rbfrag.hazards.spatial_field.correlation_range_km`).
+            that the model reads (:func:`~rbfrag.hazards.maps.spatial_field.correlation_range_km`).
 
     Raises:
         InputError: a number of draws, a seed or a share that makes no sense.

@@ -16,7 +16,7 @@ from rbfrag.fragility.shaking import Scatter
 from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.fragility.uncertain import UncertainModel
 from rbfrag.hazards.conversions import Component
-from rbfrag.hazards.site_shaking import SiteShaking
+from rbfrag.hazards.maps.site_shaking import SiteShaking
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.solver.results import FloatArray

@@ -41,7 +41,7 @@ class SiteShaking:
         std_ln: Mapping[str, FloatArray],
         model: FragilityModel,
     ) -> SiteShaking:
-        """Return the shaking of :func:`rbfrag.hazards.site_probability.site_probability`."""
+        """Return the shaking of :func:`rbfrag.hazards.maps.site_probability.site_probability`."""
         names = model.term.inputs
         given = integrated_deviations(names, std_ln)
         nothing = np.zeros(measures[names[0]].size)

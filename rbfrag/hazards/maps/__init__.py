@@ -1,0 +1,1 @@
+"""Failures of the blocks of a map of shaking in its earthquake."""

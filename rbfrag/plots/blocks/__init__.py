@@ -1,0 +1,1 @@
+"""Figures of blocks and of the planes that bound them."""
