@@ -10,8 +10,8 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.shaking_points import correlations
-from rbfrag.hazards import site_probability as site_module
 from rbfrag.hazards.conversions import component
+from rbfrag.hazards.maps import site_probability as site_module
 from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.patches import Polygon
 
 from rbfrag.errors import InputError
-from rbfrag.plots import block as module
+from rbfrag.plots.blocks import block as module
 from rbfrag.plots.blocks.block import plot_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability

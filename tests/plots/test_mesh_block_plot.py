@@ -7,7 +7,7 @@ import pytest
 
 import rbfrag
 from rbfrag.errors import InputError
-from rbfrag.plots import mesh_block as module
+from rbfrag.plots.blocks import mesh_block as module
 from rbfrag.plots.blocks.mesh_block import plot_mesh_block
 from tests.conftest import ROOT
 from tests.meshes import box, cut_ellipsoid, turned, write_obj

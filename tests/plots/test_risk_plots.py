@@ -24,7 +24,16 @@ LONG = "a name of costs of $5 and $6 that goes on " * 4
 def reached(values, years=1000.0):
     rates = 0.1 / np.arange(1, len(values) + 1)
     curve = tuple(
-        Exceedance(float(x), rate, 0.5 * rate, 2.0 * rate, rate, rate, rate < 1.0 / years)
+        Exceedance(
+            float(x),
+            rate,
+            (0.5 * rate, 2.0 * rate),
+            (0.9 * rate, 1.1 * rate),
+            None,
+            rate,
+            rate,
+            rate < 1.0 / years,
+        )  # fmt: skip
         for x, rate in zip(values, rates.tolist(), strict=True)
     )
     return SimpleNamespace(

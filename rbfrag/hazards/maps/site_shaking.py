@@ -83,10 +83,6 @@ def integrated_deviations(
 ) -> dict[str, FloatArray]:
     """Return the standard deviations that are integrated over of the measures that a model reads.
 
-    All or none, lest a measure varies while one that goes with it does not; PGA alone may be
-    missing beside PGV, which tells most.
+    Each measure varies by its own; one without is taken as certain.
     """
-    needed = names[:1] if names[0] == "pgv_m_s" else names
-    if not all(name in std_ln for name in needed):
-        return {}
     return {name: std_ln[name] for name in names if name in std_ln}
