@@ -33,7 +33,7 @@ def reached(values, years=1000.0):
             rate,
             rate,
             rate < 1.0 / years,
-        )  # fmt: skip
+        )
         for x, rate in zip(values, rates.tolist(), strict=True)
     )
     return SimpleNamespace(
