@@ -11,18 +11,20 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
+from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.hazards.event_set import EventSet, IntArray
 from rbfrag.hazards.kernel import KernelBlocks, half_width, sums_of, table_of
-from rbfrag.hazards.mass import Indices, cubic_at, event_mass
+from rbfrag.hazards.mass import Grid, Indices, Smoothing, cubic_at, event_mass
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import LevelShaking
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
 _BLOCKS_AT_ONCE = 256
-_SURE = 1.0 - 1e-16
+_SURE, _LEAST = 1.0 - 1e-16, 1e-12
 _MUCH = 1e3
 
 
@@ -105,6 +107,44 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     return EventMeans(
         failures, loss, bounds, blocks, half, float(whole[0]), float(whole[1])
     )  # fmt: skip
+
+
+def axes_of(row: ModelRow) -> FloatArray:
+    """Return the principal axes of a model's covariance in columns, one standard deviation long."""
+    variances, axes = np.linalg.eigh(np.array(row.covariance))
+    return np.asarray(np.sqrt(np.maximum(variances, 0.0)) * axes)
+
+
+def shifts_on(
+    portfolio: Portfolio, own: Indices, shaking: LevelShaking, grid: Grid, smoothing: Smoothing
+) -> FloatArray:
+    """Return by how much Φ⁻¹ of P differs one standard deviation along each axis of the errors.
+
+    To the first order: dP/db times the step over the normal density there.
+
+    Args:
+        own: rows of the portfolio, m of them.
+
+    Returns:
+        Axes of all models, one model after the other, x m x nodes; 0 for blocks of other models.
+    """
+    sizes = [len(row.coefficients) for row in portfolio.models]
+    result = np.zeros((sum(sizes), own.size, grid.size))
+    for places, blocks in _blocks_of(portfolio, own, np.zeros(portfolio.size, np.intp), shaking):
+        number = int(portfolio.model[places[0]])
+        first = sum(sizes[:number])
+        nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
+        table = table_of(blocks, grid, 0, nowhere)
+        assert table.slopes is not None
+        p = smoothing.of(table.probability)
+        known = (p > _LEAST) & (p < 1.0 - _LEAST)
+        z = ndtri(np.where(known, p, 0.5))
+        density = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
+        slopes = smoothing.of(np.stack(table.slopes))
+        by_axis = np.einsum("ka,kmn->amn", axes_of(portfolio.models[number]), slopes)
+        at = np.searchsorted(own, places)
+        result[first : first + sizes[number], at] = np.where(known, by_axis / density, 0.0)
+    return result
 
 
 def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:

@@ -25,7 +25,7 @@ from rbfrag.hazards.event_counts import (
     laws_of,
     shift_error,
 )
-from rbfrag.hazards.event_means import EventMeans, event_means
+from rbfrag.hazards.event_means import EventMeans, axes_of, event_means
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
 from rbfrag.hazards.kernel import interval_end
@@ -529,8 +529,7 @@ def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
     """
     result = []
     for number, row in enumerate(portfolio.models):
-        variances, axes = np.linalg.eigh(np.array(row.covariance))
-        for step in (np.sqrt(np.maximum(variances, 0.0)) * axes).T:
+        for step in axes_of(row).T:
             for side in (1.0, -1.0):
                 values = np.array(list(row.coefficients.values())) + side * step
                 moved = replace(
