@@ -581,8 +581,8 @@ def _of_rows(events: EventSet, portfolio: Portfolio, means: EventMeans) -> Float
     cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
     result = np.empty((4, portfolio.size))
     result[:, portfolio.row] = (
-        number * blocks[0], number * np.sqrt(blocks[1]), portfolio.count * cost * blocks[0],
-        number * means.block_half,
+        number * blocks[0], number * np.sqrt(np.maximum(blocks[1], 0.0)),
+        portfolio.count * cost * blocks[0], number * means.block_half,
     )  # fmt: skip
     if events.is_scenario:  # the scatter about the mean, of events that weigh alike
         spread = result[1] ** 2 - result[0] ** 2 / events.event_id.size

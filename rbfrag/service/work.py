@@ -146,6 +146,8 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     )
     meaning = query.model_dump(include={"convert", "convert_sigma", "component"})
     stated, how = query.question()
+    if (kind := how.pop("kind", None)) is not None:
+        stated["kind"] = kind
     given = {name: [value] * len(curves) for name, value in stated.items()}
     sites = np.arange(len(curves))
     rates = hazard_at_sites(

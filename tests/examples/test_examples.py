@@ -74,7 +74,7 @@ def test_any_fall_on_the_road(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     lines = run("annual_loss.py").splitlines()
     low, high = percent(next(line for line in lines if "any block of the road falls" in line))
     # an earthquake brings down many of the 53 blocks; their rates do not add up to it
-    assert 1.4 <= low < high <= 4.3
+    assert 1.1 <= low < high <= 4.3
     sites = [percent(line) for line in lines if ".csv falls:" in line]
     assert len(sites) == 2
     for known, together, apart in sites:
