@@ -52,7 +52,8 @@ def test_every_operation_documents_its_errors(client):
 
 
 NO_UNIT = {
-    "amplification", "amplification_sigma", "back", "base", "face", "mechanism", "pga_sigma", "pgv_sigma", "pgv_tau",
+    "amplification", "amplification_sigma", "back", "base", "face", "mechanism", "pga_sigma",
+    "pgv_sigma", "pgv_tau",
     "sa03_sigma", "sa10_sigma", "sa30_sigma",
     "component", "convert", "convert_sigma", "imt", "jrc", "kct", "kct_sigma", "kind", "kr",
     "kr_sigma", "ks", "ks_sigma", "ky", "ky_sigma", "level", "magnitude", "map", "model", "n",
