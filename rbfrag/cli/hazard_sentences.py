@@ -20,17 +20,6 @@ def several(number: int, what: str) -> str:
     return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
-def with_error(mean: float, error: float) -> str:
-    """Return a mean with its standard error, the error with two digits, and the mean as fine."""
-    if not error > 0.0:
-        return rounded(mean)
-    power = int(f"{error:.1e}".partition("e")[2])
-    if power < -6:
-        return f"{mean:.1e} ± {error:.0e}"
-    digits = max(1 - power, 0)
-    return f"{mean:,.{digits}f} ± {error:,.{digits}f}"
-
-
 def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values with three digits where they are no counts, names or yes and no."""
     return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.hazard_sentences import campaign_in_words, most_often, with_error
+from rbfrag.cli.hazard_sentences import campaign_in_words, most_often
 from rbfrag.cli.sentences import rock_mass_in_words, rounded, table_in_words
 from rbfrag.hazards.report import once_in, rate_in_words
 
@@ -40,20 +40,6 @@ def test_a_rate_with_its_interval_from_the_shorter_time_to_the_longer() -> None:
 )
 def test_three_digits(value: float, said: str) -> None:
     assert rounded(value) == said
-
-
-@pytest.mark.parametrize(
-    ("mean", "error", "said"),
-    [
-        (0.0051714, 0.00177519, "0.0052 ± 0.0018"),
-        (66.595, 22.7811, "67 ± 23"),
-        (12345.6, 987.6, "12,346 ± 988"),
-        (3.21e-9, 1.2e-9, "3.2e-09 ± 1e-09"),
-        (2.5, 0.0, "2.50"),
-    ],
-)
-def test_a_mean_has_as_many_digits_as_its_error(mean: float, error: float, said: str) -> None:
-    assert with_error(mean, error) == said
 
 
 @pytest.mark.parametrize(
