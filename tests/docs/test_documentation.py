@@ -162,3 +162,44 @@ def test_the_gallery_has_every_figure_with_its_line() -> None:
     assert subprocess.run([sys.executable, str(script), "--check"], check=False).returncode == 0
     shown = re.findall(r"\(figures/([^)]+)\)", (ROOT / "docs" / "gallery.md").read_text("utf-8"))
     assert sorted(shown) == sorted(path.name for path in (ROOT / "docs" / "figures").iterdir())
+
+
+def rows_of(text: str) -> list[list[str]]:
+    """Cells of the rows of Markdown tables."""
+    return [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in text.splitlines()
+        if line.startswith("|")
+    ]
+
+
+def test_readme_states_the_speeds_that_were_measured() -> None:
+    stored = ROOT / "benchmarks" / "results" / "performance" / "work-precision.md"
+    measured = {tuple(row[:2]): row for row in rows_of(stored.read_text(encoding="utf-8"))}
+    section = (ROOT / "README.md").read_text(encoding="utf-8").split("\n## ")
+    (speeds,) = [part for part in section if part.startswith("Fast")]
+    stated = [row[1:] for row in rows_of(speeds)[2:]]
+    for row, settings in zip(
+        stated,
+        [
+            ("rbfrag, p·h ≤ 0.03", "order 8"),
+            ("CVODE in Python", "rtol 1e-06"),
+            ("forward Euler", "dt/8"),
+        ],
+        strict=True,
+    ):
+        of_run = measured[settings]
+        assert row == [of_run[5], of_run[3]]
+
+
+def test_hard_cases_are_counted_as_their_table_has_them() -> None:
+    page = (ROOT / "docs" / "evidence" / "hard-cases.md").read_text(encoding="utf-8")
+    table = [row for row in rows_of(page) if row[0].startswith("`")]
+    tried, wrong = (sum(int(row[place]) for row in table) for place in (3, 4))
+    assert (tried, wrong) == (1625, 11)
+    for other in ("README.md", "docs/evidence/verification.md"):
+        assert f"{tried:,}" in (ROOT / other).read_text(encoding="utf-8")
+    words = "500 of them picked because they have none"
+    (without,) = [row for row in table if row[1] == "searches without certificate"]
+    assert without[6] == "500"
+    assert words in page
