@@ -140,7 +140,7 @@ def respond(
         if phi_deg is None:
             site = replace(site, phi_rad=0.5 * math.pi)
         remarks = _remarks(judged, model)
-        return answer(model, site, remarks)
+        return answer(model, site, remarks, judged.mode)
     numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
     model, site = known_by_numbers(kind, numbers, settings)
     return answer(model, site)
@@ -201,8 +201,14 @@ class _Shaken:
     gap_s: float | None
     start: BlockState | None
 
-    def answer(self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = ()) -> Response:
-        """Return what a model answers."""
+    def answer(
+        self,
+        model: Kind,
+        site: BlockOnPlanes,
+        remarks: tuple[str, ...] = (),
+        mode: ModeName | None = None,
+    ) -> Response:
+        """Return what a model answers about a block of a failure mode; None for the model's."""
         if self.start is not None and not model.carries_state:
             raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")
 
@@ -210,7 +216,10 @@ class _Shaken:
             motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
         ) -> Response:
             shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
-            return model.respond(site, shaking)
+            answer = replace(model.respond(site, shaking), mode=mode or model.mode)
+            if answer.started_s is None or answer.final_mode is not None:
+                return answer
+            return replace(answer, final_mode=model.mode)
 
         if not isinstance(self.motion, list | tuple):
             if self.gap_s is not None:

@@ -42,7 +42,7 @@ _PART = (
 
 SHORT = (
     "kind", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
-    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive",
+    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive", "toe_needs_deg", "toe_slips_g",
 )  # fmt: skip
 """Values that are shown without --verbose."""
 
