@@ -179,7 +179,7 @@ class FreeMotion:
         time_s, touch, backward = time_s[moving], touch[moving], velocities[2][moving] > 0.0
         does = 2 * touch.astype(np.int64) + backward
         first = np.flatnonzero(np.diff(does, prepend=-1))
-        last = np.append(first[1:], does.size) - 1
+        last = np.append(first, does.size)[1:] - 1
         changes: list[ModeChange] = []
         lasting = "", 0.0, 0.0
         for i, j in zip(first.tolist(), last.tolist(), strict=True):

@@ -103,8 +103,12 @@ class TestStreams:
             "block.kv": "kv",
             "friction.cohesion_pa": "cohesion_pa",
             "back.spacing_m": "s2_m",
+            "back.water_m": "water_m",
+            "friction.jrc": "jrc",
         }
         base = {**TABLE_3_4, "friction.phi_back_deg": 35.0, "block.density_kg_m3": 2700.0}
+        if key.startswith("friction.j"):
+            base |= {"friction.jrc": 8.0, "friction.jcs_mpa": 60.0}
         before = RockMass.of(base).realise(200, 9)
         low = 50.0 if key == "back.dip_deg" else 0.3
         changed = {"distribution": "uniform", "low": low, "high": low + 0.5}
