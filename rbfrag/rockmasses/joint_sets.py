@@ -142,8 +142,8 @@ class RockMass:
                 ``friction.jcs_mpa`` and perhaps ``friction.joint_length_m``,
                 ``friction.phi_residual_deg``, ``block.density_kg_m3`` (needed with cohesion, water
                 or roughness), ``block.size_factor``, ``block.kv``, ``block.back_fracture``,
-                ``realisations`` and ``seed`` may be left out. ``face.plane``, ``base.plane`` and ``back.plane``,
-                each dip/dip direction or a list of such, stand for the dips.
+                ``realisations`` and ``seed`` may be left out. ``face.plane``, ``base.plane`` and
+                ``back.plane``, each dip/dip direction or a list of such, stand for the dips.
 
         Raises:
             InputError: a key is missing, unknown or has an impossible value; it is named.

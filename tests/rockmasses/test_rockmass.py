@@ -214,6 +214,8 @@ class TestImpossible:
         ({"block__kv": normal(-0.5, 0.5)}, 7),
         ({"friction__cohesion_pa": normal(9.0, 9.0), "block__density_kg_m3": 2700.0}, 8),
         ({"block__density_kg_m3": normal(9.0, 9.0)}, 9),
+        ({"back__water_m": normal(0.1, 0.1), "block__density_kg_m3": 2650.0}, 10),
+        ({"back__water_m": 9.0, "block__density_kg_m3": 2650.0}, 11),
     )
 
     @pytest.mark.parametrize(("changes", "code"), CASES)
