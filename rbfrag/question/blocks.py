@@ -26,7 +26,6 @@ from rbfrag.question.fields import (
     names_of,
 )
 from rbfrag.question.shapes import (
-    AFTER_SLIP,
     BOND,
     FRICTION_MISSING,
     IS_PLANE,
@@ -39,9 +38,7 @@ from rbfrag.question.shapes import (
     PLANES,
     SHAPES,
     SIDES_AND_PLANES,
-    SLIPS_ON,
     SPACE,
-    UNSTABLE_AT_REST,
     WAYS,
     ModeShapes,
     check_ranges,
@@ -51,7 +48,6 @@ from rbfrag.question.shapes import (
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
-from rbfrag.solver.stability.modes import words_of_mode
 
 if TYPE_CHECKING:
     import numpy as np
@@ -289,18 +285,6 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name != "kv"}
 
 
-def slipped(planes: Mapping[str, Any], residual_deg: float) -> dict[str, Any]:
-    """Return planes after the first slip: dry, without bond or roughness.
-
-    Args:
-        planes: planes by field.
-        residual_deg: friction angle that is left on base and back [deg].
-    """
-    ended = {*BOND, *JOINT, "phi_back_deg"}
-    left = {name: value for name, value in planes.items() if name not in ended}
-    return {**left, "phi_deg": residual_deg}
-
-
 class _One:
     """Raises the first reason against a single block, with what is suspicious about its angles."""
 
@@ -370,6 +354,7 @@ def one_block(
         if kind in (None, block.kind):  # what another kind reads the choice of its model says
             check_numbers(block.kind, block, given)
         return Blocks((Group(kind, given),), unread)
+    from rbfrag.solver.stability.first_slip import after_first_slip
     from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged
 
@@ -389,16 +374,9 @@ def one_block(
     planes = shape.rough()
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
-    residual_deg = planes.pop("phi_residual_deg", None)
+    planes, after = after_first_slip(shape.block, planes)
     finding, *_ = judged(shape.block, **planes)
     listener = _One(shape.remarks)
-    if residual_deg is not None:
-        first_slip = {"k": finding.k, "mode": words_of_mode(finding.mode)}
-        listener.unstable(finding.k <= 0.0, UNSTABLE_AT_REST, **first_slip)
-        planes = slipped(planes, residual_deg)
-        finding, *_ = judged(shape.block, **planes)
-        listener.refuse(finding.k <= 0.0, SLIPS_ON, "phi_residual_deg", **first_slip)
-        listener.remark(True, AFTER_SLIP)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     numbers_read = numbers_of_shape(
         facts,
@@ -412,7 +390,7 @@ def one_block(
         listener,
     )  # fmt: skip
     remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
-    remarks += listener.remarks
+    remarks += [*after, *listener.remarks]
     remarks += [*shape.remarks, *unread]
     if (
         pga_g is not None

@@ -25,7 +25,6 @@ from rbfrag.question.blocks import (
     requested_kind,
 )
 from rbfrag.question.shapes import (
-    AFTER_SLIP,
     BOND,
     FRICTION_MISSING,
     JOINT,
@@ -35,7 +34,6 @@ from rbfrag.question.shapes import (
     PLANES,
     RECTANGLE,
     SHAPES,
-    SLIPS_ON,
     SPACE,
     UNSTABLE_AT_REST,
     ModeShapes,
@@ -46,6 +44,7 @@ from rbfrag.question.shapes import (
 from rbfrag.solver.block.arrays import REASONS, BlockArray
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
+from rbfrag.solver.stability.first_slip import AFTER_SLIP, SLIPS_ON
 from rbfrag.solver.stability.modes import MODES, words_of_mode
 
 _IF_EMPTY = {"beta_deg": 0.0}

@@ -23,6 +23,7 @@ from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise,
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
 from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
+from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, UPLIFT, slips_on_base
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 
 if TYPE_CHECKING:
@@ -77,34 +78,9 @@ SLIDES = (
     "the block slides (yield {k:.2g} g): state displacement_m, the displacement that is too far"
 )
 
-_LEFT = "state phi_residual_deg, the friction angle that is left, for the answer after it"
-
 COHESIVE = (
     "cohesion_pa does not go with {kind}: the first motion breaks a bond, which the model does not "
-    f"describe: {_LEFT}"
-)
-
-UPLIFT = (
-    "water_m does not go with a probability of {kind}: uplift ends with the first slip (yield "
-    "{k:.4g} g, {mode}), which opens the fracture, and no displacement or probability follows from "
-    f"it: {_LEFT}"
-)
-
-ROUGH = (
-    "jrc does not go with a probability of {kind}: roughness ends with the first slip (yield "
-    "{k:.4g} g, {mode}), and no displacement or probability follows from it: "
-    f"{_LEFT}"
-)
-
-SLIPS_ON = (
-    "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "
-    "it fails where the motion exceeds that yield, and no model is needed"
-)
-
-AFTER_SLIP = (
-    "the answer is that of the block after its first slip, dry and without bond or roughness, on "
-    "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
-    "and a motion below that does nothing"
+    f"describe: {STATE_RESIDUAL}"
 )
 
 NO_UNIQUE_MOTION = (
@@ -302,8 +278,7 @@ def numbers_of_shape(
         return {}
     listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
     listener.refuse(judged.wet, UPLIFT, "water_m", "phi_residual_deg", **words)
-    # a topple turns about its toe whatever its base
-    if facts.free_standing or "p2" not in facts.parameters:
+    if slips_on_base(facts):
         listener.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
         listener.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
     if "ky" in facts.parameters:

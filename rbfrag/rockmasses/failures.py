@@ -175,10 +175,24 @@ def failures_as_dict(
                 "pgv_m_s": each.scale * shaking.motion.pgv_m_s,
                 "modes": {mode: _counts(of_mode) for mode, of_mode in each.modes.items()},
                 "all": _counts(each.total),
+                "final_modes": final_modes(shaken, i),
             }
-            for each in scales
+            for i, each in enumerate(scales)
         ],
     }
+
+
+def final_modes(shaken: ShakenMass, i: int) -> dict[ModeName, dict[str, int]]:
+    """Return how many blocks of each mode end in which at one scale; ``none``: never moved."""
+    names = (*MODES, "none")
+    table = {}
+    for mode in MODES:
+        blocks = shaken.realisations.of_mode(mode)
+        if blocks.any():
+            ends = shaken.final_code[i, blocks] % len(names)
+            counts = np.bincount(ends, minlength=len(names)).tolist()
+            table[mode] = dict(zip(names, counts, strict=True))
+    return table
 
 
 def failure_warnings(shaken: ShakenMass) -> list[str]:
@@ -218,6 +232,7 @@ def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
         "scale": np.repeat(scales, n),
         "pga_g": np.repeat(shaken.pga_g, n),
         "outcome": names[shaken.code.reshape(-1)],
+        "final_mode": np.array([*MODES, ""], dtype=object)[shaken.final_code.reshape(-1)],
         "displacement_m": shaken.displacement_m.reshape(-1),
         "rotation_deg": np.degrees(shaken.rotation_rad.reshape(-1)),
         "reason": np.tile(reason, m),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,13 @@ from rbfrag.rockmasses.distributions import Distribution
 from rbfrag.rockmasses.orientations import in_section
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
+from rbfrag.solver.stability.arrays import (
+    FLOATS,
+    StabilityArray,
+    stability_arrays,
+    water_held_m,
+)
+from rbfrag.solver.stability.joint import NO_FRACTURE, refuse_half
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 
 REALISATIONS = 20_000
@@ -69,13 +75,23 @@ VARIABLES: dict[str, Variable] = {
     "block.kv": Variable(7, -1.0, math.inf, default=0.0),
     "friction.cohesion_pa": Variable(8, 0.0, math.inf, from_low=True),
     "block.density_kg_m3": Variable(9, 0.0, math.inf),
+    "back.water_m": Variable(10, 0.0, math.inf, from_low=True),
+    "friction.jrc": Variable(11, 0.0, math.inf, from_low=True),
+    "friction.jcs_mpa": Variable(12, 0.0, math.inf),
+    "friction.joint_length_m": Variable(13, 0.0, math.inf),
+    "friction.phi_residual_deg": Variable(14, 0.0, 90.0, from_low=True),
 }
 """The variables of a rock mass by their keys."""
 
 _SETTINGS = ("block.back_fracture", "realisations", "seed")
 _BACK_FRICTION = "friction.phi_back_deg"
 _COHESION, _DENSITY = "friction.cohesion_pa", "block.density_kg_m3"
-_OPTIONAL = (_BACK_FRICTION, _COHESION, _DENSITY)
+_WATER, _RESIDUAL = "back.water_m", "friction.phi_residual_deg"
+_ROUGHNESS = ("friction.jrc", "friction.jcs_mpa", "friction.joint_length_m")
+ENDING = (_COHESION, _WATER, _ROUGHNESS[0])
+"""Variables that end with the first slip of a block."""
+
+_OPTIONAL = (_BACK_FRICTION, _COHESION, _DENSITY, _WATER, *_ROUGHNESS, _RESIDUAL)
 
 IMPOSSIBLE = (
     "",
@@ -88,6 +104,8 @@ IMPOSSIBLE = (
     "kv is not above -1 g",
     "the cohesion is below zero",
     "the density is not above zero",
+    "water, roughness or residual friction is not in its range",
+    "the water lifts the block off its base: it floats",
     "the planes make a sliver without thickness (alpha1 is not below alpha3)",
 )
 """Why a realisation is no block, by its reason code; 0 for one that is."""
@@ -120,10 +138,12 @@ class RockMass:
         Args:
             description: keys such as ``base.dip_deg`` with a number or the keys of a
                 :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
-                ``friction.cohesion_pa``, ``block.density_kg_m3`` (needed with a cohesion),
-                ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
-                and ``seed`` may be left out. ``face.plane``, ``base.plane`` and ``back.plane``,
-                each dip/dip direction or a list of such, stand for the dips.
+                ``friction.cohesion_pa``, ``back.water_m``, ``friction.jrc`` with
+                ``friction.jcs_mpa`` and perhaps ``friction.joint_length_m``,
+                ``friction.phi_residual_deg``, ``block.density_kg_m3`` (needed with cohesion, water
+                or roughness), ``block.size_factor``, ``block.kv``, ``block.back_fracture``,
+                ``realisations`` and ``seed`` may be left out. ``face.plane``, ``base.plane`` and
+                ``back.plane``, each dip/dip direction or a list of such, stand for the dips.
 
         Raises:
             InputError: a key is missing, unknown or has an impossible value; it is named.
@@ -144,14 +164,18 @@ class RockMass:
                     f"{key} is missing: give a number, or a table such as "
                     "{ distribution = 'normal', mean = …, sd = … }"
                 )
-        if _COHESION in variables and _DENSITY not in variables:
+        weighed = [key for key in ENDING if key in variables]
+        if weighed and _DENSITY not in variables:
             raise InputError(
-                f"{_COHESION} needs {_DENSITY}, the density of the rock (about 2700 kg/m³): its "
+                f"{weighed[0]} needs {_DENSITY}, the density of the rock (about 2700 kg/m³): its "
                 "effect is that of a stress over the weight"
             )
+        refuse_half(*(variables.get(key) for key in _ROUGHNESS))
         back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
             raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
+        if _WATER in variables and not back_fracture:
+            raise InputError(NO_FRACTURE)
         return cls(
             variables,
             back_fracture,
@@ -184,13 +208,23 @@ class RockMass:
         """
         n = self.realisations if n is None else checked_count(n, "n")
         seed = self.seed if seed is None else checked_seed(seed, "seed")
-        drawn = self.draw(n, seed)
+        return self.blocks_of(self.draw(n, seed), seed)
+
+    def blocks_of(self, drawn: Mapping[str, FloatArray], seed: int = SEED) -> Realisations:
+        """Return the blocks of values of every variable, shape (n,) each.
+
+        Water that would stand above the top of a fracture fills it.
+        """
+        n = drawn["base.dip_deg"].size
         factor, phi = drawn["block.size_factor"], drawn["friction.phi_deg"]
         beta, back_dip = drawn["base.dip_deg"], drawn["back.dip_deg"]
         s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor
         phi_back = drawn.get(_BACK_FRICTION, phi)
         gamma = back_dip - beta
-        cohesion, density = drawn.get(_COHESION, np.zeros(n)), drawn.get(_DENSITY, np.ones(n))
+        density = drawn.get(_DENSITY, np.ones(n))
+        cohesion, water, jrc = (drawn.get(key, np.zeros(n)) for key in ENDING)
+        jcs, length = (drawn.get(key, np.ones(n)) for key in _ROUGHNESS[1:])
+        residual = drawn.get(_RESIDUAL, np.zeros(n))
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
         for code, valid in enumerate(
@@ -204,25 +238,31 @@ class RockMass:
                 drawn["block.kv"] > -1.0,
                 cohesion >= 0.0,
                 density > 0.0,
+                (water >= 0.0)
+                & (jrc >= 0.0)
+                & (jcs > 0.0)
+                & (length > 0.0)
+                & (residual >= 0.0)
+                & (residual < 90.0),
             ),
             start=1,
         ):
             reason[~valid & (reason == 0)] = code
         possible = reason == 0
         blocks = BlockArray.from_fractures(np.where(possible, s1, np.nan), s2, gamma)
+        water = water_held_m(water, s1_m=s1, gamma_deg=gamma, beta_deg=beta)
+        on: dict[str, Any] = {
+            "beta_deg": beta, "kv": drawn["block.kv"], "back_fracture": self.back_fracture,
+        }  # fmt: skip
+        strength = {_COHESION: cohesion, _WATER: water, **{k: drawn.get(k) for k in _ROUGHNESS}}
+        stated: dict[str, Any] = {k.split(".")[1]: strength[k] for k in strength if k in drawn}
         stability = stability_arrays(
-            blocks,
-            beta_deg=beta,
-            phi_deg=phi,
-            phi_back_deg=phi_back,
-            kv=drawn["block.kv"],
-            back_fracture=self.back_fracture,
-            cohesion_pa=cohesion if _COHESION in drawn else None,
-            density_kg_m3=density,
+            blocks, phi_deg=phi, phi_back_deg=phi_back, density_kg_m3=density, **on, **stated
         )
-        reason[possible & ((stability.reason_code != 0) | ~(stability.p2 > 0.0))] = (
-            len(IMPOSSIBLE) - 1
-        )
+        afloat = possible & (stability.reason_code == FLOATS)
+        sliver = possible & ((stability.reason_code != 0) | ~(stability.p2 > 0.0))
+        reason[sliver] = len(IMPOSSIBLE) - 1
+        reason[afloat] = len(IMPOSSIBLE) - 2
         realisations = Realisations(
             rock_mass=self,
             seed=seed,
@@ -234,10 +274,19 @@ class RockMass:
             phi_back_deg=phi_back,
             kv=drawn["block.kv"],
             cohesion_pa=cohesion,
+            water_m=water,
+            jrc=jrc,
             blocks=blocks,
             stability=stability,
             reason_code=reason,
         )
+        if _RESIDUAL in drawn:
+            nothing, left = np.zeros(n), stability_arrays(blocks, phi_deg=residual, **on)
+            after = replace(
+                realisations, stability=left, phi_deg=residual, phi_back_deg=residual,
+                cohesion_pa=nothing, water_m=nothing, jrc=nothing,
+            )  # fmt: skip
+            realisations = replace(realisations, after_slip=after)
         if realisations.n_blocks == 0:
             raise InputError(f"none of {n} realisations is a block: {realisations.why_impossible}")
         return realisations
@@ -256,8 +305,12 @@ class Realisations:
         phi_back_deg: friction angle of the back [deg].
         kv: vertical acceleration of the ground [g].
         cohesion_pa: cohesion of the base [Pa]; 0 where the description states none.
+        water_m: height of the water in the back fracture above the heel [m]; 0 likewise.
+        jrc: joint roughness coefficient of the base; 0 likewise.
         stability: the modes of the blocks, states and yield accelerations.
         reason_code: why a realisation is no block, a place in :data:`IMPOSSIBLE`.
+        after_slip: the same blocks on their residual friction, dry and without bond or roughness;
+            None where the description states no residual friction.
     """
 
     rock_mass: RockMass
@@ -270,9 +323,17 @@ class Realisations:
     phi_back_deg: FloatArray
     kv: FloatArray
     cohesion_pa: FloatArray
+    water_m: FloatArray
+    jrc: FloatArray
     blocks: BlockArray
     stability: StabilityArray
     reason_code: NDArray[np.int8]
+    after_slip: Realisations | None = None
+
+    @property
+    def in_time(self) -> Realisations:
+        """The blocks as what follows their first slip sees them."""
+        return self.after_slip or self
 
     @property
     def n(self) -> int:
@@ -321,9 +382,14 @@ class Realisations:
             )
 
     @property
-    def bonded(self) -> NDArray[np.bool_]:
-        """Whether a realisation is a block whose base has cohesion, shape (n,)."""
-        return self.is_block & (self.cohesion_pa > 0.0)
+    def ends_with_slip(self) -> NDArray[np.bool_]:
+        """Whether the strength of a block ends with its first slip, shape (n,).
+
+        That of a topple, which turns about its toe whatever bond or roughness, does by water alone.
+        """
+        on_base = (self.cohesion_pa > 0.0) | (self.jrc > 0.0)
+        topples = self.stability.mode_code == MODES.index("topple")
+        return np.asarray(self.is_block & ((self.water_m > 0.0) | (on_base & ~topples)))
 
     @property
     def kr_at_rest(self) -> FloatArray:

@@ -141,8 +141,9 @@ def block_columns(
         **{name: getattr(realisations, name) for name in DRAWN},
         "r3_m": only_blocks(realisations.blocks.r3_m),
     }
-    if realisations.bonded.any():
-        columns["cohesion_pa"] = realisations.cohesion_pa
+    for name in ("cohesion_pa", "water_m", "jrc"):
+        if np.any(getattr(realisations, name)[is_block]):
+            columns[name] = getattr(realisations, name)
     if answer is None:
         return columns | {"reason": realisations.reason}
     return columns | {name: getattr(answer, name) for name in ANSWERS}
@@ -152,10 +153,11 @@ def toppling_blocks(
     realisations: Realisations,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Return p² [1/s²] and k_r of the stable toppling blocks, and their share of all blocks."""
-    stability = realisations.stability
-    chosen = realisations.of_mode("topple", "stable") & (realisations.kr_at_rest > 0.0)
+    stands, after = realisations.stability.yield_acceleration > 0.0, realisations.in_time
+    chosen = after.of_mode("topple", "stable") & (after.kr_at_rest > 0.0) & stands
+    chosen &= ~after.ends_with_slip
     share = float(chosen.sum()) / max(realisations.n_blocks, 1)
-    return stability.p2[chosen], realisations.kr_at_rest[chosen], share
+    return after.stability.p2[chosen], after.kr_at_rest[chosen], share
 
 
 def _names(

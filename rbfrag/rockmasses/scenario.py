@@ -25,13 +25,16 @@ from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.kinds import kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
+from rbfrag.solver.stability.modes import MODES, STABLE, UNSTABLE, ModeName
 
 MODELLED: tuple[ModeName, ...] = ("topple",)
 """Modes that a fragility model answers for."""
 
 UNCOVERED = "no fragility model for this mode"
 BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
+ENDS = "water or roughness: it ends with the first slip, and no probability follows from it"
+AFTER = "; friction.phi_residual_deg, the friction that is left, gives an answer after it"
+SLIPS_ON = "after its first slip it does not stand on friction.phi_residual_deg"
 LOCKED = "locked: no horizontal acceleration moves it in this mode"
 
 
@@ -134,8 +137,10 @@ def scenario(
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
     fragility model. With `displacement_m` a stable block that slides has the probability of
     sliding further than that, and one that slumps or topples confined that of failing past
-    recovery, unless its base has cohesion: that bond breaks at the first slip. All others have no
-    answer and are left out of every average; the answer says how many they are.
+    recovery, unless its base has cohesion: that bond breaks at the first slip, as uplift by water
+    and roughness end. Where the rock mass states a residual friction, blocks are answered for as
+    they are after it. All others have no answer and are left out of every average; the answer says
+    how many they are.
 
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
@@ -163,13 +168,17 @@ def scenario(
     realisations.refuse_vertical()
     stability = realisations.stability
     unstable = realisations.is_block & (stability.state_code == UNSTABLE)
-    topples = realisations.of_mode("topple", "stable")
+    after = realisations.in_time
+    described = (stability.state_code == STABLE) & ~after.ends_with_slip
+    topples = after.of_mode("topple", "stable") & described
 
     columns = np.full((5, realisations.n), np.nan)
     probability, low, high, event_low, event_high = columns
     in_domain = np.zeros(realisations.n, dtype=np.bool_)
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
-    reason[realisations.bonded] = BONDED
+    reason[after.ends_with_slip] = BONDED
+    reason[after.ends_with_slip & ((after.water_m > 0.0) | (after.jrc > 0.0))] = ENDS
+    reason[realisations.is_block & (after.stability.state_code == UNSTABLE)] = SLIPS_ON
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
     columns[:3, unstable] = 1.0
     reason[unstable] = "unstable"
@@ -183,8 +192,7 @@ def scenario(
     answer: PredictionArray | None = None
     if topples.any():
         chosen = find_model(model, measures, db)
-        kr = realisations.kr_at_rest[topples]
-        toppling = {"p2": stability.p2[topples], "kr": kr}
+        toppling = {"p2": after.stability.p2[topples], "kr": after.kr_at_rest[topples]}
         predicted = answer_given(chosen, {**toppling, **measures}, level)
         assert isinstance(predicted, PredictionArray)
         answer = predicted
@@ -194,13 +202,14 @@ def scenario(
     others: dict[ModeName, str] = {}
     if displacement_m is not None:
         for mode, blocks, answers in _other_modes(
-            realisations, measures, displacement_m, rotation_deg, level, db
+            after, described, measures, displacement_m, rotation_deg, level, db
         ):
             modelled.add(mode)
             others[mode] = answers.model
             fill(blocks, answers)
-        # their models exist, but not for a bond
-        modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & (reason == BONDED))}
+        # their models exist, but not for what ends with the first slip
+        ended = np.isin(reason, (BONDED, ENDS, SLIPS_ON))
+        modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & ended)}
 
     covered = np.isfinite(probability)
     modes = []
@@ -222,8 +231,11 @@ def scenario(
     missing = {m.mode: (m.count - m.covered.count) / realisations.n_blocks for m in modes}
     missing = {mode: share for mode, share in missing.items() if share > 0.0}
     warnings = _warnings(missing, reason[topples], modelled)
-    if bonded := int(np.count_nonzero(reason == BONDED)):
-        warnings.append(f"{bonded} blocks without an answer: {BONDED}")
+    for text in (BONDED, ENDS, SLIPS_ON):
+        if count := int(np.count_nonzero(reason == text)):
+            warnings.append(
+                f"{count} blocks without an answer: {text}{AFTER if text == ENDS else ''}"
+            )
     return Scenario(
         measures=measures,
         model=getattr(answer, "model", None),
@@ -248,6 +260,7 @@ def scenario(
 
 def _other_modes(
     realisations: Realisations,
+    described: NDArray[np.bool_],
     measures: Mapping[str, float],
     displacement_m: float,
     rotation_deg: float | None,
@@ -266,7 +279,7 @@ def _other_modes(
         if name in measures
     }
     k, beta_deg = realisations.stability.yield_acceleration, realisations.beta_deg
-    described = (k > 0.0) & ~realisations.bonded
+    described = described & (k > 0.0)
     slides = realisations.of_mode("slide", "stable") & described
     slide = {"ky": k[slides], "beta_deg": beta_deg[slides], "displacement_m": distance}
     questions: list[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]] = [("slide", slides, slide)]

@@ -34,14 +34,17 @@ OUTCOMES = (
 rest, whatever the motion; ``locked``: no horizontal acceleration moves it in its mode;
 ``undetermined``: closer to failure than the error of its run; ``contact_lost``,
 ``indeterminate`` and ``jump``: the model ended before the block did, for the reason of that
-outcome; ``bond_breaks``: the motion exceeds the yield of a base with cohesion, whose bond the
-first slip breaks.
+outcome; ``bond_breaks``: the motion exceeds the yield of a block whose bond, uplift by water or
+roughness ends with the first slip.
 """
 
 AT_REST, STAYS, FAILS, UNSTABLE, LOCKED, UNDETERMINED = range(6)
 BOND_BREAKS = OUTCOMES.index("bond_breaks")
 NO_BLOCK = -1
 """Code of a realisation that is no block."""
+
+NO_MODE = -1
+"""Code of the mode of a motion that there is none of."""
 
 OPEN = ("undetermined", "contact_lost", "indeterminate", "jump", "bond_breaks")
 """Outcomes that leave open whether the block fails."""
@@ -143,6 +146,7 @@ class BlockOutcomes:
         code: places in :data:`OUTCOMES`; ``at_rest`` where a block was not run.
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
+        final_code: places in :data:`MODES` of the last motion that is one of a mode; -1 for none.
         about: sentences on what a model takes for granted, and how many of the blocks each is
             about, by mode code and sentence.
     """
@@ -151,6 +155,7 @@ class BlockOutcomes:
     code: NDArray[np.int8]
     displacement_m: FloatArray
     rotation_rad: FloatArray
+    final_code: NDArray[np.int8]
     about: dict[tuple[int, str], int]
     runs: int
 
@@ -163,6 +168,7 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
     displacement_m = np.broadcast_to(displacement_m, code.shape).copy()
     rotation_rad = np.where(work.mode_code == SLIDE, np.nan, 0.0)
     rotation_rad = np.broadcast_to(rotation_rad, code.shape).copy()
+    final_code = np.full(code.shape, NO_MODE, dtype=np.int8)
     about: dict[tuple[int, str], int] = {}
     for j in range(work.place.size):
         mode_code = int(work.mode_code[j])
@@ -175,6 +181,8 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
             code[i, j] = work.limits.code(mode_code, end)
             displacement_m[i, j] = _or_nan(end.peak_displacement_m)
             rotation_rad[i, j] = _or_nan(end.peak_rad)
+            if end.final_mode is not None:
+                final_code[i, j] = MODES.index(end.final_mode)
         for sentence in outcomes[0][1].about_block if outcomes else ():
             about[mode_code, sentence] = about.get((mode_code, sentence), 0) + 1
     return BlockOutcomes(
@@ -182,6 +190,7 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
         code=code,
         displacement_m=displacement_m,
         rotation_rad=rotation_rad,
+        final_code=final_code,
         about=about,
         runs=int(np.count_nonzero(work.moves)),
     )
@@ -245,7 +254,7 @@ class ShakingPlan:
 
     def work(self, chunk: int = CHUNK) -> Iterator[BlocksToRun]:
         """Yield the blocks that are to be run, some at a time."""
-        realisations, places = self.realisations, self.places
+        realisations, places = self.realisations.in_time, self.places
         for start in range(0, places.size, chunk):
             at = places[start : start + chunk]
             numbers = {name: getattr(realisations, name)[at] for name in _NUMBERS}
@@ -267,9 +276,12 @@ class ShakingPlan:
         """
         code = self.code.copy()
         at_rest = (self.code == AT_REST) | (self.code == LOCKED)
-        mode_code = self.realisations.stability.mode_code
+        mode_code = self.realisations.in_time.stability.mode_code
         displacement_m = np.where(at_rest & (mode_code != TOPPLE), 0.0, np.nan)
         rotation_rad = np.where(at_rest & (mode_code != SLIDE), 0.0, np.nan)
+        # what does not stand after its first slip is not run, and goes on as it then is
+        slips_on = (self.code == FAILS) & ~self.moves
+        final_code = np.where(slips_on, mode_code, np.int8(NO_MODE))
         about: dict[tuple[int, str], int] = {}
         runs = 0
         for answer in answers:
@@ -278,6 +290,9 @@ class ShakingPlan:
             )
             displacement_m[:, answer.place] = answer.displacement_m
             rotation_rad[:, answer.place] = answer.rotation_rad
+            final_code[:, answer.place] = np.where(
+                self.moves[:, answer.place], answer.final_code, final_code[:, answer.place]
+            )
             runs += answer.runs
             for key, count in answer.about.items():
                 about[key] = about.get(key, 0) + count
@@ -286,6 +301,7 @@ class ShakingPlan:
             **{**known, "code": code},
             displacement_m=displacement_m,
             rotation_rad=rotation_rad,
+            final_code=final_code,
             runs=runs,
             about={(MODES[mode], text): count for (mode, text), count in sorted(about.items())},
         )
@@ -299,11 +315,13 @@ class ShakenMass(ShakingPlan):
         displacement_m: greatest displacement along the base, of the block or, where it turns, of
             its contact on the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN for sliding, and where there is none to tell.
+        final_code: place in :data:`MODES` of the last motion that is one of a mode; -1 for none.
         about: how many blocks of a mode a sentence is about.
     """
 
     displacement_m: FloatArray
     rotation_rad: FloatArray
+    final_code: NDArray[np.int8]
     runs: int
     about: Mapping[tuple[ModeName, str], int]
 
@@ -356,6 +374,8 @@ def plan_shaking(
     is_block, state = realisations.is_block, stability.state_code
     stable = is_block & (state == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
     locked = is_block & (state == mechanism.LOCKED)
+    after = realisations.in_time
+    left = after.stability.yield_acceleration
     excitations = shaking.excitations()
     code = np.full((len(excitations), realisations.n), AT_REST, dtype=np.int8)
     moves = np.zeros(code.shape, dtype=np.bool_)
@@ -365,10 +385,11 @@ def plan_shaking(
         code[i, locked] = LOCKED
         if one.jump_node < one.w.size:
             code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
-        # a topple turns about its toe whatever the bond; of the others it is known when it breaks
-        breaks = moves[i] & realisations.bonded & (stability.mode_code != TOPPLE)
+        breaks = moves[i] & after.ends_with_slip
         code[i, breaks] = BOND_BREAKS
-        moves[i] &= ~breaks
+        # on what friction is left it does not stand
+        code[i, moves[i] & (left <= 0.0)] = FAILS
+        moves[i] &= ~breaks & (left > 0.0) & np.isfinite(left)
         code[i, ~is_block] = NO_BLOCK
     return ShakingPlan(
         realisations=realisations,
@@ -389,9 +410,10 @@ def _about_bonds(breaks: NDArray[np.bool_]) -> tuple[str, ...]:
     if not count:
         return ()
     return (
-        f"{count} blocks with cohesion are driven beyond their yield: the first slip breaks the "
-        "bond, and what they do after it no model describes (outcome bond_breaks); without "
-        "friction.cohesion_pa in its file the rock mass is run as if all bonds were broken before",
+        f"{count} blocks with cohesion, water or roughness are driven beyond their yield: the "
+        "first slip ends it, and what they do after it no model describes (outcome bond_breaks); "
+        "with friction.phi_residual_deg, what is left of the friction, they are run as they are "
+        "after it",
     )
 
 

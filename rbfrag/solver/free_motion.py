@@ -9,7 +9,7 @@ is what other laws of impact and friction make of the same motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -40,6 +40,7 @@ from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
+from rbfrag.solver.stability.modes import ModeName
 
 STEP_S = 2e-4
 """Step [s]; a run of twice the step beside it tells the error of the steps."""
@@ -173,18 +174,21 @@ class FreeMotion:
     @cached_property
     def changes(self) -> tuple[ModeChange, ...]:
         """What the block did, one entry where it does something else than before."""
+        time_s, _, _, _, *velocities, touch = self.rows
+        moving = np.any(velocities, axis=0)  # rest changes nothing of what it does
+        time_s, touch, backward = time_s[moving], touch[moving], velocities[2][moving] > 0.0
+        does = 2 * touch.astype(np.int64) + backward
+        first = np.flatnonzero(np.diff(does, prepend=-1))
+        last = np.append(first, does.size)[1:] - 1
         changes: list[ModeChange] = []
-        since, doing, last = 0.0, "", ""
-        time_s, _, _, _, vx, vy, spin, touch = self.rows
-        for now, *velocity, bits in zip(time_s, vx, vy, spin, touch, strict=True):
-            if not any(velocity):  # rest changes nothing of what it does
-                continue
-            name = _named(int(bits), velocity[2])
-            if name != doing:
-                since, doing = float(now), name
-            if doing != last and now - since >= SHORTEST_S:
-                changes.append(ModeChange(since, doing))
-                last = doing
+        lasting = "", 0.0, 0.0
+        for i, j in zip(first.tolist(), last.tolist(), strict=True):
+            name = _named(int(touch[i]), backward=bool(backward[i]))
+            since = lasting[1] if lasting[0] == name else float(time_s[i])
+            lasting = name, since, float(time_s[j])
+            new = not changes or changes[-1].motion != name
+            if new and lasting[2] - since >= SHORTEST_S:
+                changes.append(ModeChange(since, name))
         return tuple(changes)
 
 
@@ -344,14 +348,21 @@ CONFINED = "topples against its back plane"
 ALONG_BACK = "slides on its back plane"
 OFF = "is off both planes"
 
+MODES_OF: Mapping[str, ModeName] = {
+    SLIDES: "slide", SLUMPS: "slump", ROCKS: "topple", CONFINED: "confined_topple",
+    "slides": "slide", "slumps": "slump", "topples freely about its toe": "topple",
+}  # fmt: skip
+"""Failure mode by what a block does, also by the phases of mechanisms; others lead from one to
+another."""
 
-def _named(touch: int, spin: float) -> str:
+
+def _named(touch: int, *, backward: bool) -> str:
     """Return what a moving block does, by what touches its planes."""
     if touch & HEEL and touch & TOE:
         return SLIDES
     if touch & HEEL:
         if touch & ON_BACK:
-            return SLUMPS if spin > 0.0 else CLIMBS
+            return SLUMPS if backward else CLIMBS
         return ON_HEEL
     if touch & (TOE | ON_BASE):
         return CONFINED if touch & ON_BACK else ROCKS

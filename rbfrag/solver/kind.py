@@ -125,6 +125,7 @@ class RunEnd:
         error: bound on the error of the integration of the peak [rad], of a sliding block [m];
             what laws of impact leave open after a lost contact is not in it.
         about_block: what the model takes for granted about this block, whatever the motion.
+        final_mode: failure mode of the last motion that is one of a mode; None for no motion.
     """
 
     outcome: Outcome
@@ -133,6 +134,7 @@ class RunEnd:
     peak_displacement_m: float | None
     error: float
     about_block: tuple[str, ...] = ()
+    final_mode: ModeName | None = None
 
 
 Runner = Callable[[Excitation], RunEnd]

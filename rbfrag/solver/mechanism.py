@@ -55,6 +55,7 @@ class MechanismKind(Kind):
                 peak_rad=None if failed else whole.peak_rad,
                 peak_displacement_m=None if failed else whole.peak_displacement_m,
                 error=whole.step_error,
+                final_mode=whole.final_mode,
                 about_block=mechanism.warnings,
             )
 

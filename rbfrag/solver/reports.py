@@ -22,6 +22,7 @@ RESPONSE_NUMBERS = (
     "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s", "toppled_s",
     "error_estimate", "steps", "samples_moved", "samples_total", "final_theta_rad",
     "displacement_m", "peak_displacement_m", "centroid_displacement_m", "stopped_s",
+    "toe_needs_deg", "toe_needs_s", "toe_slips_g",
 )  # fmt: skip
 OF_TWO_CORNERS = (
     "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
@@ -55,6 +56,8 @@ def response_as_dict(response: Response) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract."""
     answer: dict[str, Any] = {
         "kind": response.kind,
+        "mode": response.mode,
+        "final_mode": response.final_mode,
         "outcome": response.outcome.value,
         **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
         "mode_changes": [asdict(change) for change in response.mode_changes],

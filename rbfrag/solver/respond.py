@@ -17,6 +17,7 @@ from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
+from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.single import Stability, refuse_undecided, stability
 
@@ -82,7 +83,9 @@ def respond(
         restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
             None for what angular momentum leaves at each corner.
         history: keep the motion in time.
-        of_kind: further settings of a kind, as its line in `rbfrag.solver.kinds` names them.
+        of_kind: further settings of a kind, as its line in `rbfrag.solver.kinds` names them; of a
+            shape also ``water_m``, ``jrc``, ``jcs_mpa``, ``joint_length_m``, which end with the
+            first slip, and ``phi_residual_deg``, on which it is then run.
 
     Raises:
         TypeError: a keyword that no kind knows.
@@ -92,6 +95,7 @@ def respond(
             carries none.
     """
     known = {name for facts in KINDS.values() for name in facts.settings}
+    joint = {name: of_kind.pop(name) for name in JOINT if name in of_kind}
     for name in of_kind:
         if name not in known:
             raise TypeError(f"respond() got an unexpected keyword argument {name!r}")
@@ -109,6 +113,7 @@ def respond(
         "phi_deg": phi_deg,
         "phi_back_deg": phi_back_deg,
         "density_kg_m3": density_kg_m3,
+        **joint,
     }
     if block is not None:
         for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
@@ -123,15 +128,15 @@ def respond(
                 fields=(name,),
             )
         rough_deg = 0.5 * (90.0 + max(block.alpha1_deg, block.alpha3_deg, 0.0))  # it does not slip
-        judged = stability(
-            block,
-            beta_deg=beta_deg,
-            phi_deg=rough_deg if phi_deg is None else phi_deg,
-            phi_back_deg=phi_back_deg,
-            back_fracture=back_fracture and not free_standing,
-            cohesion_pa=cohesion_pa,
-            density_kg_m3=density_kg_m3,
-        )
+        planes: dict[str, Any] = {
+            **conditions,
+            "phi_deg": rough_deg if phi_deg is None else phi_deg,
+            "back_fracture": back_fracture and not free_standing,
+            "cohesion_pa": cohesion_pa,
+        }
+        planes, after = after_first_slip(block, planes)
+        refuse_before_slip(block, planes, kind)
+        judged = stability(block, **planes)
         if kind is None:
             model = model_of_mode(judged.mode, back_fracture=back_fracture)
         else:
@@ -139,8 +144,8 @@ def respond(
         site = _site(block, judged, model, _known(model, settings))
         if phi_deg is None:
             site = replace(site, phi_rad=0.5 * math.pi)
-        remarks = _remarks(judged, model)
-        return answer(model, site, remarks)
+        remarks = (*after, *_remarks(judged, model))
+        return answer(model, site, remarks, judged.mode)
     numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
     model, site = known_by_numbers(kind, numbers, settings)
     return answer(model, site)
@@ -201,8 +206,14 @@ class _Shaken:
     gap_s: float | None
     start: BlockState | None
 
-    def answer(self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = ()) -> Response:
-        """Return what a model answers."""
+    def answer(
+        self,
+        model: Kind,
+        site: BlockOnPlanes,
+        remarks: tuple[str, ...] = (),
+        mode: ModeName | None = None,
+    ) -> Response:
+        """Return what a model answers about a block of a failure mode; None for the model's."""
         if self.start is not None and not model.carries_state:
             raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")
 
@@ -210,7 +221,10 @@ class _Shaken:
             motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
         ) -> Response:
             shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
-            return model.respond(site, shaking)
+            answer = replace(model.respond(site, shaking), mode=mode or model.mode)
+            if answer.started_s is None or answer.final_mode is not None:
+                return answer
+            return replace(answer, final_mode=model.mode)
 
         if not isinstance(self.motion, list | tuple):
             if self.gap_s is not None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
+from rbfrag.solver.stability.modes import ModeName
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -206,6 +207,13 @@ class Response(Tabular):
         impacts: impacts within the record; the free motion after it is decided in closed form.
         sensitive: whether the outcome is another one for the motion times 1 + 1e-6 or 1 - 1e-6.
         state: where the block is left at rest; None where it is not, or not known.
+        mode: failure mode of the block in its first place.
+        final_mode: that of its last motion that is one of a mode; None for no motion.
+        toe_needs_deg: greatest friction angle that a rotation without slip needs at the toe [deg];
+            None for other kinds than toppling, for numbers without a shape, and without a rotation.
+        toe_needs_s: when [s].
+        toe_slips_g: acceleration at which the toe gives way as the block starts to turn [g]; None
+            where it holds at any.
         parts: of a sequence, the answer to each motion; () for a single one.
     """
 
@@ -234,6 +242,11 @@ class Response(Tabular):
     impacts: int | None = None
     sensitive: bool | None = None
     state: BlockState | None = None
+    mode: ModeName | None = None
+    final_mode: ModeName | None = None
+    toe_needs_deg: float | None = None
+    toe_needs_s: float | None = None
+    toe_slips_g: float | None = None
     parts: tuple[Part, ...] = ()
 
 

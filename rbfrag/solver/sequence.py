@@ -159,6 +159,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
         times = [(_on_clock(part, getattr(part.response, name))) for part in parts]
         return [time_s for time_s in times if time_s is not None]
 
+    worst = max(parts, key=lambda part: part.response.toe_needs_deg or 0.0)
     errors = [answer.error_estimate for answer in answers]
     slips = [answer.displacement_m for answer in answers]
     known_slips = [slip for slip in slips if slip is not None]
@@ -166,6 +167,8 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
         answers[-1],
         outcome=outcome,
         **{name: greatest(name) for name in _GREATEST},
+        final_mode=next((a.final_mode for a in reversed(answers) if a.final_mode), None),
+        toe_needs_s=_on_clock(worst, worst.response.toe_needs_s),
         error_estimate=None if None in errors else _most(errors),
         started_s=min(clock("started_s"), default=None),
         toppled_s=min(clock("toppled_s"), default=None),
@@ -188,7 +191,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
 
 _GREATEST = (
     "peak_theta_n", "peak_theta_rad", "peak_displacement_m", "peak_forward_rad",
-    "peak_backward_rad",
+    "peak_backward_rad", "toe_needs_deg",
 )  # fmt: skip
 _SUMS = ("steps", "samples_moved", "samples_total")
 

@@ -10,6 +10,7 @@ import numpy as np
 from rbfrag.solver.contacts import gap_m, touching
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
+    MODES_OF,
     FreeError,
     FreeMotion,
     Kinematics,
@@ -29,6 +30,7 @@ from rbfrag.solver.results import (
     Response,
     ResponseHistory,
 )
+from rbfrag.solver.stability.modes import ModeName
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +137,15 @@ class WholeRun:
         changes = () if self.run is None else self.run.changes
         free = () if self.free is None else self.free.changes
         return (*(ModeChange(change.time_s, change.name) for change in changes), *free)
+
+    @property
+    def final_mode(self) -> ModeName | None:
+        """Failure mode of the last motion that is one of a mode; None for no motion."""
+        if self.started_s is None:
+            return None
+        first = () if self.run is None else (self.mechanism.first.name,)
+        names = (*first, *(change.motion for change in self.changes))
+        return next((MODES_OF[name] for name in reversed(names) if name in MODES_OF), None)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -260,6 +271,7 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
         centroid_displacement_m=math.dist(at_end.centroid_m, first.centroid_m) if at_end else None,
         stopped_s=whole.ended_s,
         mode_changes=whole.changes,
+        final_mode=whole.final_mode,
         state=whole.state(error),
     )
 

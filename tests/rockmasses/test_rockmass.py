@@ -103,8 +103,12 @@ class TestStreams:
             "block.kv": "kv",
             "friction.cohesion_pa": "cohesion_pa",
             "back.spacing_m": "s2_m",
+            "back.water_m": "water_m",
+            "friction.jrc": "jrc",
         }
         base = {**TABLE_3_4, "friction.phi_back_deg": 35.0, "block.density_kg_m3": 2700.0}
+        if key.startswith("friction.j"):
+            base |= {"friction.jrc": 8.0, "friction.jcs_mpa": 60.0}
         before = RockMass.of(base).realise(200, 9)
         low = 50.0 if key == "back.dip_deg" else 0.3
         changed = {"distribution": "uniform", "low": low, "high": low + 0.5}
@@ -210,6 +214,8 @@ class TestImpossible:
         ({"block__kv": normal(-0.5, 0.5)}, 7),
         ({"friction__cohesion_pa": normal(9.0, 9.0), "block__density_kg_m3": 2700.0}, 8),
         ({"block__density_kg_m3": normal(9.0, 9.0)}, 9),
+        ({"back__water_m": normal(0.1, 0.1), "block__density_kg_m3": 2650.0}, 10),
+        ({"back__water_m": 9.0, "block__density_kg_m3": 2650.0}, 11),
     )
 
     @pytest.mark.parametrize(("changes", "code"), CASES)

@@ -20,7 +20,7 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import critical_in_words, slides_in_words
 from rbfrag.errors import InputError
-from rbfrag.question.fields import PlaneFields, ShapeFields, WholeFields
+from rbfrag.question.fields import JointFields, PlaneFields, ShapeFields, WholeFields
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -58,7 +58,8 @@ def critical(
     *,
     motion: options.Motion,
     given: Annotated[
-        Given, fields_of("p2", ShapeFields, PlaneFields, WholeFields, without=("kind",))
+        Given,
+        fields_of("p2", ShapeFields, PlaneFields, JointFields, WholeFields, without=("kind",)),
     ],
     direction: options.Direction,
     reading: options.ReadingOptions,
@@ -192,6 +193,7 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
     """Return the keywords of a search that say which block, and what is to be said of it."""
     from rbfrag.question.blocks import shape_of, without_kv
     from rbfrag.solver.kinds import facts_of, kind_of_mode
+    from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
 
     with given.named():
         shape = shape_of(without_kv(given))
@@ -207,14 +209,15 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
         _, numbers, remarks = numbers_of(given, topples.kind)
         return {"p2": numbers["p2"]}, remarks
     with given.named():
-        planes = {**shape.known().planes}
+        planes, after = after_first_slip(shape.block, shape.known().planes)
+        refuse_before_slip(shape.block, planes, kind)
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if planes.pop(name, nothing) != nothing:
                 raise InputError(
                     f"{name} does not go with a search in time: leave it out", fields=(name,)
                 )
-    planes.pop("density_kg_m3", None)
-    return {"block": shape.block, **planes}, ()
+    read = {name: value for name, value in planes.items() if name not in (*JOINT, "density_kg_m3")}
+    return {"block": shape.block, **read}, after
 
 
 def _slides(

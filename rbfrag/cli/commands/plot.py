@@ -13,7 +13,14 @@ from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.question.fields import PlaneFields, ShapeFields, SpaceFields, WholeFields
+from rbfrag.question.fields import (
+    JointFields,
+    PlaneFields,
+    ShapeFields,
+    SpaceFields,
+    WholeFields,
+    names_of,
+)
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -200,7 +207,9 @@ def plot_spectrum(
 def plot_response(
     motion: options.Motion,
     out: Out,
-    given: Annotated[Given, fields_of("p2", "kr", ShapeFields, PlaneFields, WholeFields)],
+    given: Annotated[
+        Given, fields_of("p2", "kr", ShapeFields, PlaneFields, JointFields, WholeFields)
+    ],
     direction: options.Direction,
     reading: options.ReadingOptions,
     db: options.Db = None,
@@ -305,6 +314,12 @@ def plot_rotation(
         block, planes, *_ = on_planes(without_kv(given))
     if not planes.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
+    for name in planes.keys() - {*names_of(PlaneFields)}:
+        raise InputError(
+            f"{name} does not go with yields over a rotation, which the first slip comes before: "
+            "leave it out",
+            fields=(name,),
+        )
     shares = options.number_list(back_follows, "--back-follows")
     draw(block, out, back_follows=shares, **planes)
     lines = yield_lines(block, back_follows=shares, **planes)

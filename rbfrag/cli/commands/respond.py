@@ -23,6 +23,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
 from rbfrag.question.fields import (
     FailureFields,
+    JointFields,
     PlaneFields,
     ScatterFields,
     ShapeFields,
@@ -41,8 +42,8 @@ _PART = (
 """What is told of each motion of several; all of it with --json."""
 
 SHORT = (
-    "kind", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
-    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive",
+    "kind", "mode", "final_mode", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
+    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive", "toe_needs_deg", "toe_slips_g",
 )  # fmt: skip
 """Values that are shown without --verbose."""
 
@@ -137,6 +138,7 @@ def respond(
             FailureFields,
             ShapeFields,
             PlaneFields,
+            JointFields,
             ScatterFields,
             WholeFields,
             without=("kind", "ks_sigma", "ps2_sigma", "kct_sigma", "pct2_sigma"),

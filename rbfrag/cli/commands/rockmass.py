@@ -63,6 +63,13 @@ def print_failures(document: dict[str, Any]) -> None:
             )
     headers = ["scale", "pga_g", "mode", "count", "fails", "%_of_mode", "%_of_all"]
     print_table([*headers, "ci_low_%", "ci_high_%", *outcomes], rows)
+    ends = [
+        [mode, each["scale"], *tally.values()]
+        for each in document["scales"]
+        for mode, tally in each["final_modes"].items()
+    ]
+    print("\nmode by which blocks end; none: the motion does not move them, or they are not run")
+    print_table(["mode", "scale", *next(iter(document["scales"][0]["final_modes"].values()))], ends)
 
 
 def _percent(share: float) -> float:

@@ -14,11 +14,13 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import CriticalResult, Response
+from rbfrag.solver.stability.toe import slides_at_toe, toe_needs_in_time, toe_slips_g
 from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, respond, simulate
 
 
@@ -33,9 +35,14 @@ class Toppling(Kind):
             kr=_strength(site),
             vertical=shaking.vertical,
             polarity=shaking.polarity,
-            history=shaking.history,
+            history=shaking.history or site.block is not None,
         )
-        return replace(answer, warnings=(*shaking.remarks, *answer.warnings))
+        answer = replace(answer, warnings=(*shaking.remarks, *answer.warnings))
+        if site.block is None:
+            return answer
+        degrees = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
+        answer = with_toe(answer, site.block, *degrees)
+        return answer if shaking.history else replace(answer, history=None)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
@@ -50,6 +57,7 @@ class Toppling(Kind):
                 peak_rad=finite_or_none(end.peak_rad),
                 peak_displacement_m=None,
                 error=end.error_rad,
+                final_mode=self.mode if math.isfinite(end.started_s) else None,
             )
 
         return run
@@ -75,6 +83,19 @@ def _size(site: BlockOnPlanes) -> float:
         return site.block.p2
     assert site.p2 is not None
     return site.p2
+
+
+def with_toe(answer: Response, block: Block, beta_deg: float, phi_deg: float) -> Response:
+    """Return an answer that has its history with what the rotation needs at the toe."""
+    assert answer.history is not None
+    slips_g = toe_slips_g(block, beta_deg, phi_deg)
+    need, at_s = toe_needs_in_time(block, beta_deg, answer.history) or (None, None)
+    warnings = answer.warnings
+    if need is not None and need > phi_deg:
+        warnings = (*warnings, slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g))
+    return replace(
+        answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, warnings=warnings
+    )
 
 
 def _strength(site: BlockOnPlanes) -> float:

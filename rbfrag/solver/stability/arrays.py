@@ -63,7 +63,7 @@ _USABLE: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
 }
 """Which values can be used, and the reason code of the others, by argument."""
 
-_SPILLS, _FLOATS = 10, 11
+_SPILLS, FLOATS = 10, 11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,7 +212,7 @@ def stability_arrays(
             rough = roughness_at(there["jrc"], there["jcs_mpa"], length, weight, np.power)
             planes, *_ = roughened(planes, rough, there["phi_deg"])
         mode, k, ky, lifts, floats = _yields(t1, t3, planes, back_fracture)
-        reason[(reason == 0) & floats] = _FLOATS
+        reason[(reason == 0) & floats] = FLOATS
         state = state_code(k, planes.functions)
         p2 = frequency_parameter(shape_factor(t1, t3), corner_distance(h, t3, planes.functions))
         if reason.any():
@@ -238,6 +238,24 @@ def stability_arrays(
             f"element {place[0] if len(place) == 1 else place}: {REASONS[codes[2][place]]}"
         )
     return result
+
+
+def water_held_m(
+    water_m: ArrayLike, *, s1_m: ArrayLike, gamma_deg: ArrayLike, beta_deg: ArrayLike
+) -> FloatArray:
+    """Return heights of water above the heel [m], cut off where it fills the back fracture.
+
+    Args:
+        water_m: heights that are stated [m].
+        s1_m: spacings of the base fractures [m].
+        gamma_deg: angles of the back planes from the bases [deg].
+        beta_deg: dips of the bases [deg].
+    """
+    gamma, beta = np.radians(gamma_deg), np.radians(beta_deg)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        top_m = s1_m * np.sin(beta + gamma) / np.sin(gamma)
+    held: FloatArray = np.minimum(water_m, np.maximum(top_m, 0.0))
+    return held
 
 
 def _tangent(angle_deg: Any) -> Any:

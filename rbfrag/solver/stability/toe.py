@@ -9,15 +9,17 @@ q = F_s (k cos θc - sin θc), θc = α3 - β and friction alone,
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 
-SLIDE_ROCK = (
-    "rotation without slip needs {need:.1f} deg at the toe at {pga:.3g} g; phi = {phi:g} gives way "
-    "at {slips:.2f} g: slide-rock, outside the model"
-)
+if TYPE_CHECKING:
+    from rbfrag.solver.results import ResponseHistory
 
-HOLDS = "rotation without slip needs {need:.1f} deg at the toe at {pga:.3g} g, and phi is {phi:g}"
+NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
+
+SLIDE_ROCK = "; phi = {phi:g} gives way{at}: slide-rock, outside the model"
 
 
 def _balance(block: Block, beta_deg: float) -> tuple[float, float, float, float]:
@@ -63,5 +65,43 @@ def about_toe(block: Block, beta_deg: float, phi_deg: float, pga_g: float) -> st
     """Return whether the toe of a block that topples holds at a PGA [g], as a sentence."""
     need, slips = toe_needs_deg(block, beta_deg, pga_g), toe_slips_g(block, beta_deg, phi_deg)
     if slips is None or pga_g <= slips:
-        return HOLDS.format(need=need, pga=pga_g, phi=phi_deg)
-    return SLIDE_ROCK.format(need=need, pga=pga_g, phi=phi_deg, slips=slips)
+        return f"{NEEDS.format(need=need, where=f'{pga_g:.3g} g')}, and phi is {phi_deg:g}"
+    return slides_at_toe(need, f"{pga_g:.3g} g", phi_deg, slips)
+
+
+def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float | None) -> str:
+    """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
+    at = "" if slips_g is None else f" at {slips_g:.2f} g"
+    return NEEDS.format(need=need_deg, where=where) + SLIDE_ROCK.format(phi=phi_deg, at=at)
+
+
+def toe_needs_in_time(
+    block: Block, beta_deg: float, history: ResponseHistory
+) -> tuple[float, float] | None:
+    """Return the greatest friction angle that a rotation needs at the toe [deg], and when [s].
+
+    max atan(|Rx|/Ry) of R/m = r3 (θ'' t - θ'² e) - g G, e from the toe to the centroid, t along its
+    path, θ'' of eq. (4.13). None for a block that does not turn.
+
+    Args:
+        block: the block.
+        beta_deg: dip of the base [deg].
+        history: its motion in time.
+    """
+    import numpy as np
+
+    turns = history.theta_rad > 0.0
+    if not turns.any():
+        return None
+    beta, alpha3 = math.radians(beta_deg), math.radians(block.alpha3_deg)
+    at = alpha3 - history.theta_rad[turns]
+    k, w = history.k_h[turns], 1.0 + history.k_v[turns]
+    turning = block.r3_m * block.p2 * (k * np.cos(at - beta) - w * np.sin(at - beta))
+    inward = block.r3_m * history.theta_dot_rad_s[turns] ** 2
+    thrust = turning * np.cos(at) + inward * np.sin(at)
+    thrust -= STANDARD_GRAVITY_M_S2 * (w * math.sin(beta) + k * math.cos(beta))
+    pressure = turning * np.sin(at) - inward * np.cos(at)
+    pressure += STANDARD_GRAVITY_M_S2 * (w * math.cos(beta) - k * math.sin(beta))
+    needs = np.degrees(np.arctan2(np.abs(thrust), pressure))
+    worst = int(np.argmax(needs))
+    return float(needs[worst]), float(history.time_s[turns][worst])

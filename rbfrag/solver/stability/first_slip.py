@@ -1,0 +1,99 @@
+"""What ends with the first slip of a block, and what is left of it then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.stability.joint import OnJoint
+from rbfrag.solver.stability.modes import words_of_mode
+from rbfrag.solver.stability.single import refuse_undecided, stability
+
+JOINT = (*OnJoint.__annotations__, "phi_residual_deg")
+"""What is stated of a joint beside bond and friction."""
+
+ENDED = frozenset({*JOINT, "cohesion_pa", "density_kg_m3", "phi_back_deg"})
+"""Keywords of planes that the first slip ends, or that the residual friction takes the place of."""
+
+STATE_RESIDUAL = "state phi_residual_deg, the friction angle that is left, for the answer after it"
+
+UPLIFT = (
+    "water_m does not go with a probability or a time history of {kind}: uplift ends with the "
+    "first slip (yield {k:.4g} g, {mode}), which opens the fracture, and no displacement or "
+    f"probability follows from it: {STATE_RESIDUAL}"
+)
+
+ROUGH = (
+    "jrc does not go with a probability or a time history of {kind}: roughness ends with the first "
+    "slip (yield {k:.4g} g, {mode}), and no displacement or probability follows from it: "
+    f"{STATE_RESIDUAL}"
+)
+
+SLIPS_ON = (
+    "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "
+    "it fails where the motion exceeds that yield, and no model is needed"
+)
+
+AFTER_SLIP = (
+    "the answer is that of the block after its first slip, dry and without bond or roughness, on "
+    "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
+    "and a motion below that does nothing"
+)
+
+
+def slips_on_base(facts: KindFacts) -> bool:
+    """Return whether blocks of a kind slip on their base; a topple turns about its toe."""
+    return facts.free_standing or "p2" not in facts.parameters
+
+
+def after_first_slip(
+    block: Block, planes: Mapping[str, Any]
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return planes as what follows the first slip sees them, and what is to be said of them.
+
+    Args:
+        block: the block.
+        planes: keywords of :func:`rbfrag.solver.stability.single.stability`, and perhaps
+            ``phi_residual_deg``, without which they stay as they are.
+
+    Raises:
+        InputError: no earthquake decides about the block, or it does not stand on what is left.
+    """
+    stated = dict(planes)
+    residual_deg = stated.pop("phi_residual_deg", None)
+    if residual_deg is None:
+        return stated, ()
+    first = stability(block, **stated)
+    refuse_undecided(first)
+    left = {name: value for name, value in stated.items() if name not in ENDED}
+    left["phi_deg"] = residual_deg
+    if stability(block, **left).yield_acceleration <= 0.0:
+        said = {"k": first.yield_acceleration, "mode": words_of_mode(first.mode)}
+        raise InputError(SLIPS_ON.format(**said), fields=("phi_residual_deg",))
+    return left, (AFTER_SLIP,)
+
+
+def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:
+    """Refuse to follow in time what ends with the first slip.
+
+    Args:
+        block: the block.
+        planes: keywords of :func:`rbfrag.solver.stability.single.stability`.
+        kind: its kind; None for that of its mode.
+
+    Raises:
+        InputError: water stands behind the block, or a base that it slips on is rough.
+    """
+    if not (planes.get("water_m") or planes.get("jrc")):
+        return
+    judged = stability(block, **planes)
+    backed = planes.get("back_fracture", True)
+    facts = facts_of(kind) if kind else kind_of_mode(judged.mode, back_fracture=backed)
+    words = {"kind": facts.kind, "k": judged.yield_acceleration}
+    words["mode"] = words_of_mode(judged.mode)
+    for name, text in (("water_m", UPLIFT), ("jrc", ROUGH)):
+        if planes.get(name) and (name == "water_m" or slips_on_base(facts)):
+            raise InputError(text.format(**words), fields=(name, "phi_residual_deg"))
