@@ -17,6 +17,17 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{digits}f} %"
 
 
+def interval(low: float, high: float) -> str:
+    """Return an interval of shares in percent; one share where its ends read alike."""
+    return " to ".join(dict.fromkeys((percent(low), percent(high))))
+
+
+def with_interval(share: float, low: float, high: float) -> str:
+    """Return a share in percent with its interval, unless that says no more."""
+    ends = interval(low, high)
+    return ends if ends == percent(share) else f"{percent(share)} ({ends})"
+
+
 def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what P, its interval and the range at some sites mean, in counts of blocks.
 
@@ -32,12 +43,11 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     of_block = document.get("block_sd")
     # what slides too far or slumps past a limit does not fall
     fall = "fall" if document["mode"] == "topple" else "fail"
-    one = "s" if _count(p, of) in ("1", "fewer than 1") else ""
+    count, ends = _count(p, of), _range(low, high, of)
+    one = "s" if count in ("1", "fewer than 1") else ""
+    known = f"{'' if ends == count else f'{ends} '}as far as the data tell it"
     sentences = [
-        f"This block {fall}s or stands; in nearly all such cases it {fall}s ({level})."
-        if _range(low, high, of) == "nearly all"
-        else f"This block {fall}s or stands; of {of:,} such cases {_count(p, of)} {fall}{one} "
-        f"({_range(low, high, of)} as far as the data tell it, {level})."
+        f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, {level})."
     ]
     if sites is not None:
         where = f"At {at_sites(sites)}"
@@ -71,7 +81,7 @@ def at_sites(number: float) -> str:
 def _count(share: float, of: int) -> str:
     count = round(share * of)
     if count in (0, of) and 0.0 < share < 1.0:
-        return "fewer than 1" if count == 0 else "nearly all"
+        return "fewer than 1" if count == 0 else f"more than {of - 1:,}"
     return f"{count:,}"
 
 
@@ -107,6 +117,46 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     stands = (f"{block.support[:1].upper()}{block.support[1:]}.",) if block.support else ()
     return (f"The block has {numbers}.", *limit, *stands)
 
+
+GLOSSARY = {
+    "p²": "size of the block, a rectangle's diagonal is 15/p² m",
+    "k_r": "acceleration in g that just lifts it",
+    "k_y": "acceleration in g from which it slides",
+    "in domain": "block and shaking are such as the model was fitted to",
+    "copula": "how the failures of one earthquake go together",
+}
+"""What a geologist cannot know of the words in answers."""
+
+
+def glossary(*texts: str) -> str:
+    """Return what words of some texts mean, each once; empty where none needs it."""
+    found = (f"{word}: {GLOSSARY[word]}" for word in GLOSSARY if any(word in t for t in texts))
+    return "; ".join(found)
+
+
+def model_in_words(term: str, method: str, kind: str) -> str:
+    """Return what people call a model: the measures that it reads, and what tells it from others.
+
+    Args:
+        term: name of its measure.
+        method: name of the method that it is fitted by.
+        kind: response kind of its blocks.
+    """
+    from rbfrag.fragility.measures import SPECTRAL, TERMS
+    from rbfrag.fragility.methods import method_named
+
+    periods = {name: f"SA({period:g} s)" for period, name in SPECTRAL.items()}
+    read = [
+        periods.get(name) or _MEASURES.get(name) or name.partition("_")[0].upper()
+        for name in TERMS[term].inputs
+    ]
+    own = method_named(method).title if kind == "toppling" else kind.replace("_", " ")
+    sized = "size-dependent" if "block's" in TERMS[term].title else ""
+    return ", ".join(filter(None, (*read, sized, own)))
+
+
+_MEASURES = {"xp_m_s": "toppling spectrum", "tm_s": "Tm", "arias_m_s": "Arias intensity",
+             "magnitude": "magnitude"}
 
 SYMBOLS = {
     "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",

@@ -245,12 +245,10 @@ def _of_all(answer: HazardAnswer) -> Iterator[str]:
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
-    import numpy as np
+    from rbfrag.hazards.report import shares_between
 
     unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
-    levels, imt = curve.levels, curve.imt
-    below = np.concatenate([[0.0], answer.contribution[0].cumsum()]) / answer.annual_rate[0]
-    parts = np.diff(np.interp(np.log(levels), np.log(answer.edges), below))
+    levels, imt, parts = curve.levels, curve.imt, shares_between(answer, curve.levels)
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
         for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)

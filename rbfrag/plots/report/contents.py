@@ -12,7 +12,15 @@ from typing import Any, NamedTuple, Unpack
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import SYMBOLS, at_sites, block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import (
+    SYMBOLS,
+    at_sites,
+    block_in_words,
+    interval,
+    model_in_words,
+    percent,
+    prediction_in_words,
+)
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
@@ -109,6 +117,12 @@ class Contents:
     held: HeldMeasures | None
     document: dict[str, Any]
     rate: Rate | None
+
+    @property
+    def model_title(self) -> str:
+        """What people call the model."""
+        of = self.model
+        return model_in_words(of.term.name, of.method.name, of.kind)
 
     def notes(self) -> tuple[str, ...]:
         """Return the warnings as sentences."""
@@ -254,20 +268,15 @@ def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[T
     level = f"{100.0 * document['level']:g} %"
     answer = [
         ("probability of failure", percent(document["probability"])),
-        (f"interval ({level})", _interval(document["ci_low"], document["ci_high"])),
+        (f"interval ({level})", interval(document["ci_low"], document["ci_high"])),
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append((f"share at {at_sites(document['sites'])} ({level})", _interval(*ends)))
+        answer.append((f"share at {at_sites(document['sites'])} ({level})", interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
     return [("Answer", tuple(answer)), *hazards]
-
-
-def _interval(low: float, high: float) -> str:
-    ends = percent(low), percent(high)
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _hazard_rows(rate: Rate, level: str) -> Rows:

@@ -33,7 +33,7 @@ def panels_of(contents: Contents) -> list[Panel]:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))
     if contents.held is not None:
-        title = f"Design chart, model {contents.model.name}"
+        title = f"Design chart, model {contents.model_title}"
         panels.append(Panel("chart", title, lambda part: _chart(part, contents)))
     if contents.rate is not None:
         title = "Hazard, and the shaking that the rate comes from"
@@ -77,4 +77,4 @@ def _rate(part: FigureBase, contents: Contents) -> None:
     top, bottom = part.subplots(2, 1, sharex=True)
     draw_contribution(top, bottom, contents.rate.curve, contents.rate.answer)
     top.set_ylabel("exceedances [1/a]")
-    bottom.set_ylabel("share of the rate\n[% per decade]")
+    bottom.set_ylabel("share of the rate\n[% of each step]")
