@@ -290,12 +290,10 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
     }
     return {
         "probability": percent(document["probability"]),
-        **{
-            name: interval(*pair) for name, pair in ends.items() if None not in pair
-        },
+        **{name: interval(*pair) for name, pair in ends.items() if None not in pair},
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
-        "model": model_in_words(document["term"], document["method"], document["kind"]),
+        "model": model_in_words(document),
         "data": document["data"],
     }
 

@@ -47,7 +47,8 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     one = "s" if count in ("1", "fewer than 1") else ""
     known = f"{'' if ends == count else f'{ends} '}as far as the data tell it"
     sentences = [
-        f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, {level})."
+        f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, "
+        f"{level})."
     ]
     if sites is not None:
         where = f"At {at_sites(sites)}"
@@ -119,10 +120,10 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 GLOSSARY = {
-    "p²": "size of the block, a rectangle's diagonal is 15/p² m",
-    "k_r": "acceleration in g that just lifts it",
-    "k_y": "acceleration in g from which it slides",
-    "in domain": "block and shaking are such as the model was fitted to",
+    "p²": "15/p² m is a rectangle's diagonal",
+    "k_r": "acceleration in g that lifts it",
+    "k_y": "acceleration in g that moves it",
+    "in domain": "such as the data",
     "copula": "how the failures of one earthquake go together",
 }
 """What a geologist cannot know of the words in answers."""
@@ -134,29 +135,32 @@ def glossary(*texts: str) -> str:
     return "; ".join(found)
 
 
-def model_in_words(term: str, method: str, kind: str) -> str:
+def model_in_words(document: Mapping[str, Any]) -> str:
     """Return what people call a model: the measures that it reads, and what tells it from others.
 
     Args:
-        term: name of its measure.
-        method: name of the method that it is fitted by.
-        kind: response kind of its blocks.
+        document: an answer under the keys of the JSON contract.
     """
     from rbfrag.fragility.measures import SPECTRAL, TERMS
     from rbfrag.fragility.methods import method_named
 
+    if (term := TERMS.get(document["term"])) is None:  # several models
+        return str(document["model"])
     periods = {name: f"SA({period:g} s)" for period, name in SPECTRAL.items()}
-    read = [
-        periods.get(name) or _MEASURES.get(name) or name.partition("_")[0].upper()
-        for name in TERMS[term].inputs
-    ]
-    own = method_named(method).title if kind == "toppling" else kind.replace("_", " ")
-    sized = "size-dependent" if "block's" in TERMS[term].title else ""
+    read = (
+        _MEASURES.get(name) or periods.get(name) or name.partition("_")[0].upper()
+        for name in term.inputs
+    )
+    method = method_named(document["method"])
+    own = method.title or method.block.kind.replace("_", " ").removeprefix("toppling")
+    sized = "size-dependent" if "block's" in term.title else ""
     return ", ".join(filter(None, (*read, sized, own)))
 
 
-_MEASURES = {"xp_m_s": "toppling spectrum", "tm_s": "Tm", "arias_m_s": "Arias intensity",
-             "magnitude": "magnitude"}
+_MEASURES = {
+    "xp_m_s": "toppling spectrum", "tm_s": "Tm", "arias_m_s": "Arias intensity",
+    "magnitude": "magnitude",
+}  # fmt: skip
 
 SYMBOLS = {
     "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",

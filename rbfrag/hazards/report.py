@@ -89,14 +89,7 @@ def rate_columns(answer: HazardAnswer) -> dict[str, Any]:
 
 
 def shares_between(answer: HazardAnswer, levels: FloatArray) -> FloatArray:
-    """Return the shares of the first block's rate that come from shaking between levels.
-
-    Args:
-        levels: of the measure of the hazard curve, increasing, shape (n,).
-
-    Returns:
-        Shares, shape (n - 1,), of a rate of zero zeros.
-    """
+    """Return the shares of the first block's rate that come from shaking between levels."""
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
     below = np.append(0.0, answer.contribution[0].cumsum()) / rate
     return np.diff(np.interp(np.log(levels), np.log(answer.edges), below))

@@ -11,21 +11,18 @@ from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.report import shares_between
 from rbfrag.plots import canvas
+from rbfrag.plots.curve import AXIS
 from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHOWN = 1e-3
-_NAMES = {
-    "pga_g": "peak ground acceleration, PGA [g]",
-    "pgv_m_s": "peak ground velocity, PGV [m/s]",
-}
 
 
 def measure_title(curve: HazardCurve) -> str:
     """Return what the levels of a curve are, with their unit."""
-    return _NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
+    return AXIS.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
 
 
 @canvas.in_own_style

@@ -10,6 +10,7 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
+    print_glossary,
     print_json,
     print_pairs,
     print_rows,
@@ -21,7 +22,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import percent
+from rbfrag.fragility.words import model_in_words, percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 from rbfrag.question.fields import BlockFields, WholeFields
 
@@ -203,13 +204,15 @@ def _print(
         if branches:
             print()
             print_table(list(branches[0]), [list(row.values()) for row in branches])
+    if verbose:
+        print_glossary(str(document.get("joint_law")))
     print_warnings(warnings)
 
 
 def _short(document: dict[str, Any]) -> dict[str, Any]:
     """Return what is shown without --verbose."""
-    known = {name: document[name] for name in SHORT if document.get(name) is not None}
-    return rounded_values(known)
+    named = {**document, "model": model_in_words(document)}
+    return rounded_values({name: named[name] for name in SHORT if named.get(name) is not None})
 
 
 def _of_all(answer: HazardAnswer) -> Iterator[str]:

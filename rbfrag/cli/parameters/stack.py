@@ -259,15 +259,12 @@ def read_plainly(command: Any) -> None:
 
 def _write_panels(command: Any, context: Any, formatter: Any) -> None:
     """Write the options of a command by what they are about, as their fields declare it."""
-    panels: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *GROUPS)}
-    last: list[tuple[str, str]] = []
+    panels: dict[str, list[Any]] = {name: [] for name in ("Arguments", *GROUPS, "Options")}
     for each in command.get_params(context):
-        if (record := each.get_help_record(context)) is not None:
-            is_argument = each.param_type_name == "argument"
-            panel = "Arguments" if is_argument else getattr(each, "rich_help_panel", None)
-            panels.get(panel or "", last).append(record)
-    own = "Other options" if any(panels[name] for name in GROUPS) else "Options"
-    for name, records in (*panels.items(), (own, last)):
+        if record := each.get_help_record(context):
+            kind = f"{each.param_type_name}s".capitalize()
+            panels[getattr(each, "rich_help_panel", None) or kind].append(record)
+    for name, records in panels.items():
         if records:
             with formatter.section(name):
                 formatter.write_dl(records)
