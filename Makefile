@@ -114,8 +114,8 @@ clean:  ## remove what make made
 	find rbfrag tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-demo: pyproject.toml $(CONSTRAINTS) | $(VENV)/.made
-	@echo "installing rbfrag[plot,samples] into $(VENV) ..."
-	@$(PIP) --editable '.[plot,samples]'
+	@echo "installing rbfrag[plot,samples,excel,service] into $(VENV) ..."
+	@$(PIP) --editable '.[plot,samples,excel,service]'
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml $(CONSTRAINTS) | $(VENV)/.made

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.sentences import rounded
-from rbfrag.fragility.words import percent
+from rbfrag.fragility.words import percent, with_interval
 from rbfrag.hazards import between_measures
-from rbfrag.hazards.report import once_in
+from rbfrag.hazards.report import once_in, two_digits
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
@@ -79,8 +79,8 @@ def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
     often = "never fails" if rate == 0.0 else f"fails {once_in(rate)} on average"
     yield (
         f"{_condition(answer)}, {who} for {answer.age_years:,.6g} years{sd} with a probability of "
-        f"{percent(answer.probability_standing)} ({percent(answer.ci_low)} to "
-        f"{percent(answer.ci_high)}); {'it' if one else 'one of them'} {often}."
+        f"{with_interval(answer.probability_standing, answer.ci_low, answer.ci_high)}; "
+        f"{'it' if one else 'one of them'} {often}."
     )
     five = answer.factor_5_percent
     if five is None:
@@ -88,12 +88,12 @@ def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
     elif five < 1.0:
         yield (
             "That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
-            f"{five:.2g}."
+            f"{two_digits(five)}."
         )
     else:
         yield (
-            f"Standing does not contradict it: all rates of the hazard would have to be {five:.2g} "
-            "times as high to leave 5 %."
+            f"Standing does not contradict it: all rates of the hazard would have to be about "
+            f"{two_digits(five)} times as high to leave 5 %."
         )
 
 

@@ -45,7 +45,7 @@ COMMANDS = {
     "losses": "Count failures and losses in the earthquakes of an event set.",
     "survival": "Print how likely standing blocks are under a seismic hazard.",
     "shakemap": "Write the probability that blocks topple across a ShakeMap.",
-    "report": "Write one page about one block: PDF or HTML to attach.",
+    "report": "Write one document about blocks: PDF or HTML to attach.",
     "export": "Write fragility functions for other tools.",
     "models": "List, show and choose fitted fragility models.",
     "plot": "Draw models, data, spectra, responses and failure modes.",

@@ -12,7 +12,14 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
-from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import (
+    block_in_words,
+    glossary,
+    interval,
+    model_in_words,
+    percent,
+    prediction_in_words,
+)
 from rbfrag.question.fields import declared, option_of
 
 if TYPE_CHECKING:
@@ -29,6 +36,12 @@ def print_sentences(sentences: Iterable[str]) -> None:
     for sentence in sentences:
         print(sentence)
     print()
+
+
+def print_glossary(*texts: str) -> None:
+    """Print, below an answer, what words of its texts mean, where one needs it."""
+    if words := glossary(*texts):
+        print(f"\n({words})")
 
 
 def print_pairs(pairs: Mapping[str, object]) -> None:
@@ -248,7 +261,8 @@ def show_prediction(
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    print_sentences((*prediction_in_words(document), *block_in_words(document["method"], given)))
+    said = (*prediction_in_words(document), *block_in_words(document["method"], given))
+    print_sentences(said)
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
     else:
@@ -264,6 +278,7 @@ def show_prediction(
         print()
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
+    print_glossary(*said, *shown)
     print_warnings(warnings, [name for name in declared() if "_" in name])
 
 
@@ -275,12 +290,10 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
     }
     return {
         "probability": percent(document["probability"]),
-        **{
-            name: " to ".join(map(percent, pair)) for name, pair in ends.items() if None not in pair
-        },
+        **{name: interval(*pair) for name, pair in ends.items() if None not in pair},
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
-        "model": document["model"],
+        "model": model_in_words(document),
         "data": document["data"],
     }
 

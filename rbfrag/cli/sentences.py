@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.words import percent
+from rbfrag.fragility.words import interval, percent, with_interval
 
 STATUS = {
     "below_limit": "This motion topples no block of this size down to the search limit.",
@@ -94,16 +94,16 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     if answer is not None and answer["covered_only"]["probability"] is not None:
         total = answer["covered_only"]
         yield (
-            f"Under this shaking {percent(total['probability'])} of the blocks that there is a "
-            f"model for fail ({percent(total['ci_low'])} to {percent(total['ci_high'])}); these "
-            f"are {percent(answer['covered_share'])} of all."
+            f"Of the blocks that there is a model for, {percent(answer['covered_share'])} of all, "
+            f"{with_interval(total['probability'], total['ci_low'], total['ci_high'])} fail under "
+            "this shaking."
         )
     for scale in () if shaking is None else shaking["scales"]:
         of_all = scale["all"]["fails_of_all"]
         unknown = scale["all"]["open_of_all"]
         yield (
-            f"{shaking['motion']} times {scale['scale']:g}: {percent(of_all['share'])} of the "
-            f"blocks fail ({percent(of_all['ci_low'])} to {percent(of_all['ci_high'])})"
+            f"{shaking['motion']} times {scale['scale']:g}: of the blocks "
+            f"{with_interval(of_all['share'], of_all['ci_low'], of_all['ci_high'])} fail"
             + (f"; of another {percent(unknown)} it is open whether they do." if unknown else ".")
         )
 
@@ -219,13 +219,13 @@ def answer_in_short(row: Mapping[str, Any]) -> dict[str, object]:
     Args:
         row: one of ``blocks`` of `rbfrag predict --blocks --json`.
     """
-    ends = [percent(row[name]) for name in ("ci_low", "ci_high") if row[name] is not None]
+    ends = row["ci_low"], row["ci_high"]
     return {
         "block": row["block_id"],
         "kind": row["kind"],
         "mode": row["mode"],
         "probability": None if row["probability"] is None else percent(row["probability"]),
-        "interval": " to ".join(dict.fromkeys(ends)) or None,
+        "interval": None if None in ends else interval(*ends),
         "reason": row["reason"],
     }
 

@@ -17,9 +17,9 @@ from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
-from rbfrag.question.fields import BlockFields, column_of, names_of
+from rbfrag.question.fields import BlockFields, MeasureFields, column_of, names_of
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import SHAPES, SPACE
+from rbfrag.question.shapes import OF_A_SHAPE, SHAPES, SPACE
 from rbfrag.question.table import Header, columns_in
 
 TEXTS = ("block_id", "site_id", "kind", "mode", *SPACE)
@@ -184,3 +184,20 @@ def opened_table(
         file = open_table(source, stack, sheet=sheet)
         name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
         yield BlockTable(name, file, columns_in(file.header, name, (*read, *texts)), texts)
+
+
+def stated_rows(
+    source: str | os.PathLike[str], given: Mapping[str, Any], *, sheet: str | None = None
+) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+    """Return what each row of a table states, beside ``given``, and the remarks of the table."""
+    read = names_of(BlockFields, MeasureFields)
+    with opened_table(source, read, sheet=sheet) as table:
+        table.check(given, given.get("kind"))
+        columns, faults, _ = table.whole()
+    rows = []
+    for i, cells in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
+        row = {n: v for n, v in zip(columns, cells, strict=True) if v == v and v != ""}
+        if kinds_by_numbers(row):  # which go before a shape
+            row = {name: row[name] for name in row if name not in OF_A_SHAPE}
+        rows.append({**given, **row, **({"reason": faults[i]} if i in faults else {})})
+    return rows, table.remarks((*read, *TEXTS))

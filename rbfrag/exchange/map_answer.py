@@ -23,6 +23,7 @@ from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.shaking import doubts_about
+from rbfrag.question.words import numbers_in_words
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -232,7 +233,5 @@ def _what(blocks: Mapping[str, Any], own: bool) -> str:
         return f"{size} blocks at their places"
     if size == 1:
         numbers = {name: values[0] for name, values in numbers_in(blocks).items()}
-        if "kr" in numbers:
-            return f"block with p² = {numbers['p2']:g} 1/s², $k_r$ = {numbers['kr']:g}"
-        return "block with " + ", ".join(f"{name} = {each:g}" for name, each in numbers.items())
+        return f"block with {numbers_in_words(numbers, 6)}"
     return f"mean of {size} blocks"

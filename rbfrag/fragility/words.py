@@ -17,6 +17,17 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{digits}f} %"
 
 
+def interval(low: float, high: float) -> str:
+    """Return an interval of shares in percent; one share where its ends read alike."""
+    return " to ".join(dict.fromkeys((percent(low), percent(high))))
+
+
+def with_interval(share: float, low: float, high: float) -> str:
+    """Return a share in percent with its interval, unless that says no more."""
+    ends = interval(low, high)
+    return ends if ends == percent(share) else f"{percent(share)} ({ends})"
+
+
 def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what P, its interval and the range at some sites mean, in counts of blocks.
 
@@ -32,12 +43,12 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     of_block = document.get("block_sd")
     # what slides too far or slumps past a limit does not fall
     fall = "fall" if document["mode"] == "topple" else "fail"
-    one = "s" if _count(p, of) in ("1", "fewer than 1") else ""
+    count, ends = _count(p, of), _range(low, high, of)
+    one = "s" if count in ("1", "fewer than 1") else ""
+    known = f"{'' if ends == count else f'{ends} '}as far as the data tell it"
     sentences = [
-        f"This block {fall}s or stands; in nearly all such cases it {fall}s ({level})."
-        if _range(low, high, of) == "nearly all"
-        else f"This block {fall}s or stands; of {of:,} such cases {_count(p, of)} {fall}{one} "
-        f"({_range(low, high, of)} as far as the data tell it, {level})."
+        f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, "
+        f"{level})."
     ]
     if sites is not None:
         where = f"At {at_sites(sites)}"
@@ -71,7 +82,7 @@ def at_sites(number: float) -> str:
 def _count(share: float, of: int) -> str:
     count = round(share * of)
     if count in (0, of) and 0.0 < share < 1.0:
-        return "fewer than 1" if count == 0 else "nearly all"
+        return "fewer than 1" if count == 0 else f"more than {of - 1:,}"
     return f"{count:,}"
 
 
@@ -107,6 +118,49 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     stands = (f"{block.support[:1].upper()}{block.support[1:]}.",) if block.support else ()
     return (f"The block has {numbers}.", *limit, *stands)
 
+
+GLOSSARY = {
+    "p²": "15/p² m is a rectangle's diagonal",
+    "k_r": "acceleration in g that lifts it",
+    "k_y": "acceleration in g that moves it",
+    "in domain": "such as the data",
+    "copula": "how the failures of one earthquake go together",
+}
+"""What a geologist cannot know of the words in answers."""
+
+
+def glossary(*texts: str) -> str:
+    """Return what words of some texts mean, each once; empty where none needs it."""
+    found = (f"{word}: {GLOSSARY[word]}" for word in GLOSSARY if any(word in t for t in texts))
+    return "; ".join(found)
+
+
+def model_in_words(document: Mapping[str, Any]) -> str:
+    """Return what people call a model: the measures that it reads, and what tells it from others.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+    """
+    from rbfrag.fragility.measures import SPECTRAL, TERMS
+    from rbfrag.fragility.methods import method_named
+
+    if (term := TERMS.get(document["term"])) is None:  # several models
+        return str(document["model"])
+    periods = {name: f"SA({period:g} s)" for period, name in SPECTRAL.items()}
+    read = (
+        _MEASURES.get(name) or periods.get(name) or name.partition("_")[0].upper()
+        for name in term.inputs
+    )
+    method = method_named(document["method"])
+    own = method.title or method.block.kind.replace("_", " ").removeprefix("toppling")
+    sized = "size-dependent" if "block's" in term.title else ""
+    return ", ".join(filter(None, (*read, sized, own)))
+
+
+_MEASURES = {
+    "xp_m_s": "toppling spectrum", "tm_s": "Tm", "arias_m_s": "Arias intensity",
+    "magnitude": "magnitude",
+}  # fmt: skip
 
 SYMBOLS = {
     "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",

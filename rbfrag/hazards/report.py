@@ -6,9 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from rbfrag.fragility.words import percent
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.solver.results import FloatArray
 
 
 def as_dict(
@@ -85,6 +88,13 @@ def rate_columns(answer: HazardAnswer) -> dict[str, Any]:
     return columns
 
 
+def shares_between(answer: HazardAnswer, levels: FloatArray) -> FloatArray:
+    """Return the shares of the first block's rate that come from shaking between levels."""
+    rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
+    below = np.append(0.0, answer.contribution[0].cumsum()) / rate
+    return np.diff(np.interp(np.log(levels), np.log(answer.edges), below))
+
+
 def or_null(column: Any) -> list[float | None]:
     """Return the values of an array, None for NaN."""
     return [None if math.isnan(value) else value for value in column.tolist()]
@@ -127,12 +137,16 @@ def _in_common(answer: HazardAnswer, places: Sequence[str | None]) -> dict[str, 
     }
 
 
+def two_digits(value: float) -> str:
+    """Return a number with two digits, without an exponent where it is large."""
+    return f"{float(f'{value:.2g}'):,.15g}"
+
+
 def once_in(annual_rate: float) -> str:
     """Return a rate as people say it: once in so many years."""
     if not annual_rate > 1e-8:
         return "less than once in a hundred million years"
-    years = float(f"{1.0 / annual_rate:.2g}")
-    return f"once in {years:,.0f} years" if years >= 10.0 else f"once in {years:g} years"
+    return f"once in {two_digits(1.0 / annual_rate)} years"
 
 
 def rate_in_words(document: Mapping[str, Any]) -> str:

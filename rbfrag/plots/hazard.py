@@ -9,22 +9,20 @@ import numpy as np
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
+from rbfrag.hazards.report import shares_between
 from rbfrag.plots import canvas
+from rbfrag.plots.curve import AXIS
 from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHOWN = 1e-4
-_NAMES = {
-    "pga_g": "peak ground acceleration, PGA [g]",
-    "pgv_m_s": "peak ground velocity, PGV [m/s]",
-}
+_SHOWN = 1e-3
 
 
 def measure_title(curve: HazardCurve) -> str:
     """Return what the levels of a curve are, with their unit."""
-    return _NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
+    return AXIS.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
 
 
 @canvas.in_own_style
@@ -67,18 +65,18 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
     top.loglog(curve.levels, curve.annual_rate, "o-", color="black", ms=3.5, lw=1.4)
     top.set_ylabel("exceedances a year, λ [1/a]")
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
-    width = np.diff(np.log10(answer.edges))
-    percent = 100.0 * answer.contribution[0] / rate
+    edges = curve.levels
+    percent = 100.0 * shares_between(answer, edges)
     bottom.bar(
-        answer.edges[:-1], percent / width, width=np.diff(answer.edges), align="edge",
+        edges[:-1], percent, width=np.diff(edges), align="edge",
         color="#2b6cac", edgecolor="white", linewidth=0.3,
     )  # fmt: skip
-    bottom.set_ylabel("share of the rate\n[% per decade of shaking]")
+    bottom.set_ylabel("share of the rate [%]\nbetween levels of the curve")
     bottom.set_ylim(0.0, None if percent.any() else 1.0)
     bottom.set_xlabel(measure_title(curve))
     seen = percent > _SHOWN * max(float(percent.max()), np.finfo(float).tiny)
     if seen.any():
-        left, right = answer.edges[:-1][seen][0], answer.edges[1:][seen][-1]
+        left, right = edges[:-1][seen][0], edges[1:][seen][-1]
         bottom.set_xlim(left, right)
         inside = (curve.levels >= left) & (curve.levels <= right)
         if inside.sum() > 1:

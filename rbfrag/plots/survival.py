@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.words import with_interval
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.standing import Standing
@@ -69,8 +70,8 @@ def plot_survival(
     canvas.light_grid(*panels[:2])
     who = "The block stands" if answer.blocks == 1 else f"All {answer.blocks} blocks stand"
     figure.suptitle(
-        f"{who} after {answer.age_years:g} years with P = {answer.probability_standing:.3g} "
-        f"({100 * answer.level:g} % interval {answer.ci_low:.2g} to {answer.ci_high:.2g})",
+        f"{who} for {answer.age_years:,.6g} years with a probability of "
+        + with_interval(answer.probability_standing, answer.ci_low, answer.ci_high),
         fontsize=11,
     )
     canvas.legend_below(figure, 4)

@@ -623,6 +623,19 @@ class RowFields(TypedDict, total=False):
     loss_sigma: Annotated[float, Field("Standard deviation of the logarithm of the loss")]
 
 
+GROUPS: Mapping[str, tuple[Any, ...]] = {
+    "First": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
+    "A block by its numbers": (NumberFields, FailureFields),
+    "A block by its shape": ("block", ShapeFields),
+    "Planes and joints": (PlaneFields, SpaceFields, JointFields, WholeFields, AtRestFields),
+    "What the block may be": (ScatterFields,),
+    "More of the shaking": (MeasureFields, RecordFields),
+    "Earthquake, site and scatter of the shaking": (SceneFields, SourceFields),
+    "What is asked": (RequestFields,),
+}
+"""Fields by what they are about, those first that a beginner states: a field belongs where it is
+found first."""
+
 SPECTRAL = tuple(name for name in MeasureFields.__annotations__ if name.startswith("sa"))
 
 _CLASSES = (QuestionFields, AtRestFields, RowFields)
@@ -646,8 +659,14 @@ def declared() -> dict[str, Field]:
 
 
 def names_of(*classes: Any) -> tuple[str, ...]:
-    """Return the fields that classes declare, in their order."""
-    return tuple(dict.fromkeys(name for each in classes for name in _hints(each)))
+    """Return the fields that classes declare, in their order; a name is one of its own."""
+    every = ((each,) if isinstance(each, str) else _hints(each) for each in classes)
+    return tuple(dict.fromkeys(name for names in every for name in names))
+
+
+def group_of(name: str) -> str | None:
+    """Return what a field is about; None for a name that is no field."""
+    return next((group for group, of in GROUPS.items() if name in names_of(*of)), None)
 
 
 def _hints(fields: Any) -> Mapping[str, Any]:

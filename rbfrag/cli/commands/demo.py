@@ -13,11 +13,11 @@ from rbfrag.cli.parameters.stack import option, stacked
 EXAMPLE = "Example:  rbfrag demo"
 
 NEXT = (
-    "rbfrag predict --height 2 --width 0.4 --phi 40 --pgv 0.9",
-    "rbfrag predict --height 2 --width 0.4 --kind rocking --pgv 0.9",
+    "rbfrag block --template blocks.xlsx",
+    "rbfrag report blocks.xlsx --pgv 0.6 --out blocks.pdf",
     "rbfrag serve",
 )
-"""Commands that are named at the end."""
+"""Commands that are named at the end, with the extras that `make demo` installs."""
 
 
 @stacked

@@ -10,6 +10,7 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
+    print_glossary,
     print_json,
     print_pairs,
     print_rows,
@@ -21,7 +22,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import percent
+from rbfrag.fragility.words import model_in_words, percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 from rbfrag.question.fields import BlockFields, WholeFields
 
@@ -203,13 +204,15 @@ def _print(
         if branches:
             print()
             print_table(list(branches[0]), [list(row.values()) for row in branches])
+    if verbose:
+        print_glossary(str(document.get("joint_law")))
     print_warnings(warnings)
 
 
 def _short(document: dict[str, Any]) -> dict[str, Any]:
     """Return what is shown without --verbose."""
-    known = {name: document[name] for name in SHORT if document.get(name) is not None}
-    return rounded_values(known)
+    named = {**document, "model": model_in_words(document)}
+    return rounded_values({name: named[name] for name in SHORT if named.get(name) is not None})
 
 
 def _of_all(answer: HazardAnswer) -> Iterator[str]:
@@ -245,12 +248,10 @@ def _of_all(answer: HazardAnswer) -> Iterator[str]:
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
-    import numpy as np
+    from rbfrag.hazards.report import shares_between
 
     unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
-    levels, imt = curve.levels, curve.imt
-    below = np.concatenate([[0.0], answer.contribution[0].cumsum()]) / answer.annual_rate[0]
-    parts = np.diff(np.interp(np.log(levels), np.log(answer.edges), below))
+    levels, imt, parts = curve.levels, curve.imt, shares_between(answer, curve.levels)
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
         for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)

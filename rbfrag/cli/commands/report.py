@@ -1,12 +1,14 @@
-"""`rbfrag report`: a question about one block, answered on one page."""
+"""`rbfrag report`: a question about blocks, answered in a document."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
 
-from rbfrag.cli.output import print_json, print_sentences, print_warnings
+from rbfrag.cli.output import print_json, print_rows, print_sentences, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.parameters.stack import argument, option, stacked
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
 
@@ -33,6 +35,13 @@ class Hazard:
 @stacked
 def report(
     *,
+    blocks: str | None = argument(
+        "Table of blocks (.csv, .xlsx, .parquet, .geojson) in the place of one block: a summary, "
+        "and half a page for each. Options hold for the rows that do not state them.",
+        None,
+        metavar="[BLOCKS]",
+    ),
+    sheet: str | None = option(options.SHEET, metavar="NAME"),
     out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
     given: options.Block,
     measures: options.Measures,
@@ -42,24 +51,38 @@ def report(
     answering: options.Ranging,
     json: options.Json = False,
 ) -> None:
-    """Write one page about one block: PDF or HTML to attach.
+    """Write one document about blocks: PDF or HTML to attach.
 
-    It has the answer in a sentence, the block to scale, a table of what was asked, the design
+    A page has the answer in a sentence, the block to scale, a table of what was asked, the design
     chart and the fragility curve with the block on them, with --hazard the annual rate, and the
     versions of program, model and data. The same question gives the same file.
     """
-    from rbfrag.plots.report.contents import RateQuestion
+    from rbfrag.exchange.block_table import stated_rows
+    from rbfrag.plots.report.contents import COLUMNS, RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
+    rows: list[dict[str, Any]] = [{**given, **measures}]
+    remarks: tuple[str, ...] = ()
+    if blocks is not None:
+        rows, remarks = stated_rows(blocks, rows[0], sheet=sheet)
+    title = heading.title or (TITLE if len(rows) == 1 else f"{TITLE}s")
     with given.named():
-        contents = write_report(
-            out, {**given, **measures}, RateQuestion(rate.hazard, rate.years, vars(meaning)),
-            title=heading.title or TITLE, date=heading.date, **answering,
+        entries = write_report(
+            out, rows, RateQuestion(rate.hazard, rate.years, vars(meaning)), title=title,
+            date=heading.date, **answering,
         )  # fmt: skip
+    told = [entry.contents for entry in entries if entry.contents is not None]
     if json:
-        rates = None if contents.rate is None else contents.rate.document
-        print_json({"file": out, **contents.document, "hazard": rates})
+        documents = [
+            {**each.document, "hazard": None if each.rate is None else each.rate.document}
+            for each in told
+        ]
+        print_json({"file": out, **(documents[0] if blocks is None else {"blocks": documents})})
         return
-    print_sentences(contents.sentences)
+    if len(rows) == 1:
+        print_sentences(told[0].sentences)
+    else:
+        print_rows([{**dict(zip_longest(COLUMNS, e.cells)), "reason": e.reason} for e in entries])
+        print()
     print(out)
-    print_warnings(contents.remarks)
+    print_warnings(dict.fromkeys((*remarks, *(text for each in told for text in each.remarks))))

@@ -18,6 +18,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
+from rbfrag.fragility.words import model_in_words
 
 EXAMPLE = (
     "Example:  rbfrag shakemap grid.xml --height 2.4 --width 0.5 --out map.geojson --plot map.png"
@@ -115,7 +116,8 @@ def shakemap(
         return
     print_sentences(map_in_words(document, own="lon" in several.columns))
     del document["warnings"]
-    short = rounded_values({name: document[name] for name in SHORT})
+    named = {**document, "model": model_in_words(document)}
+    short = rounded_values({name: named[name] for name in SHORT})
     print_pairs(document if printing.verbose else short)
     print_warnings(warnings)
 

@@ -15,9 +15,11 @@ from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.refusals import refuse
 from rbfrag.errors import InputError
 from rbfrag.question.fields import (
+    GROUPS,
     OTHER_WORDS,
     by_field,
     declared,
+    group_of,
     names_of,
     option_of,
     word_of,
@@ -93,22 +95,25 @@ class FieldOptions(NamedTuple):
 
     def options(self) -> Iterator[inspect.Parameter]:
         """Yield the options, as typer reads them."""
-        every = [(e,) if isinstance(e, str) else names_of(e) for e in self.classes]
-        for name in dict.fromkeys(name for names in every for name in names):
+        for name in names_of(*self.classes):
             if name in self.without:
                 continue
-            about = declared()[name]
+            about, panel = declared()[name], group_of(name)
             if name == "block":
                 for word, help in FILES.items():
-                    yield _parameter(word, str | None, option(help, metavar="FILE"))
+                    own = option(help, metavar="FILE", rich_help_panel=panel)
+                    yield _parameter(word, str | None, own)
                 continue
-            help, further = about.sentence(option_of), FURTHER.get(name, {})
-            own = option(help, False if about.is_flag else None, **further)
+            further = {"rich_help_panel": panel, **FURTHER.get(name, {})}
             kind = bool if about.is_flag else str | None if about.is_text else float | None
-            yield _parameter(word_of(name), kind, own)
-            for word, other in OTHER_WORDS.items():
-                if other == name:
-                    yield _parameter(word, kind, option(f"Another word for {option_of(name)}."))
+            # the word that people say has the help
+            *others, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
+            help = about.sentence(option_of)
+            own = option(help, False if about.is_flag else None, **further)
+            yield _parameter(first, kind, own)
+            for word in others:
+                other = option(f"Another word for --{first}.", rich_help_panel="Planes and joints")
+                yield _parameter(word, kind, other)
 
     def read(self, words: Mapping[str, Any]) -> Given:
         """Return what was given, by field; of a block file what no option states anew."""
@@ -247,8 +252,24 @@ def read_plainly(command: Any) -> None:
         return every
 
     command.get_params = params
+    command.format_options = partial(_write_panels, command)
     for each in getattr(command, "commands", {}).values():
         read_plainly(each)
+
+
+def _write_panels(command: Any, context: Any, formatter: Any) -> None:
+    """Write the options of a command by what they are about, as their fields declare it."""
+    panels: dict[str, list[Any]] = {name: [] for name in ("Arguments", *GROUPS, "Options")}
+    for each in command.get_params(context):
+        if record := each.get_help_record(context):
+            kind = f"{each.param_type_name}s".capitalize()
+            panels[getattr(each, "rich_help_panel", None) or kind].append(record)
+    for name, records in panels.items():
+        if records:
+            with formatter.section(name):
+                formatter.write_dl(records)
+    if hasattr(command, "format_commands"):
+        command.format_commands(context, formatter)
 
 
 def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:

@@ -9,10 +9,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
-from rbfrag.fragility.measures import SPECTRAL, STATED
+from rbfrag.errors import InputError
+from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import SYMBOLS, at_sites, block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import (
+    SYMBOLS,
+    at_sites,
+    block_in_words,
+    interval,
+    percent,
+    prediction_in_words,
+)
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
@@ -31,17 +39,8 @@ from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 
-_MEASURES = {
-    "pgv_m_s": ("peak ground velocity, PGV", "m/s"),
-    "pga_g": ("peak ground acceleration, PGA", "g"),
-    "tm_s": ("mean period, Tm", "s"),
-    "pgd_m": ("peak ground displacement, PGD", "m"),
-    **{
-        name: (f"spectral acceleration, SA({period:g} s)", "g") for period, name in SPECTRAL.items()
-    },
-    "arias_m_s": ("Arias intensity", "m/s"),
-    "magnitude": ("magnitude", ""),
-}
+MOST = 200
+"""Blocks of a report."""
 
 SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
 """A symbol with its index, k_r for example."""
@@ -156,7 +155,7 @@ def contents_of(
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
-            ("Shaking", _shaking_rows(measures)),
+            ("Shaking", tuple(number_in_words(n, v, 6) for n, v in measures.items())),
             *_answer_tables(document, answered),
         ),
         remarks=tuple(dict.fromkeys(warnings)),
@@ -169,6 +168,53 @@ def contents_of(
         document=document,
         rate=answered,
     )
+
+
+class Entry(NamedTuple):
+    """One block of a report: what is said of it, or why nothing is."""
+
+    name: str
+    contents: Contents | None
+    reason: str = ""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its row of the summary; of one that is not answered its name."""
+        if self.contents is None:
+            return (self.name,)
+        block, _, answer, *hazard = (rows for _, rows in self.contents.tables)
+        read = block[0], *answer[:2], *(rows[1] for rows in hazard)
+        return (self.name, *(value for _, value in read))
+
+
+COLUMNS = ("block", "fails by", "P", "interval", "annual rate")
+
+
+def entries_of(
+    rows: Sequence[Mapping[str, Any]], rate: RateQuestion | None, **answering: Unpack[RangeFields]
+) -> list[Entry]:
+    """Answer a question about each of several blocks; one alone must be answered.
+
+    Args:
+        rows: fields of block and shaking, with ``block_id``, and ``reason`` of what is wrong.
+    """
+    if not 0 < len(rows) <= MOST:
+        raise InputError(f"a report is of 1 to {MOST} blocks, and these are {len(rows):,}")
+    entries = []
+    for i, row in enumerate(rows, start=1):
+        given = {name: row[name] for name in row if name not in ("block_id", "reason")}
+        name = str(row.get("block_id", i))
+        try:
+            if "reason" in row:
+                raise InputError(row["reason"])
+            entries.append(Entry(name, contents_of(given, rate, **answering)))
+        except InputError as error:
+            if len(rows) == 1:
+                raise
+            entries.append(Entry(name, None, str(error)))
+    if all(entry.contents is None for entry in entries):
+        raise InputError(f"no block can be answered; {entries[0].name}: {entries[0].reason}")
+    return entries
 
 
 def _rate(block: Mapping[str, Any], question: RateQuestion, answering: RangeFields) -> Rate | None:
@@ -242,32 +288,19 @@ def _block_rows(
     return tuple(rows)
 
 
-def _shaking_rows(measures: Mapping[str, float]) -> Rows:
-    return tuple(
-        (name, f"{measures[key]:g} {unit}".strip())
-        for key, (name, unit) in _MEASURES.items()
-        if key in measures
-    )
-
-
 def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
     level = f"{100.0 * document['level']:g} %"
     answer = [
         ("probability of failure", percent(document["probability"])),
-        (f"interval ({level})", _interval(document["ci_low"], document["ci_high"])),
+        (f"interval ({level})", interval(document["ci_low"], document["ci_high"])),
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append((f"share at {at_sites(document['sites'])} ({level})", _interval(*ends)))
+        answer.append((f"share at {at_sites(document['sites'])} ({level})", interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
     return [("Answer", tuple(answer)), *hazards]
-
-
-def _interval(low: float, high: float) -> str:
-    ends = percent(low), percent(high)
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _hazard_rows(rate: Rate, level: str) -> Rows:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from textwrap import wrap
+from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
+from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.plots.canvas import (
     BLUE,
@@ -15,7 +17,7 @@ from rbfrag.plots.canvas import (
     new_figure,
 )
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import SYMBOL, Contents
+from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
 from rbfrag.plots.report.panels import panels_of
 from rbfrag.version import __version__
 
@@ -41,6 +43,9 @@ that a cell does."""
 
 _TITLE_STEP_IN = 0.27
 
+_ROWS, _SUMMARY = 60, (_LEFT, 0.31, 0.54, 0.66, 0.82)
+"""Blocks of a page of the summary, and where its columns begin."""
+
 _BELOW = {"r": "\N{LATIN SUBSCRIPT SMALL LETTER R}", "s": "\N{LATIN SUBSCRIPT SMALL LETTER S}"}
 
 _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
@@ -48,29 +53,87 @@ _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 
 
 @in_own_style
-def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None:
-    """Write a report as a page of A4, PDF or PNG by the suffix of the file."""
+def write_sheet(entries: Sequence[Entry], title: str, date: str, target: Path) -> None:
+    """Write a report as pages of A4, PDF, or of one block PNG, by the suffix of the file."""
     from matplotlib import rc_context
+    from matplotlib.backends.backend_pdf import PdfPages
 
-    with rc_context(_RC):
+    about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
+    is_pdf = target.suffix.lower() == ".pdf"
+    if len(entries) > 1 and not is_pdf:
+        raise InputError(f"{target}: several blocks need several pages: write .pdf or .html")
+    with rc_context(_RC), written_whole(target, "report") as path, path.open("wb") as stream:
+        with PdfPages(stream, metadata={**about, "CreationDate": None}) if is_pdf else stream as to:
+            for page in _pages(entries, title, date):
+                if isinstance(to, PdfPages):
+                    to.savefig(page)
+                else:
+                    page.savefig(to, format="png", metadata=about, dpi=130)
+
+
+def _pages(entries: Sequence[Entry], title: str, date: str) -> Iterator[Figure]:
+    """Yield the pages: one of a single block; or the summary, and half a page for each block."""
+    answered = [(e.name, e.contents) for e in entries if e.contents is not None]
+    draws: list[Callable[[Figure], None]] = [
+        *(partial(_draw_summary, entries=entries, first=i, title=title, date=date)
+          for i in range(0, len(entries), _ROWS)),
+        *(partial(_draw_halves, entries=answered[i : i + 2]) for i in range(0, len(answered), 2)),
+    ]  # fmt: skip
+    if len(entries) == 1:
+        draws = [partial(_draw, contents=answered[0][1], title=title, date=date)]
+    for draw in draws:
         figure = new_figure(_WIDTH_IN, _HEIGHT_IN)
-        _draw(figure, contents, title, date)
+        draw(figure)
         freeze_layout(figure)
         settle_labels(figure)
-        kind = target.suffix.lower()[1:]
-        about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
-        if kind == "pdf":
-            about["CreationDate"] = None
-        with written_whole(target, "report") as partial, partial.open("wb") as stream:
-            figure.savefig(stream, format=kind, metadata=about, dpi=130)
+        yield figure
+
+
+def _draw_summary(
+    figure: Figure, entries: Sequence[Entry], first: int, title: str, date: str
+) -> None:
+    (part,) = figure.subfigures(1, 1, squeeze=False)[0]
+    _write(part, _LEFT, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
+    _write(part, _RIGHT, 0.964, date, fontsize=9, ha="right")
+    of_page = entries[first : first + _ROWS]
+    for i, cells in enumerate([COLUMNS, *(entry.cells for entry in of_page)]):
+        style = {} if i else {"fontweight": "bold", "color": BLUE}
+        y, reason = 0.93 - i * _STEP_IN / _HEIGHT_IN, of_page[i - 1].reason if i else ""
+        for x, cell in zip(_SUMMARY, cells, strict=False):
+            _write(part, x, y, _cut(cell, _CELL), fontsize=8.2, **style)
+        _write(part, _SUMMARY[1], y, _cut(reason, _NARROW), fontsize=8.2)
+    versions = dict.fromkeys(v for e in entries if e.contents for v in e.contents.versions)
+    _write_lines(part, _wrapped_all(versions), _HEIGHT_IN)
+
+
+def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> None:
+    halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
+    for half, (name, contents) in zip(halves, entries, strict=False):
+        head_in = 0.85 + 0.17 * len(_head_lines(contents))
+        notes = _wrapped_all(contents.notes())
+        foot_in = 0.35 + 0.13 * len(notes)
+        body_in = 0.5 * _HEIGHT_IN - head_in - foot_in
+        head, body, foot = half.subfigures(3, 1, height_ratios=[head_in, body_in, foot_in])
+        _write_head(head, contents, [_cut(name, _TITLE)], "", head_in)
+        left, *cells, _ = body.subfigures(1, 4, width_ratios=[3.9, 2.1, 2.1, 0.17])
+        _write_tables(left, [(0.18, 0.46, contents.tables[:3])], body_in)
+        for cell, panel in zip(cells, panels_of(contents), strict=False):
+            panel.draw(cell)
+            for axes in cell.axes:
+                axes.set_xlabel(fill(axes.get_xlabel(), 24))
+            for legend in cell.legends:
+                legend.remove()
+        _write_lines(foot, notes, foot_in)
 
 
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
+    columns = [*zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True)]
+    notes = _wrapped_all((*contents.notes(), *contents.versions))
     lines = (sum(1.5 + len(rows) for _, rows in tables) for tables in contents.columns())
     tables_in = 0.1 + _STEP_IN * max(lines)
-    foot_in = 0.35 + 0.13 * len(_foot_lines(contents))
+    foot_in = 0.35 + 0.13 * len(notes)
     panels = panels_of(contents)
     rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
     row_in = min((_HEIGHT_IN - head_in - tables_in - foot_in) / len(rows), _TALLEST_ROW_IN)
@@ -78,7 +141,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _write_head(parts[0], contents, titles, date, head_in)
-    _write_tables(parts[1], contents, tables_in)
+    _write_tables(parts[1], columns, tables_in)
     for part, row in zip(parts[2:-1], rows, strict=True):
         # one picture alone is as wide as two
         widths = [2.0 / len(row)] * len(row)
@@ -87,7 +150,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
         for cell, panel in zip(cells, row, strict=True):
             panel.draw(cell)
             cell.suptitle(_shown(panel.title), fontsize=9, parse_math=False)
-    _write_foot(parts[-1], contents, heights[-1])
+    _write_lines(parts[-1], notes, heights[-1])
 
 
 def _head_lines(contents: Contents) -> list[tuple[str, bool]]:
@@ -103,8 +166,7 @@ def _wrapped(text: str, letters: int) -> list[str]:
     return wrap(text.replace(" %", "\u00a0%"), letters, break_on_hyphens=False)
 
 
-def _foot_lines(contents: Contents) -> list[str]:
-    texts = (*contents.notes(), *contents.versions)
+def _wrapped_all(texts: Iterable[str]) -> list[str]:
     return [line for text in texts for line in _wrapped(text, _FINE)]
 
 
@@ -133,22 +195,28 @@ def _write_head(
         y -= (0.2 if is_first else 0.165) / tall_in
 
 
-def _write_tables(part: SubFigure, contents: Contents, tall_in: float) -> None:
+def _cut(text: str, letters: int) -> str:
+    return text if len(text) <= letters else f"{text[: letters - 1]}…"
+
+
+def _write_tables(
+    part: SubFigure, columns: Sequence[tuple[float, float, Sequence[Table]]], tall_in: float
+) -> None:
+    """Write columns of tables: where they begin, how wide names are, and what they hold."""
     step = _STEP_IN / tall_in
-    for x, wide, tables in zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True):
+    for x, wide, tables in columns:
         y = 1.0 - 0.5 * step
         for heading, rows in tables:
             _write(part, x, y, heading, fontsize=9, fontweight="bold", color=BLUE)
             for name, value in rows:
                 y -= step
                 _write(part, x, y, name, fontsize=8.2)
-                shown = value if len(value) <= _CELL else f"{value[: _CELL - 1]}…"
-                _write(part, x + wide, y, shown, fontsize=8.2)
+                _write(part, x + wide, y, _cut(value, _CELL), fontsize=8.2)
             y -= 1.5 * step
 
 
-def _write_foot(part: SubFigure, contents: Contents, tall_in: float) -> None:
-    lines = _foot_lines(contents)
+def _write_lines(part: SubFigure, lines: Sequence[str], tall_in: float) -> None:
+    """Write small lines at the foot of a part."""
     y = 0.25 / tall_in + 0.13 * (len(lines) - 1) / tall_in
     for line in lines:
         _write(part, _LEFT, y, line, fontsize=6.8, color="#333333")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from rbfrag.plots.canvas import (
     new_figure,
 )
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import SYMBOL, Contents, Table
+from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
 from rbfrag.plots.report.panels import Panel, panels_of
 
 _SIZE_IN = (5.4, 4.6)
@@ -35,8 +35,10 @@ th, td { text-align: left; font-weight: normal; padding: .1rem .6rem .1rem 0;
 figure { margin: 0; break-inside: avoid; }
 figcaption { font-size: .9rem; }
 svg { width: 100%; height: auto; }
-footer { font-size: .85rem; color: #333; margin-top: 1rem; }
-footer p { margin: .2rem 0; }
+table.all th { width: auto; }
+section { break-inside: avoid; margin-top: 2rem; }
+.note, footer { font-size: .85rem; color: #333; margin-top: 1rem; }
+.note, footer p { margin: .2rem 0; }
 sub { font-size: 75%; line-height: 0; }
 @page { size: A4; margin: 12mm; }
 @media print { body { font-size: 10px; margin: 0; max-width: none; }
@@ -45,22 +47,47 @@ sub { font-size: 75%; line-height: 0; }
 
 
 @in_own_style
-def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
-    """Write a report as a page that needs nothing but itself."""
-    first, *others = contents.sentences
+def write_html(entries: Sequence[Entry], title: str, date: str, target: Path) -> None:
+    """Write a report as a page that needs nothing but itself: the summary, and each block."""
+    several = len(entries) > 1
+    answered = [(e, e.contents) for e in entries if e.contents is not None]
+    versions = dict.fromkeys(text for _, contents in answered for text in contents.versions)
     parts = [
         "<!DOCTYPE html>", '<html lang="en">', '<head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{escape(title)}</title>", f"<style>{_STYLE}</style></head>", "<body>",
         f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
-        f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
-        '<div class="parts">', *map(_column, contents.columns()), "</div>",
-        '<div class="parts">', *map(_figure, panels_of(contents)), "</div>",
-        "<footer>", *(f"<p>{_written(text)}</p>" for text in contents.notes()),
-        *(f"<p>{escape(text)}</p>" for text in contents.versions), "</footer>",
+        _summary(entries) if several else "",
+        *(text for i, (entry, contents) in enumerate(answered)
+          for text in _block(contents, entry.name if several else "", f"b{i}-" if several else "")),
+        "<footer>", *(f"<p>{escape(text)}</p>" for text in versions), "</footer>",
         "</body></html>",
     ]  # fmt: skip
     write_text("\n".join(part for part in parts if part) + "\n", target)
+
+
+def _summary(entries: Sequence[Entry]) -> str:
+    """Return a table of all blocks; a reason takes the cells of an answer."""
+    rows = [f"<tr>{''.join(f'<th><b>{name}</b></th>' for name in COLUMNS)}</tr>"]
+    for entry in entries:
+        texts = "".join(f"<td>{_written(cell)}</td>" for cell in entry.cells)
+        if entry.reason:
+            texts += f'<td colspan="{len(COLUMNS) - 1}">{_written(entry.reason)}</td>'
+        rows.append(f"<tr>{texts}</tr>")
+    return f'<table class="all">{"".join(rows)}</table>'
+
+
+def _block(contents: Contents, name: str, prefix: str) -> Iterator[str]:
+    """Yield what is said of a block; of several each has two pictures, and names of its own."""
+    first, *others = contents.sentences
+    panels = panels_of(contents)[: 2 if prefix else None]
+    yield f"<section><h1>{escape(name)}</h1>" if prefix else ""
+    yield f'<p class="first">{_written(first)}</p><p>{_written(" ".join(others))}</p>'
+    yield f'<div class="parts">{"".join(map(_column, contents.columns()))}</div>'
+    figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels)
+    yield f'<div class="parts">{"".join(figures)}</div>'
+    yield "".join(f'<p class="note">{_written(text)}</p>' for text in contents.notes())
+    yield "</section>" if prefix else ""
 
 
 def _written(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
@@ -12,7 +12,7 @@ from rbfrag.fragility.measures import spectral
 from rbfrag.hazards.curve import CurveKeywords
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.plots.canvas import new_figure
-from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
+from rbfrag.plots.report.contents import Entry, RateQuestion, entries_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
 from rbfrag.question.fields import MeasureFields, RangeFields
@@ -44,19 +44,25 @@ class ReportKeywords(
 def report(
     out: str | PathLike[str],
     *,
+    blocks: Sequence[Mapping[str, Any]] | None = None,
     curve: CurveLike | None = None,
     years: float = 50.0,
     title: str = TITLE,
     date: str = "",
     **question: Unpack[ReportKeywords],
 ) -> Path:
-    """Write one page about one block: sentence, drawing, inputs, chart, curve, rate, versions.
+    """Write one page about one block, or a summary and half a page about each of several.
+
+    A page has the answer in a sentence, drawing, inputs, chart, curve, rate and versions.
 
     The same question gives the same file, byte for byte, with the same versions of rbfrag and
     matplotlib.
 
     Args:
-        out: file to write: .pdf or .png (a page of A4), or .html (one file that needs no other).
+        out: file to write: .pdf (pages of A4), .png (of one block), or .html (one file that needs
+            no other).
+        blocks: several blocks, each its fields of block and shaking and ``block_id``; what
+            ``question`` states holds for all that do not state it.
         curve: hazard curve, or its file, for the annual rate.
         years: period of the probability [a].
         title: title of the page.
@@ -78,27 +84,28 @@ def report(
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     rate = RateQuestion(curve, years, meaning)
-    write_report(out, given, rate, title=title, date=date, **answering)
+    rows = [given] if blocks is None else [{**given, **block} for block in blocks]
+    write_report(out, rows, rate, title=title, date=date, **answering)
     return Path(out)
 
 
 def write_report(
     out: str | PathLike[str],
-    given: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
     rate: RateQuestion | None = None,
     *,
     title: str = TITLE,
     date: str = "",
     **answering: Unpack[RangeFields],
-) -> Contents:
-    """Write the report of a block.
+) -> list[Entry]:
+    """Write the report of blocks, each a row of its fields.
 
     Returns:
-        What the report says.
+        What the report says of each.
     """
     target = output_path(out, SUFFIXES, "report")
     new_figure()  # says which extra is missing, before long work
-    contents = contents_of(given, rate, **answering)
+    entries = entries_of(rows, rate, **answering)
     write = write_html if target.suffix.lower() == ".html" else write_sheet
-    write(contents, title, date, target)
-    return contents
+    write(entries, title, date, target)
+    return entries
