@@ -281,6 +281,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
         "model": document["model"],
+        **({} if document["how"].startswith("model") else {"how": document["how"]}),
         "data": document["data"],
     }
 

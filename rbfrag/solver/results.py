@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
+from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -235,6 +236,11 @@ class Response(Tabular):
     sensitive: bool | None = None
     state: BlockState | None = None
     parts: tuple[Part, ...] = ()
+
+    @property
+    def how(self) -> str:
+        """How it was answered: ``followed in time``, or ``by mechanics`` where nothing moves it."""
+        return BY_MECHANICS if self.started_s is None and not self.steps else FOLLOWED
 
 
 @dataclass(frozen=True, eq=False)
