@@ -294,6 +294,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
         "model": model_in_words(document),
+        **({} if document["how"].startswith("model") else {"how": document["how"]}),
         "data": document["data"],
     }
 

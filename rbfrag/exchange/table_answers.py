@@ -33,7 +33,7 @@ from rbfrag.solver.results import FloatArray
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
-ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "reason")
+ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "how", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
 _SHAKING, _SCATTER = names_of(ShakingFields), frozenset(names_of(ScatterFields))
@@ -209,7 +209,7 @@ def _answer(
         predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
-        name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "reason")
+        name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")
     }
     for name, stated, own in (
         ("kind", kinds, predicted.kinds),
@@ -223,6 +223,7 @@ def _answer(
     for name in (*_NUMBERS, OF_UNCERTAIN):
         answer[name][bad] = np.nan
     answer["in_domain"][bad] = False
+    answer["how"][bad] = ""
     answer["reason"][bad] = [*faults.values()]
     return predicted, answer
 

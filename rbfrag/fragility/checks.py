@@ -16,6 +16,7 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
+from rbfrag.solver.kinds import BY_MECHANICS
 
 _SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
 _STRENGTH = (
@@ -88,12 +89,14 @@ class Remark:
         holds: whether (where) it is so.
         name: the value concerned.
         text: what is wrong and what to do.
+        how: what answers there, in place of the model; empty where the model does.
     """
 
     holds: Any
     name: str
     value: Any
     text: str
+    how: str = ""
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
@@ -107,7 +110,7 @@ class Remark:
         return f"{self.name} {self.text}" if self.name else self.text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Contradiction(Remark):
     """Measures that do not go together in any fitted motion.
 
@@ -232,12 +235,12 @@ def answer_with_findings(
     above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
     model.with_ratios(values, above_zero)
     no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
-    say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING))
+    say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
     for bound in model.bounds(given):
         holds = bound.holds(values) & _not(ruled)
-        say(holds, Remark(holds, bound.about, values.get(bound.about), bound.text))
+        say(holds, Remark(holds, bound.about, values.get(bound.about), bound.text, bound.how))
         ruled = ruled | holds
     answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:
@@ -276,7 +279,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         value = values[ratio.name]
         outside = (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
         fitted = model.row.domain.get(ratio.name)
-        yield Contradiction(outside, "", value, "", ratio, values, fitted)
+        yield Contradiction(outside, "", value, "", ratio=ratio, values=values, fitted=fitted)
     for name, (low, high) in model.row.domain.items():
         if name not in values or name in _RATIO_NAMES:
             continue

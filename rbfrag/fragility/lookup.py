@@ -207,6 +207,8 @@ def _suited_in(
     of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
         raise UnknownModelError(f"{store.place} holds no {kind} model: {_how_to_make(kind)}")
+    named = [row.name for row in of_kind if TERMS[row.term].by_name and not row.is_default]
+    of_kind = [row for row in of_kind if row.name not in named]
     suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
     block = store.model(suited[0]).method.block if suited else block_of_question
     if not MEASURES.issuperset(given):
@@ -232,7 +234,8 @@ def _suited_in(
             )
         raise InputError(
             f"no stored {kind} model works with {_measures(given)}: give "
-            f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}",
+            f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}"
+            + (f"; {' and '.join(named)}: by name alone" if named else ""),
         )
     # those that are kept for comparison answer where there is no other, or where one was chosen
     usual = {term: m for term, m in best.items() if m.form.rank == 0 or m.row.is_default}
@@ -251,7 +254,7 @@ def _suited_in(
 
 def _or_fit(kind: str, terms: Iterable[str]) -> str:
     fitted = {name for method in methods() if method.block.kind == kind for name in method.forms}
-    known = [name for name in terms if name in fitted]
+    known = [name for name in terms if name in fitted and not TERMS[name].by_name]
     return f", or fit a model of {' or '.join(known)}" if known else ""
 
 

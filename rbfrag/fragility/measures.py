@@ -30,6 +30,7 @@ class Term:
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
         of_block: what the formula reads of the block, after the inputs.
+        by_name: its models answer where they are named or the default, never by themselves.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Term:
     formula: Callable[..., Any]
     variance_degree: int = 1
     of_block: tuple[str, ...] = ()
+    by_name: bool = False
 
     @property
     def label(self) -> str:
@@ -150,6 +152,7 @@ TERMS: Mapping[str, Term] = {
             ("pgd_m", "tm_s"),
             pgd_tm_m_s,
             variance_degree=2,
+            by_name=True,
         ),
         Term(
             "pgv_pga",

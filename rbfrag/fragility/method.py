@@ -17,6 +17,7 @@ from typing import Any, Literal, NamedTuple
 from rbfrag.fragility.dependence import normal_quantile, normal_share
 from rbfrag.fragility.measures import Term
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.kinds import BY_MECHANICS
 
 _LARGEST_EXPONENT = 709.0
 
@@ -153,11 +154,13 @@ class Bound(NamedTuple):
         holds: whether (where) it is so, from values by name.
         about: name of the value that it is said of.
         text: what is said.
+        how: what answers then, in place of the model.
     """
 
     holds: Callable[[Mapping[str, Any]], Any]
     about: str
     text: str
+    how: str = BY_MECHANICS
 
 
 ABOVE_TWICE_PGV = Bound(
@@ -180,6 +183,7 @@ ABOVE_SPECTRUM = Bound(
     "y_m_s",
     "is not below the toppling spectrum X(p) of the motion, which no excursion from rest exceeds: "
     "P = 0 by mechanics, not by the model",
+    "by the spectrum bound",
 )
 
 

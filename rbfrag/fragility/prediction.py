@@ -59,6 +59,8 @@ class Prediction:
         block_sd: standard deviation of P over what an uncertain block may be; None where it is
             certain.
         data: the database that the model is of; None of a model that was given itself.
+        how: what answered: ``by mechanics`` and ``by the spectrum bound``, which forbid failure, or
+            ``model NAME``.
         shaking: where the shaking is uncertain, the median of each measure that scatters, the
             standard deviation ``sigma`` of its logarithm, and ``tau``, the part of it that all
             sites of an earthquake share, where that is known; else None.
@@ -84,6 +86,7 @@ class Prediction:
     block_sd: float | None = None
     data: str | None = field(default=None, compare=False)
     shaking: dict[str, dict[str, float]] | None = None
+    how: str = ""
 
     @property
     def mode(self) -> str:
@@ -310,7 +313,7 @@ def single(name: str, value: object) -> float:
 def _answer_single(
     model: FragilityModel, given: dict[str, float], quantiles: Quantiles
 ) -> Prediction:
-    method, warnings = model.method, model.notes
+    method, warnings, how = model.method, model.notes, f"model {model.name}"
     try:
         values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
         clear = not model.uncertain and is_clear(model, values)
@@ -320,7 +323,8 @@ def _answer_single(
         answer = model.answer(values, quantiles, SINGLE, given)
         x, in_domain = values["intensity_m_s"], True
     else:
-        judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
+        judgement, sentences, ruled = _answer_with_diagnostics(model, given, quantiles)
+        how = ruled or how
         answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
     probability, low, high, eta, log_sigma, block_sd, _ = answer
@@ -348,6 +352,7 @@ def _answer_single(
         median,
         block_sd,
         model.data,
+        how=how,
     )
 
 
@@ -374,15 +379,17 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
 
 def _answer_with_diagnostics(
     model: FragilityModel, given: dict[str, float], quantiles: Quantiles
-) -> tuple[Judgement, list[str]]:
+) -> tuple[Judgement, list[str], str]:
     # Kept apart: most questions need no words.
     from rbfrag.fragility.checks import answer_with_findings
 
     sentences: list[str] = []
+    ruled: list[str] = []
 
     def say(holds: bool, finding: Remark) -> None:
         if holds:
             sentences.append(finding.about(finding.value))
+            ruled.append(finding.how)
 
     def refuse(holds: bool, finding: Remark) -> None:
         if holds:
@@ -392,4 +399,4 @@ def _answer_with_diagnostics(
         model, given, tuple(given), quantiles, SINGLE,
         say=say, refuse=refuse, unstable=refuse, nothing=False,
     )  # fmt: skip
-    return judgement, sentences
+    return judgement, sentences, "".join(ruled)

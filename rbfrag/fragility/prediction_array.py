@@ -20,7 +20,7 @@ from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.frames import Tabular
-from rbfrag.solver.kinds import KINDS, mode_of_kind
+from rbfrag.solver.kinds import BY_MECHANICS, KINDS, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES
 
@@ -80,6 +80,7 @@ class PredictionArray(Tabular):
             of one kind.
         mode_codes: failure mode of each, a place among all modes, -1 where it is not known.
         read: fields of the blocks that the answer depends on, where some stated more.
+        ruled: what answered in place of a model; read it by :attr:`how`.
     """
 
     kind: str
@@ -103,6 +104,15 @@ class PredictionArray(Tabular):
     kind_codes: NDArray[np.int8] | None = None
     mode_codes: NDArray[np.int8] | None = None
     read: frozenset[str] = frozenset()
+    ruled: Reasons | None = None
+
+    @property
+    def how(self) -> NDArray[np.object_]:
+        """What answered each: ``by mechanics``, ``model NAME``; empty text without an answer."""
+        names = np.full(self.probability.shape, f"model {self.model}", dtype=object)
+        ruled = names if self.ruled is None else self.ruled.array()
+        answered = np.where(ruled == "", names, ruled)
+        return np.where(np.isnan(self.probability), "", answered)
 
     @property
     def kinds(self) -> NDArray[np.object_]:
@@ -140,7 +150,7 @@ class PredictionArray(Tabular):
         columns = super().table_columns()
         kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
         others = {n: each for n, each in columns.items() if not n.endswith("_codes")}
-        return {**others, **kinds, "reason": self.reason.ravel()}
+        return {**others, **kinds, "how": self.how.ravel(), "reason": self.reason.ravel()}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the answers as a pandas table, with the index of the Series that were given."""
@@ -203,15 +213,15 @@ def predict_many(
     # gathered: the words cost as much for a few elements as for thousands
     flagged = np.concatenate([np.empty(0, dtype=np.intp), *_in_chunks(answer, size)])
 
-    def explain(start: int) -> tuple[NDArray[np.intp], NDArray[np.object_]]:
+    def explain(start: int) -> tuple[NDArray[np.intp], Texts, Texts]:
         places = flagged[start : start + CHUNK]
         own = {n: v.repeat(places.size) if v.size == 1 else v[places] for n, v in values.items()}
         with np.errstate(all="ignore"):
-            return places, _answer_with_diagnostics(
+            return places, *_answer_with_diagnostics(
                 model, own, reach, places, shape, out, refuse_nan=refuse_nan
             )
 
-    reasons = _in_chunks(explain, flagged.size)
+    explained = _in_chunks(explain, flagged.size)
     return PredictionArray(
         kind=model.kind,
         probability=out.probability.reshape(shape),
@@ -220,7 +230,7 @@ def predict_many(
         event_low=np.full(shape, np.nan),
         event_high=np.full(shape, np.nan),
         in_domain=out.in_domain.reshape(shape),
-        reasons=Reasons(shape, reasons),
+        reasons=Reasons(shape, [(places, texts) for places, texts, _ in explained]),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
         level=quantiles.level,
@@ -231,6 +241,7 @@ def predict_many(
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
+        ruled=Reasons(shape, [(places, how) for places, _, how in explained]),
     )
 
 
@@ -306,13 +317,15 @@ def _answer_with_diagnostics(
     out: _Columns,
     *,
     refuse_nan: bool,
-) -> NDArray[np.object_]:
-    """Answer elements of which there may be something to say; return what is to be said."""
-    sentences = _Sentences(places.size)
+) -> tuple[Texts, Texts]:
+    """Answer elements of which there may be something to say; return that, and what ruled."""
+    sentences, ruled = _Sentences(places.size), _Sentences(places.size)
     at_rest = np.zeros(places.size, dtype=np.bool_)
 
     def say(holds: NDArray[np.bool_], finding: Remark) -> None:
         sentences.add(holds, finding.in_general())
+        if finding.how:
+            ruled.add(holds, finding.how)
 
     def refuse(holds: NDArray[np.bool_], finding: Remark) -> None:
         if refuse_nan and holds.any():
@@ -325,6 +338,7 @@ def _answer_with_diagnostics(
     def unstable(holds: NDArray[np.bool_], _: Remark) -> None:
         at_rest[:] = holds
         sentences.add(holds, "unstable")
+        ruled.add(holds, BY_MECHANICS)
 
     block = model.method.block
     stated = [name for name in (*block.options, *block.sigmas, *ABOUT_SCATTER) if name in given]
@@ -343,7 +357,7 @@ def _answer_with_diagnostics(
     for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
         column[places] = np.where(judgement.missing, np.nan, value)
     out.in_domain[places] = judgement.in_domain
-    return sentences.texts()
+    return sentences.texts(), ruled.texts()
 
 
 def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:

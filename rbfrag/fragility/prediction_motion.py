@@ -114,6 +114,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
         **{
             **vars(forward),
             **means,
+            "how": max(forward.how, reverse.how, key=lambda how: how.startswith("model")),
             "in_domain": forward.in_domain and reverse.in_domain,
             "warnings": tuple(warnings),
         },

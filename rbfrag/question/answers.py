@@ -18,6 +18,7 @@ from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import OF_ALL, many_blocks
 from rbfrag.question.shapes import SPACE
+from rbfrag.solver.kinds import BY_MECHANICS
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -216,6 +217,7 @@ def _together(
         in_domain[at] = part.in_domain
         reasons += [(at[places], texts) for places, texts in part.reasons.parts]
     reasons += [(each.places, each.texts) for each in refused]
+    ruled: list[ReasonPart] = [(at, part.how) for at, part in parts]
     nothing = np.empty(0, dtype=np.intp)
     unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
     if unstable.size:
@@ -225,6 +227,7 @@ def _together(
             columns["block_sd"][unstable] = 0.0
         in_domain[unstable] = True
         reasons.append((unstable, np.full(unstable.size, "unstable", dtype=object)))
+        ruled.append((unstable, np.full(unstable.size, BY_MECHANICS, dtype=object)))
     answers = [part for _, part in parts]
 
     def named(name: str) -> str:
@@ -246,5 +249,6 @@ def _together(
         index=index if index is not None and shape == (len(index),) else None,
         **{name: column.reshape(shape) for name, column in columns.items()},
         read=blocks.read,
+        ruled=Reasons(shape, ruled),
         **grid,
     )

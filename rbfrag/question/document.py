@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 OF_EACH_MODEL = (
     "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
-    "in_domain",
+    "in_domain", "how",
 )  # fmt: skip
 """What a document has of the answer of each suited model."""
 

@@ -43,8 +43,8 @@ LOUD = ("phi", "frict", "dip", "beta", "incl", "pg", "sa", "shak", "slope")
 
 WRITTEN = frozenset((
     "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain",
-    "reason", "block_sd", "model", "term", "method", "level", "years", "numerical_error", "site",
-    "state", "yield_g", "kct", "azimuth_deg",
+    "how", "reason", "block_sd", "model", "term", "method", "level", "years", "numerical_error",
+    "site", "state", "yield_g", "kct", "azimuth_deg",
 ))  # fmt: skip
 """Columns of answers: nothing is said of them where they are not read again."""
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rbfrag.fragility.intervals import checked_level
 from rbfrag.rockmasses.report import block_columns
 from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass
+from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
 from rbfrag.solver.stability.modes import MODES, ModeName
 
 
@@ -227,12 +228,15 @@ def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
     scales = np.array(shaken.shaking.scales)
     m, n = shaken.code.shape
     names = np.array([*OUTCOMES, ""], dtype=object)
+    run = np.isin(names.astype(str), ("stays", "fails", *OPEN)) & (names != "bond_breaks")
+    ways = np.where(run, FOLLOWED, np.where(names == "", "", BY_MECHANICS)).astype(object)
     return {
         **{name: np.tile(values, m) for name, values in columns.items()},
         "scale": np.repeat(scales, n),
         "pga_g": np.repeat(shaken.pga_g, n),
         "outcome": names[shaken.code.reshape(-1)],
         "final_mode": np.array([*MODES, ""], dtype=object)[shaken.final_code.reshape(-1)],
+        "how": ways[shaken.code.reshape(-1)],
         "displacement_m": shaken.displacement_m.reshape(-1),
         "rotation_deg": np.degrees(shaken.rotation_rad.reshape(-1)),
         "reason": np.tile(reason, m),

@@ -17,7 +17,7 @@ from rbfrag.solver.stability.modes import MODES, STATES, ModeName
 COUNTS = ("count", "share", "has_model", "unstable", "in_domain")
 DRAWN = ("gamma_deg", "beta_deg", "phi_deg", "phi_back_deg", "s1_m", "s2_m")
 ANSWERS = (
-    "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain", "reason",
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain", "how", "reason",
 )  # fmt: skip
 """Values of modes, realisations and scenarios that documents and tables show as they are."""
 

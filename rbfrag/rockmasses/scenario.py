@@ -22,7 +22,7 @@ from rbfrag.question.question import predict
 from rbfrag.question.shapes import ModeShapes, p2_at_rest
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
-from rbfrag.solver.kinds import kind_of_mode
+from rbfrag.solver.kinds import BY_MECHANICS, kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, STABLE, UNSTABLE, ModeName
@@ -97,6 +97,8 @@ class Scenario:
             where that is not known, shape (n,).
         event_high: upper ends, shape (n,).
         in_domain: True where a model answered in the range that was fitted, shape (n,).
+        how: what answered, as in :class:`~rbfrag.fragility.prediction.Prediction`; empty without
+            an answer, shape (n,).
         reason: why an answer is missing, ruled or to be doubted, shape (n,).
         warnings: sentences on the whole answer.
         other_models: names of the models that answered for other modes than toppling, by mode.
@@ -117,6 +119,7 @@ class Scenario:
     event_low: FloatArray
     event_high: FloatArray
     in_domain: NDArray[np.bool_]
+    how: NDArray[np.object_]
     reason: NDArray[np.object_]
     warnings: tuple[str, ...]
     other_models: Mapping[ModeName, str] = field(default_factory=dict)
@@ -182,12 +185,13 @@ def scenario(
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
     columns[:3, unstable] = 1.0
     reason[unstable] = "unstable"
+    how = np.where(unstable, BY_MECHANICS, "").astype(object)
 
     def fill(blocks: NDArray[np.bool_], answers: PredictionArray) -> None:
         probability[blocks], reason[blocks] = answers.probability, answers.reason
         low[blocks], high[blocks] = answers.ci_low, answers.ci_high
         event_low[blocks], event_high[blocks] = answers.event_low, answers.event_high
-        in_domain[blocks] = answers.in_domain
+        in_domain[blocks], how[blocks] = answers.in_domain, answers.how
 
     answer: PredictionArray | None = None
     if topples.any():
@@ -252,6 +256,7 @@ def scenario(
         event_low=event_low,
         event_high=event_high,
         in_domain=in_domain,
+        how=how,
         reason=reason,
         warnings=tuple(warnings),
         other_models=others,

@@ -117,7 +117,7 @@ class PredictAnswer(_Document):
 
 
 OF_ARRAYS = (
-    "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain",
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain", "how",
     "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
 )  # fmt: skip
 """What is answered of many blocks."""

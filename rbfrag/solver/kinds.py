@@ -121,3 +121,6 @@ NOT_BACKED = (
     "than this model says; kind rocking answers for it as it stands (docs/theory/rocking.md)"
 )
 """What is said of a block that :func:`stands_free_of` is true of."""
+
+BY_MECHANICS, FOLLOWED = "by mechanics", "followed in time"
+"""How it is answered whether a block fails: without a run, and by one."""

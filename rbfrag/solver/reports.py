@@ -59,6 +59,7 @@ def response_as_dict(response: Response) -> dict[str, Any]:
         "mode": response.mode,
         "final_mode": response.final_mode,
         "outcome": response.outcome.value,
+        "how": response.how,
         **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
         "mode_changes": [asdict(change) for change in response.mode_changes],
         "warnings": list(response.warnings),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
+from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
 from rbfrag.solver.stability.modes import ModeName
 
 FloatArray = NDArray[np.float64]
@@ -248,6 +249,11 @@ class Response(Tabular):
     toe_needs_s: float | None = None
     toe_slips_g: float | None = None
     parts: tuple[Part, ...] = ()
+
+    @property
+    def how(self) -> str:
+        """How it was answered: ``followed in time``, or ``by mechanics`` where nothing moves it."""
+        return BY_MECHANICS if self.started_s is None and not self.steps else FOLLOWED
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert float(first["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-12)
-    assert [*first][-9:] == [*ANSWERS]
+    assert [*first][-len(ANSWERS) :] == [*ANSWERS]
     for row in (first, second, third, fourth):  # each block falls or stands
         assert row["event_low"] == row["event_high"] == ""
     assert (first["in_domain"], first["reason"]) == ("true", "")

@@ -49,6 +49,14 @@ def test_otherwise_the_best_that_the_measures_suffice_for(database, measures, na
     assert find_model(None, measures, path).name == name
 
 
+def test_terms_of_pgd_answer_by_name_alone(database):
+    path = database("pgd_tm", "pga_tm")
+    given = {"pgd_m": 0.1, "tm_s": 0.5, "db": path}
+    with pytest.raises(InputError, match=r"give pga_g and tm_s; wls-pgd_tm: by name alone"):
+        predict(3, 0.1, **given)
+    assert predict(3, 0.1, **given, model="wls-pgd_tm").term == "pgd_tm"
+
+
 def test_a_named_model_is_asked_whatever_the_default(database):
     path = database("pgv", "pga_tm")
     assert predict(3, 0.1, pga_g=0.4, tm_s=0.5, model="wls-pga_tm", db=path).term == "pga_tm"

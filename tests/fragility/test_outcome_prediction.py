@@ -117,6 +117,8 @@ def test_mechanics_is_stated(name, kr, words):
     assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
     assert words in answer.warnings[0]
     assert answer.in_domain
+    assert answer.how == ("by the spectrum bound" if name == "record-xp" else "by mechanics")
+    assert predict_known(model, 3.0, 0.05, known).how == f"model {name}"
 
 
 def test_the_gate_does_not_act_with_vertical_motion():

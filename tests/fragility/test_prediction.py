@@ -59,7 +59,7 @@ def test_keys_of_the_json_contract(row):
     assert list(answer.as_dict()) == [
         "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "level",
         "model", "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
-        "pgv_over_pga_s", "median_displacement_m", "block_sd", "data", "shaking",
+        "pgv_over_pga_s", "median_displacement_m", "block_sd", "data", "shaking", "how",
     ]  # fmt: skip
     assert (answer.kind, answer.failure, answer.median_displacement_m) == (
         "toppling", "toppling", None,
@@ -208,6 +208,10 @@ def test_arrays_give_a_reason_for_every_special_element(row):
         assert bool(reason) == bool(beginning)
     assert answer.in_domain.tolist() == [
         True, False, True, True, False, False, False, True, False, False,
+    ]  # fmt: skip
+    model, mechanics = f"model {answer.model}", "by mechanics"
+    assert answer.how.tolist() == [
+        model, "", mechanics, mechanics, "", "", "", mechanics, model, "",
     ]  # fmt: skip
 
 

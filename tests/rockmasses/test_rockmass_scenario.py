@@ -164,13 +164,14 @@ def test_the_block_table_has_every_realisation(made: Realisations, model: Fragil
     answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
     plain, full = block_columns(made), block_columns(made, answer)
     assert list(plain)[:5] == ["block_id", "p2_1_s2", "kr", "mode", "weight"]
-    assert list(full)[-7:] == [
+    assert list(full)[-8:] == [
         "probability",
         "ci_low",
         "ci_high",
         "event_low",
         "event_high",
         "in_domain",
+        "how",
         "reason",
     ]
     assert {column.shape for column in full.values()} == {(made.n,)}

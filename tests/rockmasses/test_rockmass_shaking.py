@@ -220,6 +220,10 @@ def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
         named[1, j] == OUTCOMES[four.code[1, j]] for j in np.flatnonzero(four.realisations.is_block)
     )
     assert set(named[:, ~four.realisations.is_block].ravel()) == {""}
+    run = np.isin(named.ravel().astype(str), ["at_rest", "unstable", "locked"], invert=True)
+    run &= named.ravel() != ""
+    assert set(columns["how"][run]) == {"followed in time"}
+    assert set(columns["how"][~run]) == {"by mechanics", ""}
 
 
 @pytest.mark.parametrize(

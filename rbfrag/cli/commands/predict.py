@@ -53,8 +53,8 @@ class BatchOptions:
     sheet: str | None = option(options.SHEET, metavar="NAME")
     out: str | None = option(
         "With --blocks: table to write, the same columns with kind, mode, probability, ci_low, "
-        "ci_high, event_low, event_high, in_domain, reason and, of uncertain blocks, block_sd. "
-        "Default: a list of the answers; --json lists the first 10,000.",
+        "ci_high, event_low, event_high, in_domain, how (what answered), reason and, of uncertain "
+        "blocks, block_sd. Default: a list of the answers; --json lists the first 10,000.",
         metavar="FILE",
     )
     excel_text: bool = option(options.EXCEL_TEXT, False)
