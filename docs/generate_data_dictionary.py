@@ -50,7 +50,7 @@ or `samples_sha256` with `dt_s`.
 def fields() -> str:
     """Return the table of the fields that blocks, their shaking and rows of tables have."""
     rows = []
-    for name in (*columns_declared(), "cohesion_pa", "density_kg_m3"):
+    for name in (*columns_declared(), "cohesion_pa"):
         about = declared()[name]
         others = [
             f"**{column_of(name)}**",

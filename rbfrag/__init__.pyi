@@ -16,6 +16,7 @@ from rbfrag.exchange.event_losses import losses as losses
 from rbfrag.exchange.map_answer import ShakeMapAnswer as ShakeMapAnswer
 from rbfrag.exchange.map_answer import shakemap as shakemap
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
+from rbfrag.exchange.release import write_release_rates as write_release_rates
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.hazards.answer import BranchRate as BranchRate
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer

@@ -43,6 +43,8 @@ def most_often(names: Sequence[str | None], rates: Sequence[float], most: int = 
     """
     first = sorted(range(len(rates)), key=lambda i: -rates[i])[:most]
     named = [f"{names[i] or f'block {i + 1}'} ({once_in(rates[i])})" for i in first]
+    if len(named) == 1:
+        return f"Most often fails {named[0]}."
     return f"Most often fail {', '.join(named[:-1])} and {named[-1]}."
 
 

@@ -19,7 +19,7 @@ from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
 from rbfrag.question.blocks import NUMBERS
 from rbfrag.question.fields import BlockFields, column_of, names_of
-from rbfrag.question.many import many_blocks
+from rbfrag.question.many import OF_ALL, many_blocks
 from rbfrag.question.shapes import OF_A_SHAPE, SPACE
 from rbfrag.solver.kinds import KINDS, facts_of
 
@@ -180,8 +180,9 @@ def read_blocks(
             any of their names, by numbers or by shape, dip and friction; and, if it has them,
             ``block_id``, ``site_id``, ``kind``, ``mode`` and the columns that are read.
         kind: kind of the rows that state none; None for what they are given by.
-        reads: which of ``lon`` and ``lat`` [deg], ``weight``, ``count``, ``loss`` and
-            ``loss_sigma`` the answer needs; what is wrong with others is no concern.
+        reads: which of ``lon`` and ``lat`` [deg], ``weight``, ``count``, ``loss``,
+            ``loss_sigma`` and other columns the answer needs, and which fields of shapes are kept;
+            what is wrong with others is no concern.
         one_kind: all are answered as of one kind, that which is named, or else that of most rows:
             others cannot be used.
         for_all: fields that are stated of all blocks; a cell goes before.
@@ -207,7 +208,7 @@ def read_blocks(
         table.check(stated, kind)
         columns, faults, lines = table.whole()
     name, size = table.name, len(lines)
-    values = {field: columns.pop(field) for field in fields if field in columns}
+    values: dict[str, Any] = {field: columns.pop(field) for field in fields if field in columns}
     for field in SPACE:
         if field in columns or field in stated:
             own = columns.pop(field, np.full(size, "", dtype=object))
@@ -215,8 +216,11 @@ def read_blocks(
     for field, value in stated.items():
         if field in SPACE:
             continue
-        own = values.get(field, np.full(size, np.nan))
-        values[field] = np.where(np.isnan(own), value, own)
+        own = (columns if field in OF_ALL else values).get(field, np.full(size, np.nan))
+        filled = np.where(np.isnan(own), value, own)
+        values[field] = value if field in OF_ALL else filled
+        if field in OF_ALL and field in reads:
+            columns[field] = filled
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{name}: lon and lat go together: give both columns, or neither")
     named = "block_id" in columns
@@ -231,7 +235,8 @@ def read_blocks(
     columns |= {
         column_of(field): each.copy()
         for field, each in values.items()
-        if field in (*NUMBERS, *blocks.read) and field not in OF_A_SHAPE
+        if (field in reads and field not in columns)
+        or (field in (*NUMBERS, *blocks.read) and field not in OF_A_SHAPE)
     }
     for group in blocks.groups:
         for field, each in group.numbers.items():
@@ -248,7 +253,7 @@ def read_blocks(
     _refuse_columns(columns, reasons)
     for i, fault in faults.items():
         reasons[i] = fault
-    remarks = (*blocks.remarks, *table.remarks({*blocks.read, *TEXTS, *PLACE, *PORTFOLIO}))
+    remarks = (*blocks.remarks, *table.remarks({*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads}))
     columns |= {"row": np.arange(size), "line": np.array(lines, dtype=np.int64)}
     return BlockRows(columns, reasons, name, table.file.word, named, remarks).checked()
 

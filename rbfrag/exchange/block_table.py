@@ -22,7 +22,7 @@ from rbfrag.question.sections import ANGLES
 from rbfrag.question.shapes import OF_A_SHAPE, SHAPES, SPACE
 from rbfrag.question.table import Header, columns_in
 
-TEXTS = ("block_id", "site_id", "kind", "mode", *SPACE)
+TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *SPACE)
 """Columns of texts."""
 
 IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}

@@ -617,6 +617,13 @@ class RowFields(TypedDict, total=False):
     mode: Annotated[str, Field("Its failure mode", "", ("failure_mode",), is_text=True)]
     lon: Annotated[float, Field("Longitude", "deg", ("longitude",))]
     lat: Annotated[float, Field("Latitude", "deg", ("latitude",))]
+    x: Annotated[float, Field("Place of the block in {crs}, to the east", "", ("easting", "x_m"))]
+    y: Annotated[float, Field("Place likewise, to the north", "", ("northing", "y_m"))]
+    z: Annotated[float, Field("Height of the place in {crs}", "", ("elevation", "z_m"))]
+    crs: Annotated[str, Field("Coordinate reference system, as EPSG:2056", is_text=True)]
+    strike_length_m: Annotated[
+        float, _length("Length of the block along the slope, for its volume", "strike_length")
+    ]
     count: Annotated[float, Field("Number of like blocks")]
     weight: Annotated[float, Field("What a failure counts")]
     loss: Annotated[float, Field("What a failure costs")]
@@ -689,7 +696,7 @@ def keywords_in_words(fields: Any) -> str:
 
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
-    return names_of(BlockFields, ShakingFields, RowFields, SpaceFields)
+    return (*names_of(BlockFields, ShakingFields, RowFields, SpaceFields), "density_kg_m3")
 
 
 def column_of(name: str) -> str:

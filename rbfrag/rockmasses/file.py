@@ -26,8 +26,9 @@ direction beside the file.
 
 CSV: the columns ``variable,distribution`` and, as needed, ``value, mean, median, sd, sd_ln, kappa,
 low, high, values``, one variable a row such as ``base.dip_deg,normal``; measurements stand in
-``values`` with blanks between them. ``realisations``, ``seed`` and ``block.back_fracture`` are rows
-with a ``value`` and no distribution.
+``values`` with blanks between them. A plane is a ``value``, 25/102 or the CSV of a set, or a list
+in ``values``. ``realisations``, ``seed`` and ``block.back_fracture`` are rows with a ``value`` and
+no distribution.
 """
 
 from __future__ import annotations
@@ -35,7 +36,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text, toml_document
@@ -49,6 +49,7 @@ COLUMNS = (
 """Columns of the CSV form; only the first is always needed."""
 
 _SECTIONS = ("face", "base", "back", "friction", "block")
+_PLANE = ".plane"
 _LARGEST_BYTES = 10_000_000
 
 
@@ -68,20 +69,19 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
         raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
     text = source_text(source, "a rock mass", _LARGEST_BYTES)
     try:
-        if suffix == ".csv":
-            return rock_mass_of_csv(text)
-        return rock_mass_of_tables(_with_measured(toml_document(text), source.parent))
+        described = _from_csv(text) if suffix == ".csv" else _flat(toml_document(text))
+        return RockMass.of(_with_measured(described, source.parent))
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
 
 
-def _with_measured(document: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a document with the planes of the tables that it names."""
-    for content in document.values():
-        plane = content.get("plane") if isinstance(content, dict) else None
-        if isinstance(plane, str) and plane.lower().endswith(".csv"):
-            content["plane"] = read_planes(folder / plane)
-    return document
+def _with_measured(description: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return a description with the planes of the tables that it names."""
+    for name, value in description.items():
+        is_plane = name.endswith(_PLANE) and isinstance(value, str)
+        if is_plane and str(value).lower().endswith(".csv"):
+            description[name] = read_planes(folder / str(value))
+    return description
 
 
 def rock_mass_of_toml(text: str) -> RockMass:
@@ -108,6 +108,11 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
     Raises:
         InputError: they describe no rock mass; the message names the key.
     """
+    return RockMass.of(_flat(document))
+
+
+def _flat(document: Mapping[str, object]) -> dict[str, object]:
+    """Return the keys of all tables of a document, each with the name of its table."""
     description: dict[str, object] = {}
     for name, content in document.items():
         if name not in _SECTIONS:
@@ -116,7 +121,7 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
         if not isinstance(content, dict):
             raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
         description |= {f"{name}.{key}": value for key, value in content.items()}
-    return RockMass.of(description)
+    return description
 
 
 def _from_csv(text: str) -> dict[str, object]:
@@ -154,7 +159,9 @@ def _row(keys: dict[str, str], variable: str, line: int) -> object:
     numbers: dict[str, object] = {}
     for name, text in keys.items():
         where = f"line {line}: {variable}: {name}"
-        if name == "values":
+        if variable.endswith(_PLANE) and name in ("value", "values"):
+            numbers["value"] = text.split() if name == "values" else text
+        elif name == "values":
             numbers[name] = [_number(part, where) for part in text.split()]
         elif text.lower() in ("true", "false"):
             numbers[name] = text.lower() == "true"

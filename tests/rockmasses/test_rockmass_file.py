@@ -64,6 +64,37 @@ def test_the_example_files_are_the_same_rock_mass() -> None:
     assert str(toml.variables["base.dip_deg"]) == "normal, mean 20, sd 5, not truncated"
 
 
+PLANES = """\
+variable,distribution,value,median,sd_ln,values
+face.plane,,70/090,,,
+base.plane,,base.csv,,,
+base.spacing_m,,1.0,,,
+back.plane,,,,,64/084 65/085 66/087
+back.spacing_m,lognormal,,0.6,0.1,
+friction.phi_deg,,40,,,
+"""
+
+
+def test_planes_in_both_forms(tmp_path: Path) -> None:
+    written(tmp_path, "base.csv", (EXAMPLES / "base.csv").read_text())
+    toml = (
+        '[face]\nplane = "70/090"\n[base]\nplane = "base.csv"\nspacing_m = 1.0\n[back]\n'
+        'plane = ["64/084", "65/085", "66/087"]\nspacing_m = { distribution = "lognormal", '
+        "median = 0.6, sd_ln = 0.1 }\n[friction]\nphi_deg = 40.0\n"
+    )
+    found = read_rock_mass(written(tmp_path, "mass.csv", PLANES))
+    assert found == read_rock_mass(written(tmp_path, "mass.toml", toml))
+    assert found.variables["base.dip_deg"].scale == pytest.approx(349.97, rel=1e-3)
+    for old, new, words in (
+        ("70/090", "70", "bad.csv: face.plane = '70' is not dip/dip direction"),
+        ("base.csv", "none.csv", "none.csv: no such file"),
+        ("base.plane,,", "base.plane,normal,", "base.plane = .* is not dip/dip direction"),
+        ("64/084", "64-084", "back.plane = '64-084' is not dip/dip direction"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_rock_mass(written(tmp_path, "bad.csv", PLANES.replace(old, new, 1)))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -5,8 +5,10 @@ import json
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import rbfrag
+from rbfrag.cli.main import app
 from rbfrag.cli.output import show_prediction
 from rbfrag.question.document import prediction_document
 
@@ -39,6 +41,26 @@ def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, 
     assert answer.json()["probability"] == own.probability
     assert answer.json()["ci_low"] == own.ci_low
     assert answer.json()["ci_high"] == own.ci_high
+
+
+def test_planes_in_space_are_answered_as_by_the_command_line(client, database):
+    planes = {"base": "4/150", "back": "78/095", "face": "80/090"}
+    shape = {"s1": 2.0, "s2": 0.4, "phi": 40.0, "pgv": 2.0}
+    options = [part for name, value in {**planes, **shape}.items() for part in (f"--{name}", value)]
+    shell = CliRunner().invoke(
+        app, ["predict", *map(str, options), "--db", str(database), "--json"]
+    )
+    wanted = json.loads(shell.stdout)
+    assert 0.0 < wanted["probability"] < 1.0
+    assert client.get("/v1/predict", params={**planes, **shape}).json() == wanted
+    posted = client.post("/v1/predict", json={**planes, **shape, "base": ["4/150", "35/140"]})
+    assert posted.status_code == 200
+    for name in ("probability", "ci_low", "ci_high"):
+        assert posted.json()[name][0] == pytest.approx(wanted[name], rel=1e-11)
+        assert posted.json()[name][1] is None
+    assert "base and back make a wedge" in posted.json()["reason"][1]
+    alone = client.post("/v1/predict", json={**planes, **shape}).json()
+    assert alone["probability"] == posted.json()["probability"][:1]
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

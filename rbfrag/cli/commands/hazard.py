@@ -93,6 +93,11 @@ def hazard(
     wanted: RateOptions,
     workers: WorkerOptions,
     out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
+    release: str | None = option(
+        "Write places, sizes and rates of the blocks for tools of rockfall propagation (.csv, "
+        ".xlsx, .parquet).",
+        metavar="FILE",
+    ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -111,7 +116,7 @@ def hazard(
     """
     import numpy as np
 
-    from rbfrag.exchange.block_rows import PLACE
+    from rbfrag.exchange.release import RELEASE, SIDES, release_columns
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
     from rbfrag.fragility.unusable import FROM_SUMS
     from rbfrag.hazards.answer import hazard_at_sites
@@ -121,7 +126,12 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    table, is_class, remarks, rows = blocks.given_blocks(given, reads=PLACE)
+    check_files(table=release)
+    table, is_class, remarks, rows = blocks.given_blocks(given, reads=RELEASE)
+    if release is not None and is_class:
+        raise InputError("--release needs the places of blocks, and a rock mass has none: --blocks")
+    if rows is None:
+        table = {**{name: [given[name]] for name in SIDES if name in given}, **table}
     files = [suited_in(path, **vars(meaning)) for path in curve]
     at = blocks_at_sites(
         files, table, site_chosen=meaning.site is not None, within_km=wanted.within_km
@@ -144,6 +154,8 @@ def hazard(
     )  # fmt: skip
     if out is not None:
         write_table(rate_columns(answer, at.columns, rows), out, excel_text=excel_text)
+    if release is not None:
+        write_table(release_columns(answer, at.columns), release, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 

@@ -1,0 +1,127 @@
+"""Annual rates of release as a table for tools that follow falling rocks to where they stop.
+
+A row is a block at its place, with its size and how often per year it comes loose. Such tools read
+places, masses or sizes, and none a rate: what they answer is joined to it by ``release_id``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.block_rows import PLACE, Blocks, read_blocks
+from rbfrag.exchange.tables.files import write_block_table
+from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.question.sections import in_sections
+from rbfrag.question.shapes import SHAPES, SPACE
+from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.results import FloatArray
+
+SIDES = (*dict.fromkeys(name for names in SHAPES for name in names), *SPACE, "density_kg_m3")
+"""Fields that the size and the mass of a block follow from."""
+
+RELEASE = (*PLACE, "x", "y", "z", "strike_length_m", *SIDES)
+"""Columns of blocks that the table is made of, beside their names and ``crs``."""
+
+LON_LAT = "EPSG:4326"
+"""Coordinate reference system of lon and lat."""
+
+
+def write_release_rates(answer: HazardAnswer, blocks: Blocks, path: str | os.PathLike[str]) -> Path:
+    """Write annual rates of blocks as a table of release for tools of rockfall propagation.
+
+    The columns are ``release_id, x, y, z, crs, volume_m3, mass_kg, density_kg_m3, annual_rate,
+    rate_low, rate_high, kind, d1_m, d2_m, d3_m``: the dimensions are those normal to the base,
+    along it and along the slope. What is not stated of a block stays empty: it has a volume only
+    with ``strike_length_m``, its length along the slope. Blocks without a rate are left out.
+
+    Args:
+        answer: of :func:`rbfrag.hazard`, for all of the blocks in their order.
+        blocks: the blocks as a table, its file or columns by name: what their shape is, and, if
+            there are, ``block_id``, places by ``lon`` and ``lat`` [deg] or by ``x``, ``y``, ``z``
+            [m] and ``crs``, ``strike_length_m`` [m] and ``density_kg_m3`` [kg/m³].
+        path: file to write, ``.csv``, ``.xlsx`` or ``.parquet``; an existing file is replaced.
+
+    Raises:
+        InputError: the blocks are not those of the answer, or x and y stand without crs.
+        MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
+    """
+    columns = read_blocks(blocks, reads=RELEASE).columns
+    return write_block_table(release_columns(answer, columns), path)
+
+
+def release_columns(answer: HazardAnswer, columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return the columns of that table.
+
+    Args:
+        columns: what there is of :data:`RELEASE`, ``block_id`` and ``crs``, each of the blocks of
+            the answer.
+
+    Raises:
+        InputError: as of :func:`write_release_rates`.
+    """
+    size = answer.annual_rate.size
+    if len(columns["block_id"]) != size or len(answer.kinds) != size:
+        raise InputError(
+            f"the answer has {size:,} rates and the table {len(columns['block_id']):,} blocks: "
+            "give the blocks that were asked about, each with a rate of its own"
+        )
+
+    def of(name: str) -> FloatArray:
+        return np.asarray(columns.get(name, np.full(size, np.nan)), dtype=np.float64)
+
+    names = [str(name or i + 1) for i, name in enumerate(columns["block_id"])]
+    if len({*names}) < size:  # a row is one place of a block
+        names = [f"{name}-{i + 1}" for i, name in enumerate(names)]
+    x, y, crs = _places(columns, of)
+    height, base = _sides(columns, size)
+    length, density = of("strike_length_m"), of("density_kg_m3")
+    for name, values in (("strike_length_m", length), ("density_kg_m3", density)):
+        if (values <= 0.0).any():
+            raise InputError(f"{name} = {values[values <= 0.0][0]:g}: give a number above 0")
+    volume = height * base * length
+    table = {
+        "release_id": np.array(names, dtype=object), "x": x, "y": y, "z": of("z"), "crs": crs,
+        "volume_m3": volume, "mass_kg": density * volume, "density_kg_m3": density,
+        "annual_rate": answer.annual_rate, "rate_low": answer.ci_low, "rate_high": answer.ci_high,
+        "kind": answer.kinds, "d1_m": height, "d2_m": base, "d3_m": length,
+    }  # fmt: skip
+    known = ~np.isnan(answer.annual_rate)
+    return {name: values[known] for name, values in table.items()}
+
+
+def _places(columns: Mapping[str, Any], of: Any) -> tuple[FloatArray, FloatArray, Any]:
+    """Return x and y of blocks, or else their lon and lat, and the system these are in."""
+    x, y, lon, lat = (of(name) for name in ("x", "y", *PLACE))
+    crs = np.asarray(columns.get("crs", [""] * x.size), dtype=object)
+    own = ~np.isnan(x) & ~np.isnan(y)
+    if (own & (crs == "")).any():
+        raise InputError("x and y need crs, the system that they are in, such as EPSG:2056")
+    on_map = ~own & ~np.isnan(lon) & ~np.isnan(lat)
+    return (
+        np.where(own, x, np.where(on_map, lon, np.nan)),
+        np.where(own, y, np.where(on_map, lat, np.nan)),
+        np.where(own, crs, np.where(on_map, LON_LAT, "")),
+    )
+
+
+def _sides(columns: Mapping[str, Any], size: int) -> tuple[FloatArray, FloatArray]:
+    """Return the thickness of blocks normal to the base and its length [m], NaN if not stated."""
+    given = {name: np.asarray(columns[name]) for name in SIDES if name in columns}
+    if given.keys() & {*SPACE}:
+        given, _, _ = in_sections(given, size)
+    height, base = np.full((2, size), np.nan)
+    for names, way in SHAPES.items():
+        if not given.keys() >= {*names}:
+            continue
+        block = getattr(BlockArray, way)(*(given[name] for name in names))
+        height = np.where(np.isnan(height), 2.0 * block.half_s1_m, height)
+        own = block.half_s1_m * (block.tan_alpha3 - block.tan_alpha1)
+        base = np.where(np.isnan(base), own, base)
+    return height, base
