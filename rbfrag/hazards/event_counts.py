@@ -6,10 +6,10 @@ that as many fail as face sides whose Z is low enough; how many face each side i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,14 +99,9 @@ class Curves(NamedTuple):
     realizations: FloatArray
 
     @classmethod
-    def empty(cls, laws: int, k: int, realizations: int) -> Curves:
-        """Return curves of nothing."""
-        nothing = np.zeros((2, laws, k))
-        return cls(nothing, nothing, nothing, np.zeros((2, realizations, k)))
-
-    def plus(self, other: Curves) -> Curves:
-        """Return the curves of both."""
-        return Curves(*(one + more for one, more in zip(self, other, strict=True)))
+    def whole(cls, parts: Sequence[Curves]) -> Curves:
+        """Return the curves of all parts together."""
+        return cls(*(np.sum(each, axis=0) for each in zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +113,6 @@ class PartCounts:
         loss: expected loss, shape (n,).
         loss_variance: its variance, shape (laws, n); NaN without two samples.
         any_fails: probability of any failure, shape (laws, n); NaN where samples would tell it.
-        any_shifted: rate of events with any failure by the shifted portfolios, (shifted, laws).
         bounds: the same as `any_fails` under full dependence and independence, shape (2, n).
         blocks: annual rate of failure of one block of each row, the sum of squares of its
             contributions, and the part of it from outside the ranges that the model was fitted on,
@@ -133,7 +127,6 @@ class PartCounts:
     loss: FloatArray
     loss_variance: FloatArray
     any_fails: FloatArray
-    any_shifted: FloatArray
     bounds: FloatArray
     blocks: FloatArray
     counts: Curves
@@ -193,7 +186,7 @@ def count_part(part: EventYears) -> PartCounts:
     failures, loss, bounds = np.zeros(n), np.zeros(n), np.zeros((2, n))
     blocks = np.zeros((3, portfolio.size))
     rows = laws * (1 + len(part.shifted))
-    drawn, with_any = np.zeros((rows, n, 2, part.samples)), np.zeros((rows, n))
+    drawn, with_any = np.zeros((rows, n, 2, part.samples)), np.zeros((laws, n))
     kept: dict[bytes, JointSampler | LargeCounts | None] = {}
     for event, shaken in _shaken(part):
         own, p = shaken.block, shaken.probability
@@ -220,11 +213,11 @@ def count_part(part: EventYears) -> PartCounts:
         known = bounds if laws == len(bounds) else bounds[:1]
         with_any = known if laws > 1 else np.where(np.ptp(bounds, axis=0) <= 0.0, known, np.nan)
     counts, losses = (
-        _curves(events, drawn[:, :, i], ends) for i, ends in enumerate((part.counts, part.losses))
+        _curves(events, drawn[:, :, i], ends, laws)
+        for i, ends in enumerate((part.counts, part.losses))
     )
     return PartCounts(
-        part.number, failures, loss, variance, with_any[:laws],
-        (with_any[laws:] @ events.weight).reshape(-1, laws), bounds, blocks, counts, losses,
+        part.number, failures, loss, variance, with_any, bounds, blocks, counts, losses,
         quantiles=drawn[:laws] if part.samples and events.is_scenario else np.empty(0),
     )  # fmt: skip
 
@@ -321,20 +314,14 @@ def _sampled(
     The stream of random numbers is that of the event, whichever part it stands in. By the shifted
     portfolios the same samples answer.
     """
-    portfolio, draws, own, laws = (
-        part.portfolio,
-        part.samples,
-        shaken.block,
-        laws_of(part.portfolio),
-    )
+    portfolio, draws, own = part.portfolio, part.samples, shaken.block
+    laws = laws_of(portfolio)
     generator = np.random.default_rng([part.seed, _OF_EVENTS, int(part.events.event_id[event])])
-    rows = len(laws) * shaken.shift.shape[0]
-    result, with_any = np.zeros((rows, 2, draws)), np.zeros(rows)
+    result = np.zeros((shaken.shift.shape[0], len(laws), 2, draws))
     if isinstance(sampler, LargeCounts):
         latent = sampler.latent(draws, generator)
-        for row, shift in enumerate(shaken.shift):
-            result[row], with_any[row] = _of_many(part, shaken, sampler, latent, shift)
-        return result, with_any
+        many = [_of_many(part, shaken, sampler, latent, shift) for shift in shaken.shift]
+        return np.stack([values for values, _ in many]), np.array([many[0][1]])
     bounds = _bounds_of_z(part, shaken, generator)
     scattered = int((portfolio.count[own] > 1).sum()) if portfolio.is_uncertain else 0
     at_once = max(1, _VALUES_AT_ONCE // (own.size + SIDES * _STRENGTHS * _SIZES * scattered))
@@ -344,14 +331,10 @@ def _sampled(
         here = bounds(k)
         for number, law in enumerate(laws):
             sides = _sides(law, sampler, (k, own.size), generator)
-            z = _Latent.of(sides, portfolio.count[own], generator, alone=law == INDEPENDENT)
-            for i, shift in enumerate(shaken.shift):
-                row = number + i * len(laws)
-                failures = z.failures(here, shift)
-                with_any[row] += failures[:, portfolio.weight[own] > 0.0].any(axis=1).sum()
-                result[row, 0, some] = failures @ portfolio.weight[own]
-                result[row, 1, some] = _costs(portfolio, own, failures, z.seed)
-    return result, with_any / draws
+            result[:, number, :, some] = _failing(
+                portfolio, shaken, sides, here, generator, alone=law == INDEPENDENT
+            )
+    return result.reshape(-1, 2, draws), (result[0, :, 0] > 0.0).mean(axis=1)
 
 
 def _sides(
@@ -397,59 +380,63 @@ class _Bounds(NamedTuple):
         return np.asarray(np.einsum("spkm,p->skm", ndtr(strength) * (last[:, 0] >= 0), self.weight))
 
 
-@dataclass(frozen=True, eq=False)
-class _Latent:
-    """Z of some samples of one event.
+def _failing(
+    portfolio: Portfolio,
+    shaken: Shaken,
+    sides: FloatArray,
+    bounds: _Bounds,
+    generator: np.random.Generator,
+    *,
+    alone: bool,
+) -> FloatArray:
+    """Return numbers of failures and losses of samples by shifted portfolios, shifts x 2 x draws.
+
+    What fails by no shift, as most does not, is not looked at again for each of them.
 
     Args:
-        count: blocks of each row, shape (m,).
-        single: Z of the rows of one block, draws x rows.
-        like: Z of the others on each side, sides x draws x rows.
-        facing: how many of these face each side, same shape; None where each has a Z of its own.
-        seed: of what else is random.
+        sides: Z on the sides that blocks may face, each as likely, sides x draws x m.
+        alone: each of like blocks has a Z of its own.
     """
-
-    count: IntArray
-    single: FloatArray
-    like: FloatArray
-    facing: IntArray | None
-    seed: int
-
-    @classmethod
-    def of(
-        cls, sides: FloatArray, count: IntArray, generator: np.random.Generator, *, alone: bool
-    ) -> _Latent:
-        """Return Z of samples by the sides that blocks face, each as likely."""
-        ones, number = sides[..., count == 1], sides.shape[0]
-        side = generator.integers(number, size=(1, *ones.shape[1:]))
-        like, facing = sides[..., count > 1], None
-        if like.size and not alone:
-            each = np.full(number, 1.0 / number)
-            drawn = generator.multinomial(count[count > 1], each, size=like.shape[1:])
-            facing = np.moveaxis(drawn, -1, 0)
-        seed = int(generator.integers(1 << 62))
-        return cls(count, np.take_along_axis(ones, side, axis=0)[0], like, facing, seed)
-
-    def failures(self, bounds: _Bounds, shift: FloatArray) -> FloatArray:
-        """Return how many blocks of each row fail, draws x m."""
-        bound, like = bounds.bound + shift, self.count > 1
-        result = np.empty((self.single.shape[0], self.count.size))
-        result[:, ~like] = self.single <= bound[:, ~like]
-        if not like.any():
-            return result
-        generator = np.random.default_rng(self.seed)
-        if self.facing is None:
-            p = np.broadcast_to(ndtr(bound[:, like]), (result.shape[0], int(like.sum())))
-            result[:, like] = generator.binomial(self.count[like], p)
-            return result
-        fails = self.like <= bound[:, like]
-        if bounds.scattered.any():
-            share, own = fails.astype(np.float64), bounds.scattered[like]
-            share[..., own] = bounds.share(self.like[..., own], shift)
-            result[:, like] = generator.binomial(self.facing, share).sum(axis=0)
-        else:
-            result[:, like] = (self.facing * fails).sum(axis=0)
-        return result
+    own, (number, draws, _) = shaken.block, sides.shape
+    count, weight, shift = portfolio.count[own], portfolio.weight[own], shaken.shift
+    most = shift.max(axis=0)
+    like, ones = np.flatnonzero(count > 1), np.flatnonzero(count == 1)
+    side = generator.integers(number, size=(1, draws, ones.size))
+    facing: IntArray = count[like]
+    if like.size and not alone:
+        each = np.full(number, 1.0 / number)
+        drawn = generator.multinomial(facing, each, size=(draws, like.size))
+        facing = np.moveaxis(drawn, -1, 0)
+    seed = int(generator.integers(1 << 62))
+    chance = alone | bounds.scattered[like]
+    whole = [(ones, np.take_along_axis(sides[..., ones], side, axis=0), count[ones])]
+    if not chance.all():
+        whole.append((like[~chance], sides[..., like[~chance]], facing[..., ~chance]))
+    parts: list[tuple[NDArray[Any], ...]] = []
+    for places, z, many in whole:
+        excess = z - bounds.bound[:, places]
+        at = np.nonzero((excess <= most[places]) & (many > 0))
+        parts.append((at[1], places[at[2]], np.broadcast_to(many, z.shape)[at], excess[at]))
+    whole_of = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    order = np.argsort(whole_of[3] > 0.0, kind="stable")  # costs do not depend on the shifts
+    sample, block, many, excess = (each[order] for each in whole_of)
+    row, at_once = np.nonzero(excess <= shift[:, block])
+    failing, cost = weight[block] * many, _costs(portfolio, own[block], many, seed)
+    found = [(row, *(each[at_once] for each in (sample, failing, cost)))]
+    scattered = like[chance]
+    for i, by in enumerate(shift if scattered.size else ()):
+        z = sides[..., scattered]
+        bound = bounds.bound[:, scattered] + by[scattered]
+        p = ndtr(np.broadcast_to(bound, z.shape[1:])) if alone else bounds.share(z, by)
+        by_chance = np.random.default_rng(seed).binomial(facing[..., chance], p)
+        by_chance = by_chance if alone else by_chance.sum(axis=0)
+        sample, block = np.nonzero(by_chance)
+        many, block = by_chance[sample, block], scattered[block]
+        cost = _costs(portfolio, own[block], many, seed)
+        found.append((np.full(sample.size, i), sample, weight[block] * many, cost))
+    row, sample, *values = (np.concatenate(column) for column in zip(*found, strict=True))
+    sums = [np.bincount(row * draws + sample, each, len(shift) * draws) for each in values]
+    return np.array(sums, dtype=np.float64).reshape(2, -1, draws).swapaxes(0, 1)
 
 
 def _bounds_of_z(
@@ -494,22 +481,17 @@ def _bounds_of_z(
     return next_samples
 
 
-def _costs(portfolio: Portfolio, own: Indices, failures: FloatArray, seed: int) -> FloatArray:
-    """Return what the failures of each sample cost, shape (draws,)."""
+def _costs(portfolio: Portfolio, block: Indices, number: IntArray, seed: int) -> FloatArray:
+    """Return what so many failures of blocks cost, same shape."""
+    cost = number * np.ones(block.size)
     if portfolio.loss is None:
-        return np.zeros(failures.shape[0])
-    loss, sigma = portfolio.loss[own], portfolio.loss_sigma[own]
-    if not sigma.any():
-        return np.asarray(failures @ loss)
-    sample, block = np.nonzero(failures)
-    number = failures[sample, block].astype(np.int64)
-    cost = number * np.ones(sample.size)
-    generator, some = np.random.default_rng([seed, 1]), sigma[block]
-    for many in (False, True):
-        chosen = np.flatnonzero((some > 0.0) & ((number > _MOST_SUMMED) == many))
-        draw = _sum_by_moments if many else _sum_of_each
-        cost[chosen] = draw(number[chosen], some[chosen], generator)
-    return np.asarray(np.bincount(sample, loss[block] * cost, minlength=failures.shape[0]))
+        return 0.0 * cost
+    sigma, generator = portfolio.loss_sigma[block], np.random.default_rng([seed, 1])
+    for many, draw in ((False, _sum_of_each), (True, _sum_by_moments)):
+        chosen = np.flatnonzero((sigma > 0.0) & ((number > _MOST_SUMMED) == many))
+        if chosen.size:
+            cost[chosen] = draw(number[chosen].astype(np.int64), sigma[chosen], generator)
+    return np.asarray(portfolio.loss[block] * cost)
 
 
 def _sum_of_each(number: IntArray, sigma: FloatArray, generator: np.random.Generator) -> FloatArray:
@@ -558,11 +540,11 @@ def _of_many(
     return sampler.sums(bound, _common(part, shaken), latent, marks)
 
 
-def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:
+def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray, laws: int) -> Curves:
     """Return how often the samples of events, and of years, reach some numbers.
 
     Args:
-        drawn: samples, shape (laws, n, draws).
+        drawn: samples, shape (rows, n, draws); the laws, then those of shifted portfolios.
         ends: the numbers, shape (k,).
     """
     weight = events.weight
@@ -572,21 +554,25 @@ def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:
     year = np.ravel(year)
     order = np.argsort(year, kind="stable")
     starts = np.flatnonzero(np.diff(year[order], prepend=-1))
-    of_year = weight[order[starts]]
-    largest = np.maximum.reduceat(drawn[:, order], starts, axis=1)
-    total = np.add.reduceat(drawn[:, order], starts, axis=1)
 
     def reached(values: FloatArray, own: FloatArray) -> FloatArray:
-        share = np.stack([(values >= end).mean(axis=-1) for end in ends], axis=-1)
-        parts = own[None, :, None] * share if ends.size else np.zeros((*share.shape[:2], 0))
+        """Return the weight of each event or year that reaches each number, rows x n x k."""
+        rows, n, draws = values.shape
+        place = np.searchsorted(ends, values, side="right")
+        place += (ends.size + 1) * np.arange(rows * n).reshape(rows, n, 1)
+        number = np.bincount(place.ravel(), minlength=rows * n * (ends.size + 1))
+        number = number.reshape(rows, n, -1)[..., :0:-1].cumsum(axis=-1)[..., ::-1]
+        return np.asarray(own[:, None] * (number / draws))
+
+    def powers(parts: FloatArray) -> FloatArray:
         return np.stack([parts.sum(axis=1), (parts * parts).sum(axis=1)])
 
-    realizations = Curves.empty(0, ends.size, len(events.realization_weights)).realizations
-    if not ends.size:
-        return Curves.empty(drawn.shape[0], 0, realizations.shape[1])
-    own = weight[:, None] * np.stack([(drawn[0] >= end).mean(axis=-1) for end in ends], axis=-1)
+    by_event, of_year = reached(drawn, weight), weight[order[starts]]
+    realizations = np.zeros((2, len(events.realization_weights), ends.size))
     for power in (1, 2):
-        np.add.at(realizations[power - 1], events.branch, own**power)
-    return Curves(
-        reached(drawn, weight), reached(largest, of_year), reached(total, of_year), realizations
+        np.add.at(realizations[power - 1], events.branch, by_event[0] ** power)
+    largest, total = (
+        powers(reached(along.reduceat(drawn[:laws, order], starts, axis=1), of_year))
+        for along in (np.maximum, np.add)
     )
+    return Curves(powers(by_event), largest, total, realizations)

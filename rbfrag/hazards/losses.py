@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -387,9 +386,7 @@ def event_losses(
         done += groups[result.number].size
         if on_progress is not None:
             on_progress(done, sum(group.size for group in groups))
-    return _answer(
-        events, portfolio, ends, groups, results, means, samples, seed, level, len(shifted)
-    )
+    return _answer(events, portfolio, ends, groups, results, means, samples, seed, level)
 
 
 def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
@@ -457,7 +454,6 @@ def _answer(
     samples: int,
     seed: int,
     level: float,
-    shifted: int,
 ) -> LossAnswer:
     n, laws, order = (
         events.event_id.size,
@@ -482,11 +478,9 @@ def _answer(
     if not order:  # known without samples alone where no law matters, as of single blocks
         one = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
         any_fails = means.bounds if len(laws) > 1 else one
-    rows, branches = len(laws) * (1 + shifted), len(events.realization_weights)
     curves = [
-        reduce(Curves.plus, (part[i] for part in pairs), Curves.empty(rows, end.size, branches))
-        for i, end in enumerate(ends)
-        for pairs in [[(part.counts, part.losses) for part in order]]
+        Curves.whole(parts) if parts else None
+        for parts in ([part.counts for part in order], [part.losses for part in order])
     ]
     exceedance, loss_exceedance = (
         {law: _curve(events, curve, end, i, len(laws), level) for i, law in enumerate(laws)}
@@ -494,11 +488,14 @@ def _answer(
         else {}
         for curve, end in zip(curves, ends, strict=True)
     )
-    of_any = sum((part.any_shifted for part in order), np.zeros((rows // len(laws) - 1, len(laws))))
+    of_any = curves[0].events[0, :, 0] if curves[0] and ends[0].size else np.empty(0)
     stated = {
         "average_annual_failures": (means.failures, means.failures_half),
         "average_annual_loss": (means.loss, means.loss_half),
-        "annual_rate_any": (any_fails[0], _half_of(events.weight @ any_fails[0], of_any, level)),
+        "annual_rate_any": (
+            any_fails[0],
+            events.weight @ any_fails[0] * _half_of(of_any, len(laws), level),
+        ),
     }
     if portfolio.loss is None:
         del stated["average_annual_loss"]
@@ -540,18 +537,19 @@ def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
     return tuple(result)
 
 
-def _half_of(rate: float, shifted: FloatArray, level: float) -> float:
-    """Return what the interval of a rate reaches to by those of shifted portfolios, (2 axes, 1)."""
-    if not shifted.size or shifted.shape[1] > 1:
+def _half_of(rates: FloatArray, laws: int, level: float) -> float:
+    """Return how far the interval of a rate reaches, as a part of it; rates as `shift_error`."""
+    if laws > 1 or rates.size < 2:
         return np.nan
-    error = shift_error(np.concatenate([[rate], shifted[:, 0]]))
-    return float(rate * error * quantiles_of(level).normal)
+    return float(shift_error(rates) * quantiles_of(level).normal)
 
 
 def _curve(
-    events: EventSet, curve: Curves, ends: FloatArray, law: int, laws: int, level: float
+    events: EventSet, curve: Curves | None, ends: FloatArray, law: int, laws: int, level: float
 ) -> tuple[Exceedance, ...]:
     """Return the numbers that are reached at all, each with its intervals."""
+    if curve is None:
+        return ()
     widest = float(events.weight.max())
     effective, alike = events.effective_years, float((events.weight**2).sum())
     errors = shift_error(curve.events[0, law::laws]) * quantiles_of(level).normal
