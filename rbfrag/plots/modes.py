@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,14 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import halo
+from rbfrag.rockmasses.joint_sets import VARIABLES, Realisations, RockMass
+from rbfrag.rockmasses.shaking import FAILS, NO_MODE, ShakenMass
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
+from rbfrag.solver.stability.arrays import (
+    NOTHING,
+    StabilityArray,
+    stability_arrays,
+    water_held_m,
+)
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.contour import ContourSet
+    from matplotlib.patches import Patch
     from matplotlib.text import Text
 
 MOST_POINTS = 300
@@ -28,9 +37,18 @@ CELL_DEG = 2.0
 """Cell of the histogram [deg]."""
 
 _STEP_DEG = 0.5
+_CELLS = np.arange(-88.5, 90.0, 3.0)
+"""Angles of the cells that are followed in time [deg]."""
+
+_OF_CELLS = ("s1_m", "phi_residual_deg")
+
+_OPAQUE = {"fails": 0.85, "stays": 0.35}
+"""How blocks that fail, and others that move, are coloured."""
+
 _HATCHED = (
     (UNSTABLE, "////", "unstable at rest"),
     (LOCKED, "xxx", "locked: no acceleration\nmoves it in this mode"),
+    (NOTHING, "...", "afloat: the water lifts\nit off its base"),
 )
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
 _NARROW_G = 0.4
@@ -60,11 +78,13 @@ def plot_modes(
     alpha1_deg: ArrayLike | None = None,
     alpha3_deg: ArrayLike | None = None,
     title: str = "",
+    ended: ShakenMass | None = None,
+    **on_base: float,
 ) -> canvas.Picture:
     """Draw which mode governs a block of given angles, and its yield acceleration.
 
-    The modes do not depend on the dip of the base if there is a back fracture; the yield
-    accelerations, and what is unstable or locked, do.
+    Dry and without a bond the modes do not depend on the dip of the base if there is a back
+    fracture; the yield accelerations, and what is unstable or locked, do.
 
     Args:
         out: file to write (.png, .pdf, .svg); None for a picture that a notebook shows.
@@ -75,48 +95,128 @@ def plot_modes(
         alpha1_deg: angles of the heel of blocks to be shown [deg], shape (m,).
         alpha3_deg: angles of the toe of these blocks [deg], shape (m,).
         title: title of the figure; friction and dip if empty.
+        ended: what a motion did to the blocks of :func:`chart_cells`: colours are then the modes in
+            which they end.
+        on_base: ``water_m``, ``cohesion_pa``, ``jrc``, ``jcs_mpa``, ``joint_length_m`` with
+            ``density_kg_m3`` as :func:`rbfrag.stability` takes them, and ``s1_m``, the spacing of
+            the base fractures of all blocks [m]. Water fills a fracture that is lower.
     """
     canvas.plot_path(out)
+    on_base = on_base if ended is None else {"s1_m": 1.0, **on_base}
+    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
-    stability = stability_arrays(
-        # Other angles than a block's are not asked for; their place is taken by one that is.
-        BlockArray.from_angles(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), 1.0),
-        beta_deg=beta_deg,
-        phi_deg=phi_deg,
-        phi_back_deg=phi_back_deg,
-        back_fracture=back_fracture,
-        nan="raise",
+    # Other angles than a block's are not asked for; their place is taken by one that is.
+    stability = _judged(
+        np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), back_fracture, on_base, planes
     )
     shown = _pairs(alpha1_deg, alpha3_deg)
     figure = canvas.new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
     chart = _Chart(axes, nodes, is_block, stability)
-    _draw_regions(chart)
-    contours = _draw_yields(chart)
+    ends = _draw_regions(chart) if ended is None else _draw_ends(chart, ended)
+    contours = _draw_yields(chart) if ended is None else []
     covered = _draw_blocks(axes, nodes, *shown)
     names = _name_regions(chart, back_fracture, covered)
-    _explain_hatches(chart)
+    _explain_hatches(chart, ends)
     axes.fill([-90, 90, 90], [-90, -90, 90], color="white", zorder=4, lw=0)
     axes.plot([-90, 90], [-90, 90], color="black", lw=1.0, zorder=5)
-    axes.text(38, -38, r"no block: $\alpha_1 \geq \alpha_3$", ha="center", fontsize=9, zorder=5)
+    low = -38 if ended is None else -12
+    axes.text(38, low, r"no block: $\alpha_1 \geq \alpha_3$", ha="center", fontsize=9, zorder=5)
     ticks = range(-90, 91, 30)
     axes.set(xlim=(-90, 90), ylim=(-90, 90), aspect="equal", xticks=ticks, yticks=ticks)
     axes.set_xlabel(r"angle of the heel, $\alpha_1$ [°]")
     axes.set_ylabel(r"angle of the toe, $\alpha_3$ [°]")
-    figure.suptitle(title or _title(phi_deg, phi_back_deg, beta_deg, back_fracture), fontsize=10)
+    if not title:
+        title = _title(phi_deg, phi_back_deg, beta_deg, back_fracture, on_base, ended)
+    figure.suptitle(title, fontsize=10)
     figure.draw_without_rendering()  # the extents of texts are known once the layout is
     for lines, here in contours:
         _write_values(chart, lines, here, names)
     return canvas.save_figure(figure, out)
 
 
-def _title(phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool) -> str:
+def chart_cells(
+    *,
+    phi_deg: float,
+    beta_deg: float = 0.0,
+    phi_back_deg: float | None = None,
+    back_fracture: bool = True,
+    s1_m: float = 1.0,
+    **strength: float,
+) -> Realisations:
+    """Return the blocks of the cells of a chart of ultimate modes, row by row of the angle α3.
+
+    Args:
+        s1_m: spacing of the base fractures of all blocks [m].
+        strength: as ``on_base`` of :func:`plot_modes`, and ``phi_residual_deg``.
+    """
+    a1, a3 = np.meshgrid(_CELLS, _CELLS)
+    cells = _of_one_spacing(a1[a1 < a3], a3[a1 < a3], s1_m)
+    stated = {"phi_deg": phi_deg, "phi_back_deg": phi_back_deg, **strength}
+    known = {key: stated.get(key.split(".")[1]) for key in VARIABLES}
+    known |= {"base.dip_deg": beta_deg, "base.spacing_m": s1_m}
+    known |= {"block.size_factor": 1.0, "block.kv": 0.0}
+    drawn = {key: np.full(cells.size, each) for key, each in known.items() if each is not None}
+    drawn["back.dip_deg"] = beta_deg + cells.gamma_deg
+    base_m = cells.half_s1_m * (cells.tan_alpha3 - cells.tan_alpha1)
+    drawn["back.spacing_m"] = base_m * np.sin(np.radians(cells.gamma_deg))
+    return RockMass({}, back_fracture).blocks_of(drawn)
+
+
+def _of_one_spacing(a1: FloatArray, a3: FloatArray, s1_m: float) -> BlockArray:
+    """Return blocks of given angles [deg] and of one spacing of the base fractures [m]."""
+    return BlockArray.from_angles(a1, a3, 0.5 * s1_m / np.cos(np.radians(a3)))
+
+
+def _judged(
+    a1: FloatArray,
+    a3: FloatArray,
+    back_fracture: bool,
+    on_base: Mapping[str, float],
+    planes: Mapping[str, Any],
+) -> StabilityArray:
+    s1_m = on_base.get("s1_m", 1.0)
+    blocks = _of_one_spacing(a1, a3, s1_m)
+    strength: dict[str, Any] = {n: v for n, v in on_base.items() if n not in _OF_CELLS}
+    if strength and "s1_m" not in on_base:
+        raise InputError(
+            f"{min(strength)} needs s1_m, the spacing of the base fractures of the blocks of the "
+            "chart: its effect is that of a stress over the weight", fields=("s1_m",),
+        )  # fmt: skip
+    if "water_m" in strength:
+        strength["water_m"] = water_held_m(
+            strength["water_m"], s1_m=s1_m, gamma_deg=blocks.gamma_deg, beta_deg=planes["beta_deg"]
+        )
+    nan: Any = "propagate" if strength else "raise"  # a block may float
+    return stability_arrays(blocks, back_fracture=back_fracture, nan=nan, **planes, **strength)
+
+
+def _title(
+    phi_deg: float,
+    phi_back_deg: float | None,
+    beta_deg: float,
+    back_fracture: bool,
+    on_base: Mapping[str, float],
+    ended: ShakenMass | None,
+) -> str:
     friction = rf"$\phi$ = {phi_deg:g}°"
     if back_fracture and phi_back_deg is not None and phi_back_deg != phi_deg:
         friction += f" (back {phi_back_deg:g}°)"
     back = "with" if back_fracture else "without"
+    if "s1_m" in on_base:
+        words = {
+            "s1_m": "$S_1$ = {:g} m", "water_m": "water {:g} m", "jrc": "JRC {:g}",
+            "cohesion_pa": "cohesion {:g} Pa", "phi_residual_deg": "residual {:g}°",
+        }  # fmt: skip
+        stated = [text.format(on_base[n]) for n, text in words.items() if n in on_base]
+        friction = ", ".join((friction, *stated))
+    if ended is not None:
+        return (
+            f"modes in which blocks end under {ended.shaking.motion.label}\n"
+            rf"lines and names: modes at first, {friction}, $\beta$ = {beta_deg:g}°"
+        )
     return (
         f"failure modes {back} back fracture, {friction}\n"
         rf"contours: yield acceleration [g] on a base that dips by $\beta$ = {beta_deg:g}°"
@@ -151,16 +251,23 @@ class _Chart(NamedTuple):
         return np.asarray(self.is_block & (self.stability.state_code == code))
 
 
-def _draw_regions(chart: _Chart) -> None:
+def _draw_regions(chart: _Chart) -> list[Patch]:
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
-    axes, nodes = chart.axes, chart.nodes
-    axes.imshow(
-        np.ma.masked_where(~chart.is_block, chart.stability.mode_code),
+    there = chart.is_block & (chart.stability.mode_code != NOTHING)
+    chart.axes.imshow(
+        np.ma.masked_where(~there, chart.stability.mode_code),
         cmap=ListedColormap([canvas.MODE_COLOURS[mode] for mode in MODES]),
         norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
         alpha=0.30, zorder=1, **_WHOLE_CHART,
     )  # fmt: skip
+    _draw_borders(chart)
+    return []
+
+
+def _draw_borders(chart: _Chart) -> None:
+    """Hatch what no motion decides about, and draw the borders of the modes."""
+    axes, nodes = chart.axes, chart.nodes
     for code, hatch, _ in _HATCHED:
         here = chart.in_state(code)
         if here.any():
@@ -175,6 +282,27 @@ def _draw_regions(chart: _Chart) -> None:
                 nodes, nodes, here.astype(float), levels=[0.5], colors="black", linewidths=1.2,
                 zorder=3,
             )  # fmt: skip
+
+
+def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
+    """Colour the cells by the modes in which their blocks end; return what says so."""
+    from matplotlib.colors import to_rgba
+    from matplotlib.patches import Patch
+
+    a1, a3 = np.meshgrid(_CELLS, _CELLS)
+    final, fails = ended.final_code[0], ended.code[0] == FAILS
+    colours = np.ones((*a1.shape, 4))
+    cells, patches = colours[a1 < a3], []
+    for text, here in (("fails", fails), ("stays", ~fails)):
+        for code in np.unique(final[here & (final != NO_MODE)]).tolist():
+            colour = to_rgba(canvas.MODE_COLOURS[MODES[code]], _OPAQUE[text])
+            cells[here & (final == code)] = colour
+            words = f"{text}: {MODES[code].replace('_', ' ')}"
+            patches.append(Patch(facecolor=colour, label=words))
+    colours[a1 < a3] = cells
+    chart.axes.imshow(colours, zorder=1, **_WHOLE_CHART)
+    _draw_borders(chart)
+    return patches
 
 
 def _draw_yields(chart: _Chart) -> list[tuple[ContourSet, NDArray[np.bool_]]]:
@@ -256,10 +384,10 @@ def _write_values(
             value.remove()
 
 
-def _explain_hatches(chart: _Chart) -> None:
+def _explain_hatches(chart: _Chart, patches: list[Patch]) -> None:
     from matplotlib.patches import Patch
 
-    patches = [
+    patches += [
         Patch(facecolor="white", edgecolor="#777777", hatch=hatch, label=text)
         for code, hatch, text in _HATCHED
         if chart.in_state(code).any()

@@ -344,6 +344,7 @@ SLUMPS = "slumps against its back plane"
 ON_HEEL = "tips about its heel"
 CLIMBS = "is driven back against its back plane"
 ROCKS = "rocks about its toe"
+FALLS_BACK = "falls back about its toe"
 CONFINED = "topples against its back plane"
 ALONG_BACK = "slides on its back plane"
 OFF = "is off both planes"
@@ -365,7 +366,7 @@ def _named(touch: int, *, backward: bool) -> str:
             return SLUMPS if backward else CLIMBS
         return ON_HEEL
     if touch & (TOE | ON_BASE):
-        return CONFINED if touch & ON_BACK else ROCKS
+        return CONFINED if touch & ON_BACK else FALLS_BACK if backward else ROCKS
     return ALONG_BACK if touch & ON_BACK else OFF
 
 

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
+from rbfrag.cli.output import (
+    ProgressBar,
+    print_json,
+    print_table,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
@@ -250,6 +256,18 @@ def plot_planes(
     print_warnings(picture.warnings)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Ultimate:
+    """The motion under which the cells of a chart are followed."""
+
+    ultimate: bool = option(
+        "Follow the block of each cell of 3 degrees, of the spacing --s1 (default 1 m), in time.",
+        False,
+    )
+    motion: str | None = option("The accelerogram of --ultimate.", metavar="MOTION")
+    jobs: options.Jobs = None
+
+
 @app.command(
     "modes",
     epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
@@ -257,8 +275,17 @@ def plot_planes(
 @stacked
 def plot_modes(
     *,
-    planes: Annotated[Given, fields_of(PlaneFields, "back_fracture")],
+    planes: Annotated[
+        Given,
+        fields_of(
+            PlaneFields, "back_fracture", "s1_m", JointFields, "cohesion_pa", "density_kg_m3"
+        ),
+    ],
     out: Out,
+    ended: Ultimate,
+    direction: options.Direction,
+    reading: options.ReadingOptions,
+    db: options.Db = None,
     blocks: str | None = option(
         "Show the blocks of a table (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
         "as  rbfrag rockmass --out  writes it.",
@@ -269,7 +296,12 @@ def plot_modes(
         "Show the blocks of a rock mass file (.toml, .csv).", metavar="FILE"
     ),
 ) -> None:
-    """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
+    """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3.
+
+    With water, cohesion or roughness the chart is that of blocks of one spacing --s1. With
+    --ultimate the block of each cell is followed under --motion, and its colour is the mode in
+    which it ends.
+    """
     from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
@@ -280,9 +312,24 @@ def plot_modes(
         )
     plot_path(out)
     shown = charted_blocks(blocks, rockmass, planes, sheet=sheet)
-    plot.modes(out, alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg, **planes)
+    ran, warnings = None, [*shown.warnings]
+    if ended.ultimate != (ended.motion is not None):
+        raise InputError("--ultimate and --motion go together: cells are followed under a motion")
+    if ended.motion is not None:
+        from rbfrag.campaign.shake_rockmass import shake
+        from rbfrag.plots.modes import chart_cells
+
+        ground, upward, remarks = find_shaking(ended.motion, direction, db=db, reading=reading)
+        say_when_compiling()
+        with ProgressBar("plot modes", "cells") as bar:
+            ran = shake(
+                chart_cells(**planes), ground, vertical=upward, polarity=direction.polarity,
+                jobs=ended.jobs, on_progress=lambda each: bar.show(each.done, each.total),
+            )  # fmt: skip
+        warnings += [*remarks, *ran.warnings]
+    plot.modes(out, alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg, ended=ran, **planes)
     print(out)
-    print_warnings(shown.warnings)
+    print_warnings(warnings)
 
 
 @app.command(
