@@ -34,8 +34,9 @@ def fit(
             outcomes, the same terms), ``bounded`` (of outcomes, the terms with PGV or PGA) and
             ``record`` (``xp``). Sliding: ``displacement``; slumping: ``capacity``;
             confined_toppling: ``confined`` (both ``pgv_pga`` and ``pgv_pga_m``); rocking:
-            ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``, or the only one that
-            there is for the kind.
+            ``overturning`` (also ``sa10`` and ``pga_sa10``). None: the one
+            that predicts earthquakes left out best with this term; ``details["why_method"]`` says
+            why.
         suite: suite of motions to fit; None for all motions.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
