@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
@@ -79,7 +79,7 @@ def fit(
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
     of_term = intensity_term(term)
-    chosen = method_of_kind(kind, method, of_term, estimate_m=estimate_m)
+    chosen = method_of_kind(kind, method, term, estimate_m=estimate_m)
     _refuse_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
     if seed < 0:
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
@@ -96,7 +96,7 @@ def fit(
     elif not isinstance(source, FitSource):
         source = read_source(source, chosen.block, kind=kind, **selection)
     if method is None and not np.isfinite(source.failed).any():
-        chosen = method_of_kind(kind, None, of_term, estimate_m=estimate_m, reads=("critical",))
+        chosen = method_of_kind(kind, None, term, estimate_m=estimate_m, reads="critical")
     return fit_source(
         source, of_term, chosen, kind=kind, name=name, seed=seed, estimate_m=estimate_m,
         selection=selection, why=None if method else _why(chosen, of_term, kind),
@@ -121,30 +121,22 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
 
 
 def method_of_kind(
-    kind: str,
-    name: str | None,
-    term: Term | None = None,
-    *,
-    estimate_m: bool = False,
-    reads: Collection[str] = ("outcomes", "critical"),
+    kind: str, name: str | None, term: str = "", *, estimate_m: bool = False, reads: str = ""
 ) -> Method:
-    """Return the named method, or else the one of most skill on earthquakes left out.
+    """Return the named method, or else that of most skill with a term on earthquakes left out.
 
     Args:
-        term: the measure, where no method is named.
         estimate_m: it estimates the exponent M.
-        reads: what it may read.
+        reads: what it must read; empty for anything.
 
     Raises:
         InputError: an unknown kind or method, or two that do not go together.
     """
     known = methods_of_kind(kind)
     if name is None:
-        suited = (
-            each for each in known if term is not None and term.name in each.forms
-            if each.reads in reads and (each.exponent or not estimate_m)
-        )  # fmt: skip
-        return min(suited, key=lambda each: each.forms[term.name].rank, default=known[0])
+        suited = [each for each in known if term in each.forms and reads in ("", each.reads)]
+        able = (each for each in suited if each.exponent or not estimate_m)
+        return min(able, key=lambda each: each.forms[term].rank, default=known[0])
     chosen = method_named(name)
     if chosen not in known:
         raise InputError(
@@ -155,12 +147,10 @@ def method_of_kind(
 
 
 def _why(chosen: Method, term: Term, kind: str) -> str:
-    """Return why a method fits a measure that no method was named for."""
+    """Return why a method is taken where none is named."""
     suited = [each.name for each in methods_of_kind(kind) if term.name in each.forms]
-    why = f"of {', '.join(suited)} it predicts earthquakes left out best"
-    if chosen.reads == "critical":
-        why = "no outcomes are stored, and it is the best of critical values"
-    return f"method {chosen.name}: {why if len(suited) > 1 else 'the only one of this measure'}"
+    of = "no outcomes are stored; of critical values" if chosen.reads == "critical" else "of"
+    return f"{chosen.name}, {of} {', '.join(suited)} the best on earthquakes left out"
 
 
 def fit_source(
