@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.cli.sentences import rounded
 from rbfrag.fragility.words import percent, with_interval
 from rbfrag.hazards import between_measures
-from rbfrag.hazards.report import once_in, two_digits
+from rbfrag.hazards.report import once_in
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
@@ -90,12 +90,12 @@ def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
     elif five < 1.0:
         yield (
             "That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
-            f"{two_digits(five)}."
+            f"{float(f'{five:.2g}'):,.15g}."
         )
     else:
         yield (
             f"Standing does not contradict it: all rates of the hazard would have to be about "
-            f"{two_digits(five)} times as high to leave 5 %."
+            f"{float(f'{five:.2g}'):,.15g} times as high to leave 5 %."
         )
 
 

@@ -12,14 +12,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
-from rbfrag.fragility.words import (
-    block_in_words,
-    glossary,
-    interval,
-    model_in_words,
-    percent,
-    prediction_in_words,
-)
+from rbfrag.fragility import words
 from rbfrag.question.fields import declared, option_of
 
 if TYPE_CHECKING:
@@ -40,8 +33,8 @@ def print_sentences(sentences: Iterable[str]) -> None:
 
 def print_glossary(*texts: str) -> None:
     """Print, below an answer, what words of its texts mean, where one needs it."""
-    if words := glossary(*texts):
-        print(f"\n({words})")
+    if meaning := words.glossary(*texts):
+        print(f"\n({meaning})")
 
 
 def print_pairs(pairs: Mapping[str, object]) -> None:
@@ -261,7 +254,7 @@ def show_prediction(
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    said = (*prediction_in_words(document), *block_in_words(document["method"], given))
+    said = (*words.prediction_in_words(document), *words.block_in_words(document["method"], given))
     print_sentences(said)
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
@@ -289,12 +282,12 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         "at the sites": (document["event_low"], document["event_high"]),
     }
     return {
-        "probability": percent(document["probability"]),
-        **{name: interval(*pair) for name, pair in ends.items() if None not in pair},
+        "probability": words.percent(document["probability"]),
+        **{name: words.interval(*pair) for name, pair in ends.items() if None not in pair},
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
-        "model": model_in_words(document),
         **({} if document["how"].startswith("model") else {"how": document["how"]}),
+        "model": words.model_in_words(document),
         "data": document["data"],
     }
 

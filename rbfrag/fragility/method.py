@@ -409,7 +409,6 @@ class Method:
         doubts: yields (holds, name of the value, text) where the model makes no sense, from
             parameters, values and functions.
         fitted_variance: mean and variance where the variance is fitted in bins; None elsewhere.
-        title: what people call it; empty for a method that models need not be told apart by.
     """
 
     name: str
@@ -427,7 +426,6 @@ class Method:
         | None
     ) = None
     fitted_variance: FittedVariance | None = None
-    title: str = ""
 
 
 OF_CRITICAL = (

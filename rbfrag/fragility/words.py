@@ -136,30 +136,23 @@ def glossary(*texts: str) -> str:
 
 
 def model_in_words(document: Mapping[str, Any]) -> str:
-    """Return what people call a model: the measures that it reads, and what tells it from others.
-
-    Args:
-        document: an answer under the keys of the JSON contract.
-    """
-    from rbfrag.fragility.measures import SPECTRAL, TERMS
+    """Return what people call the model of an answer: what it reads, and what tells it apart."""
+    from rbfrag.fragility.measures import TERMS
     from rbfrag.fragility.methods import method_named
 
     if (term := TERMS.get(document["term"])) is None:  # several models
         return str(document["model"])
-    periods = {name: f"SA({period:g} s)" for period, name in SPECTRAL.items()}
-    read = (
-        _MEASURES.get(name) or periods.get(name) or name.partition("_")[0].upper()
-        for name in term.inputs
-    )
+    read = (_MEASURES.get(n) or n.partition("_")[0].upper() for n in term.inputs)
     method = method_named(document["method"])
-    own = method.title or method.block.kind.replace("_", " ").removeprefix("toppling")
+    kind = method.block.kind.replace("_", " ").removeprefix("toppling")
+    own = "" if method.forms[term.name].rank == 0 else method.name
     sized = "size-dependent" if "block's" in term.title else ""
-    return ", ".join(filter(None, (*read, sized, own)))
+    return ", ".join(filter(None, (*read, sized, kind, own)))
 
 
 _MEASURES = {
-    "xp_m_s": "toppling spectrum", "tm_s": "Tm", "arias_m_s": "Arias intensity",
-    "magnitude": "magnitude",
+    "sa03_g": "SA(0.3 s)", "sa10_g": "SA(1 s)", "sa30_g": "SA(3 s)", "xp_m_s": "toppling spectrum",
+    "tm_s": "Tm", "arias_m_s": "Arias intensity", "magnitude": "magnitude",
 }  # fmt: skip
 
 SYMBOLS = {

@@ -137,16 +137,11 @@ def _in_common(answer: HazardAnswer, places: Sequence[str | None]) -> dict[str, 
     }
 
 
-def two_digits(value: float) -> str:
-    """Return a number with two digits, without an exponent where it is large."""
-    return f"{float(f'{value:.2g}'):,.15g}"
-
-
 def once_in(annual_rate: float) -> str:
     """Return a rate as people say it: once in so many years."""
     if not annual_rate > 1e-8:
         return "less than once in a hundred million years"
-    return f"once in {two_digits(1.0 / annual_rate)} years"
+    return f"once in {float(f'{1.0 / annual_rate:.2g}'):,.15g} years"
 
 
 def rate_in_words(document: Mapping[str, Any]) -> str:

@@ -168,7 +168,10 @@ def _draw_variance(
     left, right = axes.get_xlim()
     line_x = np.geomspace(left, right, 400) if log else np.linspace(0.0, right, 400)
     line = np.asarray(fitted.variance_m2_s2(model.parameters, line_x))
+    ratio = np.asarray(fitted.variance_m2_s2(model.parameters, binned.centre)) / binned.variance
+    off = ~((ratio > 0.5) & (ratio < 2.0))
     (dots,) = axes.plot(binned.centre, binned.variance, "o", color="#555555", markersize=5.0)
+    (missed,) = axes.plot(binned.centre[off], binned.variance[off], "s", color=canvas.RED)
     (curve,) = axes.plot(line_x, line, "-", color="black", linewidth=1.8)
     if log:
         canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0,))
@@ -177,5 +180,6 @@ def _draw_variance(
     axes.set_xlim(left, right)
     axes.set_xlabel(model.term.label)
     axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
-    labels = [f"{binned.counts.size} bins of equal count", "fitted variance"]
-    axes.legend([dots, curve], labels, loc="upper left", fontsize=8, frameon=False)
+    missing = f"{off.sum()} bins that it misses by a factor above 2"
+    labels = [f"{binned.counts.size} bins of equal count", "fitted variance", missing]
+    axes.legend([dots, curve, missed], labels, loc="upper left", fontsize=8, frameon=False)

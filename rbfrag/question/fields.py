@@ -640,8 +640,7 @@ GROUPS: Mapping[str, tuple[Any, ...]] = {
     "Earthquake, site and scatter of the shaking": (SceneFields, SourceFields),
     "What is asked": (RequestFields,),
 }
-"""Fields by what they are about, those first that a beginner states: a field belongs where it is
-found first."""
+"""Fields by what they are about, a beginner's first; each belongs where it is found first."""
 
 SPECTRAL = tuple(name for name in MeasureFields.__annotations__ if name.startswith("sa"))
 
@@ -669,11 +668,6 @@ def names_of(*classes: Any) -> tuple[str, ...]:
     """Return the fields that classes declare, in their order; a name is one of its own."""
     every = ((each,) if isinstance(each, str) else _hints(each) for each in classes)
     return tuple(dict.fromkeys(name for names in every for name in names))
-
-
-def group_of(name: str) -> str | None:
-    """Return what a field is about; None for a name that is no field."""
-    return next((group for group, of in GROUPS.items() if name in names_of(*of)), None)
 
 
 def _hints(fields: Any) -> Mapping[str, Any]:

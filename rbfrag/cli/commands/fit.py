@@ -72,9 +72,8 @@ def fit(
     ),
     method: str | None = option(
         "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
-        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, "
-        "bounded; of outcomes on xp: record. Default: wls. Sliding: displacement; "
-        "slumping: capacity; confined_toppling: confined; rocking: overturning.",
+        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, bounded; on "
+        "xp: record. Default: the one that predicts earthquakes left out best with this term.",
         show_default=False,
     ),
     free_m: bool = option(
@@ -133,6 +132,8 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
         f"{report.model.meaning}."
     )
     outcomes: Any = report.details.get("n_outcomes")
+    if why := report.details.get("why_method"):
+        yield f"No method was named: {why}."
     what = f"{report.n:,} critical values" if outcomes is None else f"{outcomes:,} outcomes"
     data = f"It is fitted on {what} of {report.events:,} earthquakes"
     score = report.scores.get("log_loss_held_out")

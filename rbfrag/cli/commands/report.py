@@ -61,10 +61,8 @@ def report(
     from rbfrag.plots.report.contents import COLUMNS, RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
-    rows: list[dict[str, Any]] = [{**given, **measures}]
-    remarks: tuple[str, ...] = ()
-    if blocks is not None:
-        rows, remarks = stated_rows(blocks, rows[0], sheet=sheet)
+    known: dict[str, Any] = {**given, **measures}
+    rows, remarks = stated_rows(blocks, known, sheet=sheet) if blocks else ([known], ())
     title = heading.title or (TITLE if len(rows) == 1 else f"{TITLE}s")
     with given.named():
         entries = write_report(
@@ -73,10 +71,7 @@ def report(
         )  # fmt: skip
     told = [entry.contents for entry in entries if entry.contents is not None]
     if json:
-        documents = [
-            {**each.document, "hazard": None if each.rate is None else each.rate.document}
-            for each in told
-        ]
+        documents = [each.document for each in told]
         print_json({"file": out, **(documents[0] if blocks is None else {"blocks": documents})})
         return
     if len(rows) == 1:

@@ -19,7 +19,6 @@ from rbfrag.question.fields import (
     OTHER_WORDS,
     by_field,
     declared,
-    group_of,
     names_of,
     option_of,
     word_of,
@@ -98,7 +97,8 @@ class FieldOptions(NamedTuple):
         for name in names_of(*self.classes):
             if name in self.without:
                 continue
-            about, panel = declared()[name], group_of(name)
+            about = declared()[name]
+            panel = next((group for group, of in GROUPS.items() if name in names_of(*of)), None)
             if name == "block":
                 for word, help in FILES.items():
                     own = option(help, metavar="FILE", rich_help_panel=panel)

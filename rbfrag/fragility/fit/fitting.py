@@ -78,7 +78,8 @@ def fit(
         InputError: unknown kind, term or method, or some that do not go together.
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
-    chosen, of_term = method_of_kind(kind, method), intensity_term(term)
+    of_term = intensity_term(term)
+    chosen = method_of_kind(kind, method, term, estimate_m=estimate_m)
     _refuse_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
     if seed < 0:
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
@@ -94,16 +95,12 @@ def fit(
             source = read_source(connection, chosen.block, kind=kind, **selection)
     elif not isinstance(source, FitSource):
         source = read_source(source, chosen.block, kind=kind, **selection)
+    if method is None and not np.isfinite(source.failed).any():
+        chosen = method_of_kind(kind, None, term, estimate_m=estimate_m, reads="critical")
     return fit_source(
-        source,
-        of_term,
-        chosen,
-        kind=kind,
-        name=name,
-        seed=seed,
-        estimate_m=estimate_m,
-        selection=selection,
-    ).report
+        source, of_term, chosen, kind=kind, name=name, seed=seed, estimate_m=estimate_m,
+        selection=selection, why=None if method else _why(chosen, of_term, kind),
+    ).report  # fmt: skip
 
 
 def methods_of_kind(kind: str) -> tuple[Method, ...]:
@@ -123,15 +120,23 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     return suited
 
 
-def method_of_kind(kind: str, name: str | None) -> Method:
-    """Return the named method, or the one that a kind is fitted by where none is named.
+def method_of_kind(
+    kind: str, name: str | None, term: str = "", *, estimate_m: bool = False, reads: str = ""
+) -> Method:
+    """Return the named method, or else that of most skill with a term on earthquakes left out.
+
+    Args:
+        estimate_m: it estimates the exponent M.
+        reads: what it must read; empty for anything.
 
     Raises:
         InputError: an unknown kind or method, or two that do not go together.
     """
     known = methods_of_kind(kind)
     if name is None:
-        return known[0] if len(known) == 1 else method_named("wls")
+        suited = [each for each in known if term in each.forms and reads in ("", each.reads)]
+        able = (each for each in suited if each.exponent or not estimate_m)
+        return min(able, key=lambda each: each.forms[term].rank, default=known[0])
     chosen = method_named(name)
     if chosen not in known:
         raise InputError(
@@ -139,6 +144,13 @@ def method_of_kind(kind: str, name: str | None) -> Method:
             f"kind {kind}, which are fitted by {', '.join(each.name for each in known)}"
         )
     return chosen
+
+
+def _why(chosen: Method, term: Term, kind: str) -> str:
+    """Return why a method is taken where none is named."""
+    suited = [each.name for each in methods_of_kind(kind) if term.name in each.forms]
+    of = "no outcomes are stored; of critical values" if chosen.reads == "critical" else "of"
+    return f"{chosen.name}, {of} {', '.join(suited)} the best on earthquakes left out"
 
 
 def fit_source(
@@ -152,11 +164,12 @@ def fit_source(
     estimate_m: bool = False,
     selection: Selection | None = None,
     shared: bool = True,
+    why: str | None = None,
 ) -> Fitted:
     """Fit a model and keep its held-out probabilities.
 
     Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
-    estimated too, which a study of scores has no use for.
+    estimated too, which a study of scores has no use for; `why` why this method is taken.
     """
     table, chosen = source.table, selection or {}
     data = fit_data(source, method, term, kind=kind)
@@ -199,6 +212,7 @@ def fit_source(
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
+            **({"why_method": why} if why else {}),
             "mahalanobis": _scatter(data, method, term),
             **result.details,
         },

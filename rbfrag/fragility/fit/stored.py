@@ -29,13 +29,8 @@ def fit(
         replace: replace a stored model of the same name.
         kind: what the blocks do: any kind that campaigns store; ``toppling`` if left out.
         term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``; there is no default.
-        method: method of fitting (docs/theory/fragility.md). Blocks known by p² and k_r: ``wls``
-            and ``lognormal`` (of critical values, for a term that is one number), ``logistic`` (of
-            outcomes, the same terms), ``bounded`` (of outcomes, the terms with PGV or PGA) and
-            ``record`` (``xp``). Sliding: ``displacement``; slumping: ``capacity``;
-            confined_toppling: ``confined`` (both ``pgv_pga`` and ``pgv_pga_m``); rocking:
-            ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``, or the only one that
-            there is for the kind.
+        method: one of those of the kind (docs/theory/fragility.md); None for the one that predicts
+            earthquakes left out best with this term: ``details["why_method"]`` says why.
         suite: suite of motions to fit; None for all motions.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind

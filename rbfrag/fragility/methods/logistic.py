@@ -45,7 +45,6 @@ _SPECTRAL = Form(
 
 METHOD = Method(
     name="logistic",
-    title="logistic",
     block=method.TOPPLING_BLOCK,
     link=method.LOGIT,
     forms={

@@ -33,7 +33,6 @@ _FORM = Form(
 
 METHOD = Method(
     name="lognormal",
-    title="lognormal",
     block=TOPPLING_BLOCK,
     link=NORMAL,
     forms=dict.fromkeys(("pgv", "pga_tm", "pgd_tm", "xp"), _FORM),

@@ -61,7 +61,6 @@ _QUADRATIC = Form(
 
 METHOD = Method(
     name="wls",
-    title="weighted least squares",
     block=method.TOPPLING_BLOCK,
     link=method.NORMAL,
     forms={"pgv": _LINE, "pga_tm": _LINE, "pgd_tm": _QUADRATIC, "xp": _LINE},

@@ -10,17 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import words
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import (
-    SYMBOLS,
-    at_sites,
-    block_in_words,
-    interval,
-    percent,
-    prediction_in_words,
-)
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
@@ -38,9 +31,6 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
-
-MOST = 200
-"""Blocks of a report."""
 
 SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
 """A symbol with its index, k_r for example."""
@@ -149,9 +139,9 @@ def contents_of(
     warnings = [*document["warnings"], *(answered.document["warnings"] if answered else ())]
     return Contents(
         sentences=(
-            *prediction_in_words(document),
+            *words.prediction_in_words(document),
             *about_rate,
-            *block_in_words(document["method"], known),
+            *words.block_in_words(document["method"], known),
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
@@ -165,7 +155,7 @@ def contents_of(
         measures=measures,
         model=model,
         held=_held(model, numbers, measures),
-        document=document,
+        document={**document, "hazard": None if answered is None else answered.document},
         rate=answered,
     )
 
@@ -198,9 +188,9 @@ def entries_of(
     Args:
         rows: fields of block and shaking, with ``block_id``, and ``reason`` of what is wrong.
     """
-    if not 0 < len(rows) <= MOST:
-        raise InputError(f"a report is of 1 to {MOST} blocks, and these are {len(rows):,}")
-    entries = []
+    if not 0 < len(rows) <= 200:
+        raise InputError(f"a report is of 1 to 200 blocks, and these are {len(rows):,}")
+    entries, errors = [], []
     for i, row in enumerate(rows, start=1):
         given = {name: row[name] for name in row if name not in ("block_id", "reason")}
         name = str(row.get("block_id", i))
@@ -209,11 +199,10 @@ def entries_of(
                 raise InputError(row["reason"])
             entries.append(Entry(name, contents_of(given, rate, **answering)))
         except InputError as error:
-            if len(rows) == 1:
-                raise
+            errors.append(error)
             entries.append(Entry(name, None, str(error)))
-    if all(entry.contents is None for entry in entries):
-        raise InputError(f"no block can be answered; {entries[0].name}: {entries[0].reason}")
+    if len(errors) == len(rows):
+        raise errors[0]
     return entries
 
 
@@ -283,7 +272,10 @@ def _block_rows(
     of = model.method.block
     if y_m_s is not None and of.size is not None:
         first = "toppling velocity" if facts.mode == "topple" else "velocity"
-        k, p = SYMBOLS.get(of.strength, of.strength), SYMBOLS.get(of.size, of.size).rstrip("²")
+        k, p = (
+            words.SYMBOLS.get(of.strength, of.strength),
+            words.SYMBOLS.get(of.size, of.size).rstrip("²"),
+        )
         rows.append((f"{first}, y = {k} g/{p}", f"{y_m_s:.3g} m/s"))
     return tuple(rows)
 
@@ -291,12 +283,14 @@ def _block_rows(
 def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
     level = f"{100.0 * document['level']:g} %"
     answer = [
-        ("probability of failure", percent(document["probability"])),
-        (f"interval ({level})", interval(document["ci_low"], document["ci_high"])),
+        ("probability of failure", words.percent(document["probability"])),
+        (f"interval ({level})", words.interval(document["ci_low"], document["ci_high"])),
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append((f"share at {at_sites(document['sites'])} ({level})", interval(*ends)))
+        answer.append(
+            (f"share at {words.at_sites(document['sites'])} ({level})", words.interval(*ends))
+        )
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
@@ -311,7 +305,7 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
         ("annual rate of failure", f"{document['annual_rate']:.3g} 1/a"),
         (f"interval ({level})", f"{document['ci_low']:.2g} to {document['ci_high']:.2g} 1/a"),
         ("on average", once_in(document["annual_rate"])),
-        (f"probability in {document['years']:g} years", percent(document["probability"])),
+        (f"probability in {document['years']:g} years", words.percent(document["probability"])),
     )
 
 

@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
-from rbfrag.plots.canvas import (
-    BLUE,
-    freeze_layout,
-    in_own_style,
-    new_figure,
-)
+from rbfrag.plots.canvas import BLUE, freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
 from rbfrag.plots.report.panels import panels_of
@@ -59,23 +54,24 @@ def write_sheet(entries: Sequence[Entry], title: str, date: str, target: Path) -
     from matplotlib.backends.backend_pdf import PdfPages
 
     about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
-    is_pdf = target.suffix.lower() == ".pdf"
-    if len(entries) > 1 and not is_pdf:
+    is_png = target.suffix.lower() == ".png"
+    if len(entries) > 1 and is_png:
         raise InputError(f"{target}: several blocks need several pages: write .pdf or .html")
     with rc_context(_RC), written_whole(target, "report") as path, path.open("wb") as stream:
-        with PdfPages(stream, metadata={**about, "CreationDate": None}) if is_pdf else stream as to:
-            for page in _pages(entries, title, date):
-                if isinstance(to, PdfPages):
-                    to.savefig(page)
-                else:
-                    page.savefig(to, format="png", metadata=about, dpi=130)
+        pages = _pages(entries, title, date)
+        if is_png:
+            next(pages).savefig(stream, format="png", metadata=about, dpi=130)
+        else:
+            with PdfPages(stream, metadata={**about, "CreationDate": None}) as book:
+                for page in pages:
+                    page.savefig(book, format="pdf")
 
 
 def _pages(entries: Sequence[Entry], title: str, date: str) -> Iterator[Figure]:
     """Yield the pages: one of a single block; or the summary, and half a page for each block."""
     answered = [(e.name, e.contents) for e in entries if e.contents is not None]
     draws: list[Callable[[Figure], None]] = [
-        *(partial(_draw_summary, entries=entries, first=i, title=title, date=date)
+        *(partial(_list, entries=entries, first=i, title=title, date=date)
           for i in range(0, len(entries), _ROWS)),
         *(partial(_draw_halves, entries=answered[i : i + 2]) for i in range(0, len(answered), 2)),
     ]  # fmt: skip
@@ -89,9 +85,7 @@ def _pages(entries: Sequence[Entry], title: str, date: str) -> Iterator[Figure]:
         yield figure
 
 
-def _draw_summary(
-    figure: Figure, entries: Sequence[Entry], first: int, title: str, date: str
-) -> None:
+def _list(figure: Figure, entries: Sequence[Entry], first: int, title: str, date: str) -> None:
     (part,) = figure.subfigures(1, 1, squeeze=False)[0]
     _write(part, _LEFT, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
     _write(part, _RIGHT, 0.964, date, fontsize=9, ha="right")
@@ -109,14 +103,13 @@ def _draw_summary(
 def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> None:
     halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
     for half, (name, contents) in zip(halves, entries, strict=False):
-        head_in = 0.85 + 0.17 * len(_head_lines(contents))
-        notes = _wrapped_all(contents.notes())
+        notes, head_in = _wrapped_all(contents.notes()), 0.85 + 0.17 * len(_head_lines(contents))
         foot_in = 0.35 + 0.13 * len(notes)
-        body_in = 0.5 * _HEIGHT_IN - head_in - foot_in
-        head, body, foot = half.subfigures(3, 1, height_ratios=[head_in, body_in, foot_in])
+        heights = [head_in, 0.5 * _HEIGHT_IN - head_in - foot_in, foot_in]
+        head, body, foot = half.subfigures(3, 1, height_ratios=heights)
         _write_head(head, contents, [_cut(name, _TITLE)], "", head_in)
         left, *cells, _ = body.subfigures(1, 4, width_ratios=[3.9, 2.1, 2.1, 0.17])
-        _write_tables(left, [(0.18, 0.46, contents.tables[:3])], body_in)
+        _write_table(left, 0.18, 0.46, contents.tables[:3], heights[1])
         for cell, panel in zip(cells, panels_of(contents), strict=False):
             panel.draw(cell)
             for axes in cell.axes:
@@ -129,10 +122,9 @@ def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> Non
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
-    columns = [*zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True)]
-    notes = _wrapped_all((*contents.notes(), *contents.versions))
     lines = (sum(1.5 + len(rows) for _, rows in tables) for tables in contents.columns())
     tables_in = 0.1 + _STEP_IN * max(lines)
+    notes = _wrapped_all((*contents.notes(), *contents.versions))
     foot_in = 0.35 + 0.13 * len(notes)
     panels = panels_of(contents)
     rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
@@ -141,7 +133,8 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _write_head(parts[0], contents, titles, date, head_in)
-    _write_tables(parts[1], columns, tables_in)
+    for x, wide, tables in zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True):
+        _write_table(parts[1], x, wide, tables, tables_in)
     for part, row in zip(parts[2:-1], rows, strict=True):
         # one picture alone is as wide as two
         widths = [2.0 / len(row)] * len(row)
@@ -199,20 +192,19 @@ def _cut(text: str, letters: int) -> str:
     return text if len(text) <= letters else f"{text[: letters - 1]}…"
 
 
-def _write_tables(
-    part: SubFigure, columns: Sequence[tuple[float, float, Sequence[Table]]], tall_in: float
+def _write_table(
+    part: SubFigure, x: float, wide: float, tables: Sequence[Table], tall_in: float
 ) -> None:
-    """Write columns of tables: where they begin, how wide names are, and what they hold."""
+    """Write tables below each other from x on, their values behind names so wide."""
     step = _STEP_IN / tall_in
-    for x, wide, tables in columns:
-        y = 1.0 - 0.5 * step
-        for heading, rows in tables:
-            _write(part, x, y, heading, fontsize=9, fontweight="bold", color=BLUE)
-            for name, value in rows:
-                y -= step
-                _write(part, x, y, name, fontsize=8.2)
-                _write(part, x + wide, y, _cut(value, _CELL), fontsize=8.2)
-            y -= 1.5 * step
+    y = 1.0 - 0.5 * step
+    for heading, rows in tables:
+        _write(part, x, y, heading, fontsize=9, fontweight="bold", color=BLUE)
+        for name, value in rows:
+            y -= step
+            _write(part, x, y, name, fontsize=8.2)
+            _write(part, x + wide, y, _cut(value, _CELL), fontsize=8.2)
+        y -= 1.5 * step
 
 
 def _write_lines(part: SubFigure, lines: Sequence[str], tall_in: float) -> None:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from html import escape
+from itertools import islice
 from pathlib import Path
 
 from rbfrag.files import write_text
-from rbfrag.plots.canvas import (
-    freeze_layout,
-    in_own_style,
-    new_figure,
-)
+from rbfrag.plots.canvas import freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
 from rbfrag.plots.report.panels import Panel, panels_of
@@ -50,7 +47,7 @@ sub { font-size: 75%; line-height: 0; }
 def write_html(entries: Sequence[Entry], title: str, date: str, target: Path) -> None:
     """Write a report as a page that needs nothing but itself: the summary, and each block."""
     several = len(entries) > 1
-    answered = [(e, e.contents) for e in entries if e.contents is not None]
+    answered = [(e.name, e.contents) for e in entries if e.contents is not None]
     versions = dict.fromkeys(text for _, contents in answered for text in contents.versions)
     parts = [
         "<!DOCTYPE html>", '<html lang="en">', '<head><meta charset="utf-8">',
@@ -58,8 +55,8 @@ def write_html(entries: Sequence[Entry], title: str, date: str, target: Path) ->
         f"<title>{escape(title)}</title>", f"<style>{_STYLE}</style></head>", "<body>",
         f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
         _summary(entries) if several else "",
-        *(text for i, (entry, contents) in enumerate(answered)
-          for text in _block(contents, entry.name if several else "", f"b{i}-" if several else "")),
+        *(_block(contents, name, f"b{i}-" if several else "")
+          for i, (name, contents) in enumerate(answered)),
         "<footer>", *(f"<p>{escape(text)}</p>" for text in versions), "</footer>",
         "</body></html>",
     ]  # fmt: skip
@@ -77,17 +74,17 @@ def _summary(entries: Sequence[Entry]) -> str:
     return f'<table class="all">{"".join(rows)}</table>'
 
 
-def _block(contents: Contents, name: str, prefix: str) -> Iterator[str]:
-    """Yield what is said of a block; of several each has two pictures, and names of its own."""
+def _block(contents: Contents, name: str, prefix: str) -> str:
+    """Return what is said of a block; of several each has two pictures, and names of its own."""
     first, *others = contents.sentences
-    panels = panels_of(contents)[: 2 if prefix else None]
-    yield f"<section><h1>{escape(name)}</h1>" if prefix else ""
-    yield f'<p class="first">{_written(first)}</p><p>{_written(" ".join(others))}</p>'
-    yield f'<div class="parts">{"".join(map(_column, contents.columns()))}</div>'
-    figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels)
-    yield f'<div class="parts">{"".join(figures)}</div>'
-    yield "".join(f'<p class="note">{_written(text)}</p>' for text in contents.notes())
-    yield "</section>" if prefix else ""
+    figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels_of(contents))
+    return "\n".join([
+        f"<section>{f'<h1>{escape(name)}</h1>' if prefix else ''}",
+        f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
+        '<div class="parts">', *map(_column, contents.columns()), "</div>",
+        '<div class="parts">', *islice(figures, 2 if prefix else None), "</div>",
+        *(f'<p class="note">{_written(text)}</p>' for text in contents.notes()), "</section>",
+    ])  # fmt: skip
 
 
 def _written(text: str) -> str:

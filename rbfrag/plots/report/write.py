@@ -44,25 +44,19 @@ class ReportKeywords(
 def report(
     out: str | PathLike[str],
     *,
-    blocks: Sequence[Mapping[str, Any]] | None = None,
     curve: CurveLike | None = None,
     years: float = 50.0,
     title: str = TITLE,
     date: str = "",
     **question: Unpack[ReportKeywords],
 ) -> Path:
-    """Write one page about one block, or a summary and half a page about each of several.
-
-    A page has the answer in a sentence, drawing, inputs, chart, curve, rate and versions.
+    """Write one page about one block: sentence, drawing, inputs, chart, curve, rate, versions.
 
     The same question gives the same file, byte for byte, with the same versions of rbfrag and
     matplotlib.
 
     Args:
-        out: file to write: .pdf (pages of A4), .png (of one block), or .html (one file that needs
-            no other).
-        blocks: several blocks, each its fields of block and shaking and ``block_id``; what
-            ``question`` states holds for all that do not state it.
+        out: file to write: .pdf or .png (a page of A4), or .html (one file that needs no other).
         curve: hazard curve, or its file, for the annual rate.
         years: period of the probability [a].
         title: title of the page.
@@ -84,8 +78,7 @@ def report(
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     rate = RateQuestion(curve, years, meaning)
-    rows = [given] if blocks is None else [{**given, **block} for block in blocks]
-    write_report(out, rows, rate, title=title, date=date, **answering)
+    write_report(out, [given], rate, title=title, date=date, **answering)
     return Path(out)
 
 
