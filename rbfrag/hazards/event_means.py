@@ -24,7 +24,7 @@ from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
 _BLOCKS_AT_ONCE = 256
-_SURE, _LEAST = 1.0 - 1e-16, 1e-12
+_SURE, _LEAST = 1.0 - 1e-16, 1e-30
 _MUCH = 1e3
 
 
@@ -138,7 +138,7 @@ def shifts_on(
             table_of(blocks.moved(step), grid, 0, nowhere, slopes=False).probability
             for step in (0.0 * axes[0], *(side * axis for axis in axes for side in (1.0, -1.0)))
         ]))  # fmt: skip
-        z = ndtri(np.clip(p, _LEAST, 1.0 - _LEAST))
+        z = ndtri(np.clip(p, _LEAST, _SURE))
         result[first : first + sizes[number], np.searchsorted(own, places)] = z[1:] - z[0]
     return result
 

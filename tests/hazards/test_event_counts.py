@@ -150,8 +150,8 @@ def test_shifted_models_answer_by_the_same_samples(meaning: str) -> None:
 
 @pytest.mark.parametrize("meaning", ["single", "rotd50"])
 def test_shifts_on_nodes_are_those_of_each_pair(meaning: str) -> None:
-    shaking = events(0.5 * np.exp(0.5 * np.random.default_rng(1).normal(size=(9, 2))))
-    blocks = portfolio(shaking, SHARED, meaning, y=[0.3, 0.5, 0.6], site=["s0", "s0", "s1"])
+    shaking = events(0.5 * np.exp(0.15 * np.random.default_rng(1).normal(size=(9, 2))))
+    blocks = portfolio(shaking, SHARED, meaning, y=[0.3, 0.45, 0.5], site=["s0", "s0", "s1"])
     part = EventYears(0, blocks, shaking, np.empty(0), np.empty(0), 1, 0)
     by = shifted_portfolios(blocks)
     nodes, pairs = (
