@@ -43,8 +43,9 @@ _STRENGTHS, _SIZES, _REACH = 41, 9, 5.0
 """Points of what like blocks scatter by, and how far they reach in standard deviations."""
 
 _FARTHEST, _LEAST_SHAKING = 38.0, 1e-4
-_MOST_ON_NODES = 2000
-"""Blocks of a site up to which their derivatives are kept on nodes."""
+_MOST_ON_NODES, _SHIFT_STEP = 1000, 0.02
+"""Blocks of a site up to which what shifts do to them is kept on nodes, and the step of these
+where nothing scatters: a shift changes slowly with the shaking."""
 
 _MOST_SUMMED = 50
 """Costs of like blocks that are drawn one by one; the sum of more by its three moments."""
@@ -238,16 +239,17 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     most = int(np.bincount(portfolio.site).max(initial=0))
     along_axes = len(part.shifted) == 2 * sum(len(row.coefficients) for row in portfolio.models)
     one_measure = along_axes and len(portfolio.measures) == 1 and most <= _MOST_ON_NODES
-    by_axis = None
-    if one_measure:  # by first derivatives on nodes, a tenth of the work
+    shifts = None
+    if one_measure:  # on nodes, a fraction of the work
         about = LevelShaking.about(portfolio.measures[0], portfolio.component)
         step, smoothing = smoothing_of(about)
+        step = step if smoothing.reach else _SHIFT_STEP
         u = np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING))
         grid = Grid.over(step, float(u.min()), float(u.max()), smoothing.reach)
     for site in np.intersect1d(events.site, portfolio.site):
         own = np.flatnonzero(portfolio.site == site)
         if one_measure:
-            by_axis = shifts_on(portfolio, own, about, grid, smoothing)
+            shifts = shifts_on(portfolio, own, about, grid, smoothing)
         rows = np.flatnonzero(events.site == site)
         at_once = max(1, _VALUES_AT_ONCE // (own.size * weight.size))
         for start in range(0, rows.size, at_once):
@@ -262,13 +264,12 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
             which, block = np.nonzero(p > NOTHING)
             shifted = (
                 np.einsum("rkm,k->rm", other.probability(own, shaking, points)[0], weight)
-                for other in (() if by_axis is not None else part.shifted)
+                for other in (() if shifts is not None else part.shifted)
             )
             columns = [each[which, block] for each in (p, outside, *shifted)]
-            if by_axis is not None:
+            if shifts is not None:
                 first, weights = grid.cubic(u[chunk][which])
-                of_axes = sum(w * by_axis[:, block, first + i] for i, w in enumerate(weights))
-                columns += [*of_axes]
+                columns += [*sum(w * shifts[:, block, first + i] for i, w in enumerate(weights))]
             parts.append((own[block], chunk[which], *columns))
     if not parts:
         return
@@ -276,14 +277,10 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     order = np.lexsort((block, events.event[row]))
     block, row, outside = block[order], row[order], outside[order]
     p = np.minimum(p[order], 1.0)
-    if one_measure:
-        shift = np.zeros((1 + 2 * len(more), p.size))
-        for axis, own_shift in enumerate(more):
-            shift[1 + 2 * axis], shift[2 + 2 * axis] = own_shift[order], -own_shift[order]
-    else:
+    shift = np.stack([np.zeros(p.size), *(one[order] for one in more)])
+    if not one_measure:
         with np.errstate(invalid="ignore"):
-            shift = ndtri(np.minimum(np.stack([p, *(one[order] for one in more)]), 1.0)) - ndtri(p)
-        shift = np.nan_to_num(shift, nan=0.0)
+            shift[1:] = np.nan_to_num(ndtri(np.minimum(shift[1:], 1.0)) - ndtri(p), nan=0.0)
     event = events.event[row]
     starts = np.flatnonzero(np.diff(event, prepend=-1))
     for first, last in pairwise([*starts.tolist(), event.size]):

@@ -24,7 +24,7 @@ from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
 _BLOCKS_AT_ONCE = 256
-_SURE, _LEAST = 1.0 - 1e-16, 1e-12
+_SURE, _LEAST = 1.0 - 1e-16, 1e-30
 _MUCH = 1e3
 
 
@@ -118,32 +118,28 @@ def axes_of(row: ModelRow) -> FloatArray:
 def shifts_on(
     portfolio: Portfolio, own: Indices, shaking: LevelShaking, grid: Grid, smoothing: Smoothing
 ) -> FloatArray:
-    """Return by how much Φ⁻¹ of P differs one standard deviation along each axis of the errors.
-
-    To the first order: dP/db times the step over the normal density there.
+    """Return by how much Φ⁻¹ of P differs at b ± one standard deviation along axes of the errors.
 
     Args:
         own: rows of the portfolio, m of them.
 
     Returns:
-        Axes of all models, one model after the other, x m x nodes; 0 for blocks of other models.
+        Both sides of each axis of each model, one model after the other, x m x nodes; 0 for blocks
+        of other models.
     """
-    sizes = [len(row.coefficients) for row in portfolio.models]
+    sizes = [2 * len(row.coefficients) for row in portfolio.models]
     result = np.zeros((sum(sizes), own.size, grid.size))
     for places, blocks in _blocks_of(portfolio, own, np.zeros(portfolio.size, np.intp), shaking):
         number = int(portfolio.model[places[0]])
         first = sum(sizes[:number])
         nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
-        table = table_of(blocks, grid, 0, nowhere)
-        assert table.slopes is not None
-        p = smoothing.of(table.probability)
-        known = (p > _LEAST) & (p < 1.0 - _LEAST)
-        z = ndtri(np.where(known, p, 0.5))
-        density = np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
-        slopes = smoothing.of(np.stack(table.slopes))
-        by_axis = np.einsum("ka,kmn->amn", axes_of(portfolio.models[number]), slopes)
-        at = np.searchsorted(own, places)
-        result[first : first + sizes[number], at] = np.where(known, by_axis / density, 0.0)
+        axes = axes_of(portfolio.models[number]).T
+        p = smoothing.of(np.stack([
+            table_of(blocks.moved(step), grid, 0, nowhere, slopes=False).probability
+            for step in (0.0 * axes[0], *(side * axis for axis in axes for side in (1.0, -1.0)))
+        ]))  # fmt: skip
+        z = ndtri(np.clip(p, _LEAST, _SURE))
+        result[first : first + sizes[number], np.searchsorted(own, places)] = z[1:] - z[0]
     return result
 
 

@@ -117,6 +117,11 @@ class KernelBlocks:
         numbers = {name: each[:, chosen] for name, each in self.numbers.items()}
         return KernelBlocks(self.model, self.median, numbers, self.weight, self.site[chosen])
 
+    def moved(self, step: FloatArray | float) -> KernelBlocks:
+        """Return the blocks by a model whose parameters are so much greater."""
+        parameters = tuple(np.add(self.model.parameters, step).tolist())
+        return replace(self, model=replace(self.model, parameters=parameters))
+
     def values(self, u: FloatArray) -> dict[str, Any]:
         """Return what the formula reads at u, of a shape that broadcasts with draws x blocks."""
         block, term = self.model.method.block, self.model.term
@@ -382,8 +387,7 @@ def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | float = 0
     Args:
         step: what is added to the model's parameters.
     """
-    parameters = tuple(np.add(blocks.model.parameters, step).tolist())
-    moved = replace(blocks, model=replace(blocks.model, parameters=parameters))
+    moved = blocks.moved(step)
     p = table_of(moved, grid, 0, moved.allowed_from(grid), slopes=False).probability
     return np.maximum.accumulate(p, axis=1)
 

@@ -18,12 +18,14 @@ from rbfrag.hazards.conversions import component
 from rbfrag.hazards.event_counts import (
     EventYears,
     PartCounts,
+    _shaken,
     _sum_by_moments,
     _sum_of_each,
     count_part,
     shift_error,
 )
 from rbfrag.hazards.event_set import Duration, EventSet
+from rbfrag.hazards.losses import shifted_portfolios
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.solver.results import FloatArray
 from tests.fragility.conftest import model_row
@@ -144,6 +146,20 @@ def test_shifted_models_answer_by_the_same_samples(meaning: str) -> None:
     other = counted(shaking, by[1], 4000).counts.events[0, 0, 0]
     base = counted(shaking, blocks, 4000).counts.events[0, 0, 0]
     assert more[0] / same[0] == pytest.approx(other / base, rel=0.1)
+
+
+@pytest.mark.parametrize("meaning", ["single", "rotd50"])
+def test_shifts_on_nodes_are_those_of_each_pair(meaning: str) -> None:
+    shaking = events(0.5 * np.exp(0.15 * np.random.default_rng(1).normal(size=(9, 2))))
+    blocks = portfolio(shaking, SHARED, meaning, y=[0.3, 0.45, 0.5], site=["s0", "s0", "s1"])
+    part = EventYears(0, blocks, shaking, np.empty(0), np.empty(0), 1, 0)
+    by = shifted_portfolios(blocks)
+    nodes, pairs = (
+        [shaken.shift for _, shaken in _shaken(part._replace(shifted=each))]
+        for each in (by, (*by, by[0]))  # another number than that of the axes: no nodes
+    )
+    for one, other in zip(nodes, pairs, strict=True):
+        np.testing.assert_allclose(one, other[:-1], atol=5e-4, rtol=1e-2)
 
 
 def test_error_from_the_axes() -> None:
