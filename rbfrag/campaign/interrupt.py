@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.util import _run_finalizers  # type: ignore[attr-defined]
 
 STOPPING = "stopping after the motion in hand; press again to stop now"
 
@@ -71,6 +72,7 @@ def _answer(pressed: threading.Event) -> None:
     try:
         for worker in multiprocessing.active_children():
             worker.kill()
+        _run_finalizers(0)  # else the tracker of resources says that their semaphores leaked
     finally:
         os._exit(INTERRUPTED)
 

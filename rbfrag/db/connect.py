@@ -150,8 +150,9 @@ def _raise_explained(context: ExceptionContext) -> None:
     silent = type(error).__name__ == "SilentServerError"
     if context.is_pre_ping and not silent:
         return  # the server closed it meanwhile: another one takes its place
-    # without a connection it was one that could not be made
-    connected = silent or context.connection is not None
+    # without a connection it was one that could not be made, and the first
+    first = context.dialect.server_version_info is None
+    connected = silent or context.connection is not None or not first
     explained = _explained_server_error(error, label, connected=connected)
     if explained is not None:
         raise explained from error

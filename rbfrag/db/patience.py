@@ -18,6 +18,9 @@ ENDED_S = 100.0
 PROBE_S = 5
 """How long the other connection may take [s]."""
 
+# what it says of a pipeline that broke tells nobody more than the error that follows
+logging.getLogger("psycopg").addHandler(logging.NullHandler())
+
 
 class SilentServerError(psycopg.OperationalError):
     """A server that does not answer any more."""

@@ -38,7 +38,13 @@ FILE_FORM = {
 """A form of one file, as OpenAPI describes it."""
 
 SMALL_BYTES = 1 << 16
-"""So much of each body is read at once, however many others are being read."""
+"""A body of so much takes no place, however many others are being worked on."""
+
+LEAST_RATE = 1000.0
+"""Slowest [bytes/s] that a body may come."""
+
+PAUSE_S = 5.0
+"""Longest time [s] in which nothing of a body comes."""
 
 MOST_BRACKETS = 1000
 """Lists and objects of a request: one list a name, and one object around them."""
@@ -54,7 +60,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
 class Bodies:
-    """Reads bodies, a bounded number at a time.
+    """Reads bodies, and bounds how many are worked on and what all of them hold.
 
     The framework can bound the size of a body, but neither the time that one takes to come nor
     the memory of many at once.
@@ -63,6 +69,7 @@ class Bodies:
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
         self._places = asyncio.Semaphore(settings.bodies_at_once)
+        self._free = settings.bodies_at_once * settings.body_limit_bytes
 
     @asynccontextmanager
     async def read(self, request: Request) -> AsyncIterator[Request]:
@@ -72,43 +79,52 @@ class Bodies:
         if stated.isdigit() and int(stated) > limits.body_limit_bytes:
             raise self._too_long()
         parts: list[bytes] = []
-        # so much takes no memory to speak of, and so no place: nobody waits behind idle bodies
-        if not await self._in_time(self._read_on(request, parts, SMALL_BYTES)):
-            yield _with_body(request, b"".join(parts))
-            return
         try:
-            await asyncio.wait_for(self._places.acquire(), limits.time_limit)
-        except TimeoutError:
-            raise RequestRefusedError(*BUSY) from None
-        try:
-            await self._in_time(self._read_on(request, parts, limits.body_limit_bytes))
-            yield _with_body(request, b"".join(parts))
+            await self._read_into(parts, request)
+            parts[:] = [b"".join(parts)]
+            whole = _with_body(request, parts[0])
+            if len(parts[0]) <= SMALL_BYTES:
+                yield whole
+                return
+            # taken only now: nobody waits behind bodies that do not come
+            try:
+                await asyncio.wait_for(self._places.acquire(), limits.time_limit)
+            except TimeoutError:
+                raise RequestRefusedError(*BUSY) from None
+            try:
+                yield whole
+            finally:
+                self._places.release()
         finally:
-            self._places.release()
+            self._free += sum(map(len, parts))
 
-    async def _in_time(self, reading: Coroutine[Any, Any, bool]) -> bool:
-        limit_s = self._settings.body_time
+    async def _read_into(self, parts: list[bytes], request: Request) -> None:
+        size = 0
+        now = asyncio.get_running_loop().time
+        end, late = now() + self._settings.body_time, now() + PAUSE_S
         try:
-            return await asyncio.wait_for(reading, limit_s)
+            async with asyncio.timeout_at(min(late, end)) as patience:
+                more = True
+                while more:
+                    message = await request.receive()
+                    if message["type"] == "http.disconnect":
+                        raise RequestRefusedError(*GONE)
+                    parts.append(message.get("body", b""))
+                    came, more = len(parts[-1]), message.get("more_body", False)
+                    size += came
+                    self._free -= came
+                    if size > self._settings.body_limit_bytes:
+                        raise self._too_long()
+                    if self._free < 0:
+                        raise RequestRefusedError(*BUSY[:3], {**BUSY[3], **_CLOSE})
+                    # what came fast is no credit for more than one pause
+                    late = min(late + came / LEAST_RATE, now() + PAUSE_S)
+                    patience.reschedule(min(late, end))
         except TimeoutError:
-            words = f"the body took longer than {limit_s:g} s to come"
+            words = f"the body took longer than {self._settings.body_time:g} s to come"
+            if late < end:
+                words = f"the body came slower than {LEAST_RATE:g} bytes/s for {PAUSE_S:g} s"
             raise RequestRefusedError(408, "too-slow", words, _CLOSE) from None
-
-    async def _read_on(self, request: Request, parts: list[bytes], most: int) -> bool:
-        """Read until more than `most` bytes are there; return whether there may be more."""
-        size = sum(map(len, parts))
-        while True:
-            message = await request.receive()
-            if message["type"] == "http.disconnect":
-                raise RequestRefusedError(*GONE)
-            parts.append(message.get("body", b""))
-            size += len(parts[-1])
-            if size > self._settings.body_limit_bytes:
-                raise self._too_long()
-            if not message.get("more_body", False):
-                return False
-            if size > most:
-                return True
 
     def _too_long(self) -> RequestRefusedError:
         limit = self._settings.body_limit_bytes

@@ -120,6 +120,7 @@ def test_twice_ends_at_once(place: Path, jobs: int, group: bool, pause_s: float)
         rest = process.communicate(timeout=PATIENCE_S)[1].decode()
         assert process.returncode == 130
         assert "Traceback" not in rest
+        assert "resource_tracker" not in rest
         end = time.monotonic() + PATIENCE_S
         while any(Path(f"/proc/{pid}/cmdline").exists() for pid in workers):
             assert time.monotonic() < end, "a worker goes on"

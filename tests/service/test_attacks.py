@@ -3,11 +3,12 @@
 import http.client
 import json
 import os
+import select
 import socket
 import sqlite3
 import threading
 import time
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 
 import pytest
 
@@ -101,21 +102,82 @@ def test_a_million_elements_are_parsed_beside_others(service):
 
 
 @pytest.mark.parametrize(
-    ("stated", "honest"), [(1000, BODY), (100_000, BODY), (100_000, b" " * 80_000 + BODY)]
+    ("stated", "sent", "honest"),
+    [
+        (1000, 0, BODY),
+        (100_000, 0, b" " * 80_000 + BODY),
+        (128_000, 66_000, BODY),
+        (128_000, 66_000, b" " * 240_000 + BODY),
+    ],
 )
-def test_idle_bodies_keep_nobody_out(service, stated, honest):
+def test_idle_bodies_keep_nobody_out(service, stated, sent, honest):
     wires = [socket.create_connection(("127.0.0.1", service.port), 60) for _ in range(40)]
     try:
         for wire in wires:
             wire.sendall(
                 b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\n"
-                b"content-length: %d\r\n\r\n" % stated
+                b"content-length: %d\r\n\r\n" % stated + b" " * sent
             )
+        time.sleep(0.5)  # until what was sent is read
         healthy(service)
         assert ask(service, "POST", "/v1/predict", honest, timeout=CLIENT_WAITS_S)[0] == 200
     finally:
         for wire in wires:
             wire.close()
+
+
+@pytest.mark.parametrize("first", [b"", b" " * 200_000], ids=["at once", "after a fast start"])
+def test_bodies_slower_than_the_least_rate_are_given_up(service, first):
+    with socket.create_connection(("127.0.0.1", service.port), 60) as wire:
+        wire.sendall(
+            b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ncontent-length: 500000\r\n\r\n"
+            + first
+        )
+        wire.settimeout(0.1)
+        answer, sent = b"", 0
+        while not answer and sent < 200:  # 20 s; without a least rate it is given 30
+            wire.sendall(b" ")
+            sent += 1
+            with suppress(TimeoutError):
+                answer = wire.recv(10_000)
+        assert answer.startswith(b"HTTP/1.1 408 ")
+        assert b"connection: close" in answer
+        wire.settimeout(20)
+        while answer:  # the rest of the answer, and then the end
+            answer = wire.recv(10_000)
+
+
+def test_bodies_that_come_slowly_but_steadily_are_answered(service):
+    body = b" " * 12_000 + BODY
+    with socket.create_connection(("127.0.0.1", service.port), 60) as wire:
+        wire.sendall(
+            b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ncontent-length: %d\r\n\r\n"
+            % len(body)
+        )
+        for start in range(0, len(body), 1000):  # longer than a pause, faster than the least rate
+            wire.sendall(body[start : start + 1000])
+            time.sleep(0.5)
+        assert wire.recv(10_000).startswith(b"HTTP/1.1 200 ")
+
+
+def test_bodies_that_are_being_read_hold_bounded_memory(tmp_path):
+    bound = {"body_limit_mb": 0.2, "bodies_at_once": 2}
+    with running_service(tmp_path, **bound) as running, ExitStack() as wires:
+        half_sent = [
+            wires.enter_context(socket.create_connection(("127.0.0.1", running.port), 60))
+            for _ in range(3)
+        ]
+        for wire in half_sent:
+            wire.sendall(
+                b"POST /v1/predict HTTP/1.1\r\nhost: localhost\r\ncontent-length: 190000\r\n\r\n"
+                + b" " * 150_000
+            )
+        (refused,), _, _ = select.select(half_sent, [], [], 60.0)
+        assert refused.recv(10_000).startswith(b"HTTP/1.1 503 ")
+        wires.close()  # and what they held is free again
+        end = time.monotonic() + 30.0
+        while ask(running, "POST", "/v1/predict", b" " * 150_000 + BODY)[0] != 200:
+            assert time.monotonic() < end
 
 
 def test_dotted_keys_burn_no_worker(service):
