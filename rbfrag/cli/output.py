@@ -286,8 +286,8 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         **{name: words.interval(*pair) for name, pair in ends.items() if None not in pair},
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
-        **({} if document["how"].startswith("model") else {"how": document["how"]}),
         "model": words.model_in_words(document),
+        **({} if document["how"].startswith("model") else {"how": document["how"]}),
         "data": document["data"],
     }
 
