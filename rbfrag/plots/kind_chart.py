@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -76,18 +76,31 @@ def plot_kind_chart(
     outside = np.where(answers.in_domain, 0.0, 1.0)
     axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25)
     lines = axes.contour(x, y, answers.probability, CONTOURS, colors=canvas.BLUE, linewidths=1.1)
-    axes.clabel(lines, fmt=lambda p: f"{100.0 * p:g} %", fontsize=8)
+    places = list(_label_places(x, y, answers.probability))
+    axes.clabel(lines, fmt=lambda p: f"{100.0 * p:g} %", fontsize=8, manual=places)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     about = declared()[first]
     axes.set_xlabel(f"{about.what} [{about.unit}]")
-    axes.set_ylabel(f"yield acceleration coefficient, {number_in_words(strength, 0.0)[0]}")
+    axes.set_ylabel(f"yield acceleration coefficient, $k_{{{strength[1:]}}}$")
     axes.grid(visible=True, which="both", lw=0.4, color="#c0c0c0")
     at = [" = ".join(number_in_words(name, value, 3)) for name, value in held.items()]
-    title = as_written(f"Probability of failure, {model.method.block.kind}: model {model.name}", 85)
-    axes.set_title(
-        f"{title}\nat {', '.join([*at, *ratios])}\nshaded: outside the fitted range", fontsize=10
-    )
+    kind = model.method.block.kind.replace("_", " ")
+    title = as_written(f"Probability of failure, {kind}: model {model.name}", 85)
+    conditions = as_written(f"at {', '.join([*at, *ratios])}", 85)
+    axes.set_title(f"{title}\n{conditions}\nshaded: outside the fitted range", fontsize=10)
     return canvas.save_figure(figure, path)
+
+
+def _label_places(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Yield a place on each line of the chart, one below the other and off the frame."""
+    margin = _NODES // 12
+    for level, wanted in zip(CONTOURS, np.linspace(0.85, 0.15, len(CONTOURS)), strict=True):
+        column = (p < level).sum(axis=1)
+        inside = np.flatnonzero((column > margin) & (column < _NODES - margin))
+        inside = inside[(inside > margin) & (inside < _NODES - margin)]
+        if inside.size:
+            row = inside[np.abs(inside - wanted * _NODES).argmin()]
+            yield float(x[column[row]]), float(y[row])
 
 
 def _in_proportion(
@@ -101,6 +114,8 @@ def _in_proportion(
 
     seconds = middle("pgv_over_pga_s")
     pgv = x if first == "pgv_m_s" else x * seconds * g if first == "pga_g" else None
+    if first == "sa10_g":
+        pgv = x * g / (2.0 * math.pi * middle("v10_over_pgv"))
     if pgv is not None and name == "pga_g":
         return pgv / (seconds * g), f"PGV/(PGA g) = {seconds:.3g} s"
     if pgv is not None and name in _PERIODS_S:

@@ -12,8 +12,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model
 from rbfrag.db.queries import combination_table
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import find_model, stored_row
 from rbfrag.fragility.measures import MEASURES, spectral
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
@@ -125,7 +126,9 @@ def chart(
     from rbfrag.plots.chart import plot_chart
     from rbfrag.plots.model_lines import held_measures
 
-    chosen = find_model(model, ["pgv_m_s"] if model is None else MEASURES, db)
+    rotation = None if model is None else FragilityModel.from_row(stored_row(model, db)).criterion
+    measures = ["pgv_m_s"] if model is None else MEASURES
+    chosen = find_model(model, measures, db, rotation_deg=rotation)
     if chosen.method.block.kind != TOPPLING_BLOCK.kind:
         from rbfrag.plots.kind_chart import plot_kind_chart
 
