@@ -315,7 +315,7 @@ def read_shakemap(
     """
     if os.fspath(path).lower().endswith((".hdf", ".hdf5", ".h5")):
         raise InputError(
-            f"{path} is HDF5, such as shake_result.hdf, which is not read: take grid.xml of the same "
+            f"{path} is HDF5 (shake_result.hdf), which is not read: take grid.xml of the same "
             "ShakeMap, and uncertainty.xml with it"
         )
     event, fields, columns, rows, warnings = GridReading(str(path), tuple(_MEASURES)).read(
