@@ -313,6 +313,11 @@ def read_shakemap(
     Raises:
         InputError: not such a file, or numbers that cannot be used; the message names the line.
     """
+    if os.fspath(path).lower().endswith((".hdf", ".hdf5", ".h5")):
+        raise InputError(
+            f"{path} is HDF5 (shake_result.hdf), which is not read: take grid.xml of the same "
+            "ShakeMap, and uncertainty.xml with it"
+        )
     event, fields, columns, rows, warnings = GridReading(str(path), tuple(_MEASURES)).read(
         allow_partial
     )

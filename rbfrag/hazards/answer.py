@@ -22,7 +22,7 @@ from rbfrag.fragility.unusable import (
 from rbfrag.frames import Tabular
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.annual_rate import checked_years, probability_in
-from rbfrag.hazards.between_measures import TAU
+from rbfrag.hazards.between_measures import LAW_TAU, TAU
 from rbfrag.hazards.branches import (
     Weights,
     branch_curves,
@@ -228,6 +228,8 @@ def hazard(
       motions of the shipped reference.
     - ``component``: what the curve's horizontal component means: single, geometric_mean, rotd50 or
       larger; None for single, with a warning.
+    - ``disaggregation``: the OpenQuake engine's disaggregation of a curve of PGA by magnitude
+      (Mag-*.csv or Mag_Dist-*.csv), by which PGV is taken from it.
     - ``model``, ``level``, ``db``: as in :func:`rbfrag.predict`.
 
     Args:
@@ -293,11 +295,11 @@ def hazard_at_sites(
     alone = (between_measures.PGA_ALONE,) if reading.name == "pga_g" else ()
     if alone and answering.get("model") is None:
         raise InputError(
-            f"{first[0].source}: {alone[0]}; give a curve of PGV or SA(1.0), or name a model of "
-            "PGA",
-            fields=("curve", "imt", "model"),
+            f"{first[0].source}: {alone[0]}; give a curve of PGV or SA(1.0), or the "
+            "disaggregation by magnitude, or name a model of PGA",
+            fields=("curve", "imt", "model", "disaggregation"),
         )
-    parts, remarks, reason = parts_by_model(given, reading.name, answering)
+    parts, remarks, reason = parts_by_model(given, reading, answering)
     refuse_elements(reason, fields=BlockFields.__optional_keys__)
     sound = np.asarray(reason == "", dtype=bool)
     where = np.zeros(sound.size, dtype=np.intp) if site is None else site
@@ -370,8 +372,14 @@ def hazard_at_sites(
         warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
-        tau=None if meaning.get("convert") else TAU.get(reading.name),
+        tau=_tau(reading, meaning),
     )
+
+
+def _tau(reading: LevelShaking, meaning: CurveKeywords) -> float | None:
+    if reading.magnitudes_from_g is not None:
+        return LAW_TAU
+    return None if meaning.get("convert") else TAU.get(reading.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypedDict, Unpack
@@ -30,6 +31,7 @@ class CurveKeywords(TypedDict, total=False):
     convert: str | None
     convert_sigma: float | None
     component: str | None
+    disaggregation: str | os.PathLike[str] | None
 
 
 class _CurveSite(TypedDict, total=False):
@@ -60,6 +62,8 @@ class HazardCurve(Tabular):
         warnings: what was noticed on reading it.
         statistic: what of a logic tree the curve is, as OpenQuake names it: mean, quantile-0.84,
             rlz-001; empty where that is not stated.
+        magnitudes_from_g: PGA [g] from which on its magnitudes are known, of a curve of PGV that
+            was made of them; None of any other.
     """
 
     measure: str
@@ -73,6 +77,7 @@ class HazardCurve(Tabular):
     source: str = "hazard curve"
     warnings: tuple[str, ...] = ()
     statistic: str = ""
+    magnitudes_from_g: float | None = None
 
     @property
     def imt(self) -> str:

@@ -40,7 +40,7 @@ def as_curves(
     if isinstance(given, str | os.PathLike):
         return [_one_curve(given, meaning)]
     if isinstance(given, HazardCurve):
-        return [given]
+        return _by_magnitude([given], meaning)
     if not isinstance(given, Sequence):
         raise InputError(
             f"curve is of type {type(given).__name__}: give a HazardCurve, the path of its file, "
@@ -63,8 +63,22 @@ def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) ->
     """Return the curves of a file that models can answer for, one a site; see :func:`as_curves`."""
     convert = meaning.get("convert")
     period = None if convert is None else velocity_conversion(convert).period_s
-    curves = read_hazard_curves(path, imt=meaning.get("imt"), site=meaning.get("site"))
-    return suited_curves(curves, converted_period_s=period)
+    imt = meaning.get("imt")
+    if imt is None and meaning.get("disaggregation") is not None:
+        imt = "PGA"
+    curves = read_hazard_curves(path, imt=imt, site=meaning.get("site"))
+    return _by_magnitude(suited_curves(curves, converted_period_s=period), meaning)
+
+
+def _by_magnitude(curves: list[HazardCurve], meaning: CurveKeywords) -> list[HazardCurve]:
+    """Return the curves, of PGV where those of PGA are given with a disaggregation."""
+    path = meaning.get("disaggregation")
+    if path is None or all(curve.magnitudes_from_g is not None for curve in curves):
+        return curves
+    from rbfrag.hazards.disaggregation import Disaggregation
+
+    known = Disaggregation.read(path)
+    return [known.velocity_curve(curve, **meaning) for curve in curves]
 
 
 def read_hazard_curves(

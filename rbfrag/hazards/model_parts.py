@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.curve import CurveKeywords
+from rbfrag.hazards.shaking import LevelShaking
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, model_for
@@ -35,7 +36,7 @@ class ModelPart(NamedTuple):
 
 
 def parts_by_model(
-    given: Mapping[str, Any], measure: str, answering: AnsweringFields
+    given: Mapping[str, Any], shaking: LevelShaking, answering: AnsweringFields
 ) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
     """Return blocks by the model that answers for them.
 
@@ -53,7 +54,7 @@ def parts_by_model(
     for group in blocks.groups:
         places = np.arange(whole) if group.places is None else group.places
         try:
-            chosen = model_for(answering, (*group.numbers, measure), group.kind)
+            chosen = model_for(answering, (*group.numbers, shaking.name), group.kind)
         except (InputError, UnknownModelError) as error:
             if len(blocks.groups) == 1:
                 raise
@@ -62,5 +63,18 @@ def parts_by_model(
         own = np.flatnonzero(reason[places] == "")
         if own.size:
             values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
+            _refuse_unknown_magnitudes(values[chosen.method.block.strength], shaking)
             parts.append(ModelPart(places[own], values, chosen))
     return parts, blocks.remarks, reason
+
+
+def _refuse_unknown_magnitudes(strength: FloatArray, shaking: LevelShaking) -> None:
+    """Refuse blocks that may fail at a PGA whose magnitudes are not known."""
+    start, weakest = shaking.magnitudes_from_g, float(strength.min())
+    if start is not None and start > weakest:
+        raise InputError(
+            f"Disaggregation levels must start at or below k_r: they, or those of the curve, start "
+            f"at {start:.3g} g, and a block fails from {weakest:.3g} g on: disaggregate at higher "
+            "probabilities, too (poes_disagg)",
+            fields=("disaggregation",),
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
@@ -37,6 +37,7 @@ class LevelShaking:
         weight: their weights, which sum to 1, shape (s,).
         median: the factor without scatter.
         warnings: what was assumed.
+        magnitudes_from_g: as of the curve.
     """
 
     name: str
@@ -44,10 +45,14 @@ class LevelShaking:
     weight: FloatArray
     median: float
     warnings: tuple[str, ...]
+    magnitudes_from_g: float | None = None
 
     @classmethod
     def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> LevelShaking:
         """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
+        if curve.magnitudes_from_g is not None:
+            single = cls.about("pgv_m_s", component_named("single"), warnings=curve.warnings)
+            return replace(single, magnitudes_from_g=curve.magnitudes_from_g)
         warnings = list(curve.warnings)
         name, factor, spread = _measure(
             curve, stated.get("convert"), stated.get("convert_sigma"), warnings

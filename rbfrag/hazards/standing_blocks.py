@@ -175,7 +175,7 @@ class ModelBlocks:
                 raise InputError(f"{sigma} goes with {of}: give its mean, too")
         if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
-        parts, remarks, reason = parts_by_model(stated, shaking.name, answering)
+        parts, remarks, reason = parts_by_model(stated, shaking, answering)
         refuse_elements(reason, ALL_STAND, BlockFields.__optional_keys__)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)

@@ -122,3 +122,14 @@ def test_files_that_are_no_datastore(tmp_path: Path) -> None:
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"calc_1.hdf5: cannot be read"):
         read_events(JobFiles.of(path))
+
+
+def test_a_damaged_file_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # with another length of the second text of the heap, the HDF5 library searches it for ever
+    store = write_datastore(tmp_path / "calc_5.hdf5")
+    damaged = bytearray(store.read_bytes())
+    damaged[damaged.index(b"GCOL") + 64] = 67
+    store.write_bytes(damaged)
+    monkeypatch.setattr("rbfrag.exchange.openquake.datastore._LEAST_S", 3.0)
+    with pytest.raises(InputError, match=r"damaged|cannot be read"):
+        read_events(JobFiles.of(store))

@@ -164,3 +164,11 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
         )
         found = read_shakemap(grid_file, uncertainty=other)
         assert found.std_ln["sa10_g"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
+
+
+@pytest.mark.parametrize("name", ["shake_result.hdf", "SHAKE.HDF5"])
+def test_hdf5_is_refused_with_what_to_take_instead(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(InputError, match=r"is HDF5, .* take grid\.xml of the same ShakeMap"):
+        read_shakemap(path)

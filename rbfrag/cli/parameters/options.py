@@ -176,6 +176,11 @@ class Curve:
         "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger. "
         "Left out: single, with a warning."
     )
+    disaggregation: str | None = option(
+        "OpenQuake's disaggregation of a curve of PGA by magnitude (Mag-*.csv or Mag_Dist-*.csv): "
+        "PGV is taken from both.",
+        metavar="FILE",
+    )
 
 
 def number_list(text: str, option: str) -> list[float]:

@@ -155,7 +155,15 @@ NEEDS = (
         ("rockmass",),
     ),
     Need(
-        ("--imt", "--site", "--component", "--convert", "--convert-sigma", "--years"),
+        (
+            "--imt",
+            "--site",
+            "--component",
+            "--convert",
+            "--convert-sigma",
+            "--years",
+            "--disaggregation",
+        ),
         ("--hazard",),
         "--hazard",
         "name the hazard curve, too",

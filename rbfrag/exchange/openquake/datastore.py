@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +30,48 @@ _JOBS = {"checksum": "checksum32", "start_date": "date"}
 _MOST_ROWS = 300
 """Rows a byte of the file: packed ones of four bytes cannot take less; a damaged file states any
 number."""
+
+_PROBE = f"""
+import os, sys, h5py
+with h5py.File(sys.argv[1], "r") as file:
+    dict(file.attrs)
+    for name in ("gmf_data", "events", "sitecol", "complete", "weights", "oqparam"):
+        node = file.get(name)
+        for each in (*node.values(),) if hasattr(node, "values") else (node,) if node else ():
+            if each.ndim == 0:
+                each[()]
+            elif each.size <= {_MOST_ROWS} * os.path.getsize(sys.argv[1]):
+                for start in range(0, len(each), {ROWS}):
+                    each[start : start + {ROWS}]
+"""
+"""Reads all that is read of a file."""
+
+_LEAST_S, _BYTES_A_SECOND = 20.0, 1e7
+"""How long that may take."""
+
+
+@lru_cache
+def _refuse_endless(path: Path, size: int, _changed_ns: int) -> None:
+    """Refuse a damaged file with which the HDF5 library never ends, or that makes it crash.
+
+    Only another process can be stopped in the library; an exception there comes here again.
+    """
+    limit = _LEAST_S + size / _BYTES_A_SECOND
+    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", _PROBE, str(path.absolute())]
+    try:
+        ended = subprocess.run(
+            command, env=surroundings, timeout=limit, stdin=subprocess.DEVNULL,
+            capture_output=True, check=False,
+        ).returncode  # fmt: skip
+        what = "crashes" if ended < 0 else ""
+    except subprocess.TimeoutExpired:
+        what = f"does not end in {limit:.0f} s"
+    if what:
+        raise InputError(
+            f"{path}: damaged: the HDF5 library {what} in reading it: copy it again, or name the "
+            "CSV files (oq export … -e csv)"
+        )
 
 
 @dataclass(frozen=True)
@@ -172,6 +218,8 @@ def _opened(path: Path) -> Iterator[Any]:
     with reading(path, _WHAT):
         if not h5py.is_hdf5(path):
             raise InputError(f"{path}: not an HDF5 file: name {_WHAT}, calc_N.hdf5")
+        about = path.stat()
+        _refuse_endless(path, about.st_size, about.st_mtime_ns)
         try:
             with h5py.File(path, "r") as file:
                 yield file
