@@ -180,16 +180,17 @@ def _judged(
     s1_m = on_base.get("s1_m", 1.0)
     blocks = _of_one_spacing(a1, a3, s1_m)
     strength: dict[str, Any] = {n: v for n, v in on_base.items() if n not in _OF_CELLS}
-    if strength and "s1_m" not in on_base:
+    ending = strength.keys() - {"density_kg_m3"}
+    if ending and "s1_m" not in on_base:
         raise InputError(
-            f"{min(strength)} needs s1_m, the spacing of the base fractures of the blocks of the "
+            f"{min(ending)} needs s1_m, the spacing of the base fractures of the blocks of the "
             "chart: its effect is that of a stress over the weight", fields=("s1_m",),
         )  # fmt: skip
     if "water_m" in strength:
         strength["water_m"] = water_held_m(
             strength["water_m"], s1_m=s1_m, gamma_deg=blocks.gamma_deg, beta_deg=planes["beta_deg"]
         )
-    nan: Any = "propagate" if strength else "raise"  # a block may float
+    nan: Any = "propagate" if ending else "raise"  # a block may float
     return stability_arrays(blocks, back_fracture=back_fracture, nan=nan, **planes, **strength)
 
 
