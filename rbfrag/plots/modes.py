@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import halo
+from rbfrag.question.fields import declared, word_of
 from rbfrag.rockmasses.joint_sets import VARIABLES, Realisations, RockMass
 from rbfrag.rockmasses.shaking import FAILS, NO_MODE, ShakenMass
 from rbfrag.solver.block.arrays import BlockArray
@@ -103,14 +104,13 @@ def plot_modes(
     """
     canvas.plot_path(out)
     on_base = on_base if ended is None else {"s1_m": 1.0, **on_base}
-    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
+    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg,
+              "back_fracture": back_fracture}  # fmt: skip
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
     # Other angles than a block's are not asked for; their place is taken by one that is.
-    stability = _judged(
-        np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), back_fracture, on_base, planes
-    )
+    stability = _judged(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), on_base, planes)
     shown = _pairs(alpha1_deg, alpha3_deg)
     figure = canvas.new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
@@ -138,14 +138,9 @@ def plot_modes(
 
 
 def chart_cells(
-    *,
-    phi_deg: float,
-    beta_deg: float = 0.0,
-    phi_back_deg: float | None = None,
-    back_fracture: bool = True,
-    s1_m: float = 1.0,
-    **strength: float,
-) -> Realisations:
+    *, phi_deg: float, beta_deg: float = 0.0, phi_back_deg: float | None = None,
+    back_fracture: bool = True, s1_m: float = 1.0, **strength: float,
+) -> Realisations:  # fmt: skip
     """Return the blocks of the cells of a chart of ultimate modes, row by row of the angle α3.
 
     Args:
@@ -171,47 +166,37 @@ def _of_one_spacing(a1: FloatArray, a3: FloatArray, s1_m: float) -> BlockArray:
 
 
 def _judged(
-    a1: FloatArray,
-    a3: FloatArray,
-    back_fracture: bool,
-    on_base: Mapping[str, float],
-    planes: Mapping[str, Any],
+    a1: FloatArray, a3: FloatArray, on_base: Mapping[str, float], planes: Mapping[str, Any]
 ) -> StabilityArray:
     s1_m = on_base.get("s1_m", 1.0)
     blocks = _of_one_spacing(a1, a3, s1_m)
     strength: dict[str, Any] = {n: v for n, v in on_base.items() if n not in _OF_CELLS}
-    if strength and "s1_m" not in on_base:
+    ending = strength.keys() - {"density_kg_m3"}
+    if ending and "s1_m" not in on_base:
         raise InputError(
-            f"{min(strength)} needs s1_m, the spacing of the base fractures of the blocks of the "
+            f"{min(ending)} needs s1_m, the spacing of the base fractures of the blocks of the "
             "chart: its effect is that of a stress over the weight", fields=("s1_m",),
         )  # fmt: skip
     if "water_m" in strength:
         strength["water_m"] = water_held_m(
             strength["water_m"], s1_m=s1_m, gamma_deg=blocks.gamma_deg, beta_deg=planes["beta_deg"]
         )
-    nan: Any = "propagate" if strength else "raise"  # a block may float
-    return stability_arrays(blocks, back_fracture=back_fracture, nan=nan, **planes, **strength)
+    nan: Any = "propagate" if ending else "raise"  # a block may float
+    return stability_arrays(blocks, nan=nan, **planes, **strength)
 
 
 def _title(
-    phi_deg: float,
-    phi_back_deg: float | None,
-    beta_deg: float,
-    back_fracture: bool,
-    on_base: Mapping[str, float],
-    ended: ShakenMass | None,
-) -> str:
+    phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool,
+    on_base: Mapping[str, float], ended: ShakenMass | None,
+) -> str:  # fmt: skip
     friction = rf"$\phi$ = {phi_deg:g}°"
     if back_fracture and phi_back_deg is not None and phi_back_deg != phi_deg:
         friction += f" (back {phi_back_deg:g}°)"
     back = "with" if back_fracture else "without"
-    if "s1_m" in on_base:
-        words = {
-            "s1_m": "$S_1$ = {:g} m", "water_m": "water {:g} m", "jrc": "JRC {:g}",
-            "cohesion_pa": "cohesion {:g} Pa", "phi_residual_deg": "residual {:g}°",
-        }  # fmt: skip
-        stated = [text.format(on_base[n]) for n, text in words.items() if n in on_base]
-        friction = ", ".join((friction, *stated))
+    for name, value in on_base.items():
+        friction += (
+            f", {word_of(name).replace('_', ' ')} {value:g} {declared()[name].unit}".rstrip()
+        )
     if ended is not None:
         return (
             f"modes in which blocks end under {ended.shaking.motion.label}\n"

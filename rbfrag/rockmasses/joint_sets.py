@@ -15,12 +15,8 @@ from rbfrag.rockmasses.distributions import Distribution
 from rbfrag.rockmasses.orientations import in_section
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.arrays import (
-    FLOATS,
-    StabilityArray,
-    stability_arrays,
-    water_held_m,
-)
+from rbfrag.solver.stability.arrays import FLOATS, OF_JOINT, StabilityArray, stability_arrays
+from rbfrag.solver.stability.arrays import water_held_m as held_m
 from rbfrag.solver.stability.joint import NO_FRACTURE, refuse_half
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 
@@ -223,8 +219,6 @@ class RockMass:
         gamma = back_dip - beta
         density = drawn.get(_DENSITY, np.ones(n))
         cohesion, water, jrc = (drawn.get(key, np.zeros(n)) for key in ENDING)
-        jcs, length = (drawn.get(key, np.ones(n)) for key in _ROUGHNESS[1:])
-        residual = drawn.get(_RESIDUAL, np.zeros(n))
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
         for code, valid in enumerate(
@@ -238,31 +232,29 @@ class RockMass:
                 drawn["block.kv"] > -1.0,
                 cohesion >= 0.0,
                 density > 0.0,
-                (water >= 0.0)
-                & (jrc >= 0.0)
-                & (jcs > 0.0)
-                & (length > 0.0)
-                & (residual >= 0.0)
-                & (residual < 90.0),
             ),
             start=1,
         ):
             reason[~valid & (reason == 0)] = code
         possible = reason == 0
         blocks = BlockArray.from_fractures(np.where(possible, s1, np.nan), s2, gamma)
-        water = water_held_m(water, s1_m=s1, gamma_deg=gamma, beta_deg=beta)
-        on: dict[str, Any] = {
-            "beta_deg": beta, "kv": drawn["block.kv"], "back_fracture": self.back_fracture,
-        }  # fmt: skip
+        water = held_m(water, s1_m=s1, gamma_deg=gamma, beta_deg=beta)
+        on: dict[str, Any] = {"beta_deg": beta, "kv": drawn["block.kv"]}
+        on["back_fracture"] = self.back_fracture
         strength = {_COHESION: cohesion, _WATER: water, **{k: drawn.get(k) for k in _ROUGHNESS}}
         stated: dict[str, Any] = {k.split(".")[1]: strength[k] for k in strength if k in drawn}
         stability = stability_arrays(
             blocks, phi_deg=phi, phi_back_deg=phi_back, density_kg_m3=density, **on, **stated
         )
-        afloat = possible & (stability.reason_code == FLOATS)
-        sliver = possible & ((stability.reason_code != 0) | ~(stability.p2 > 0.0))
-        reason[sliver] = len(IMPOSSIBLE) - 1
-        reason[afloat] = len(IMPOSSIBLE) - 2
+        left = stability
+        if _RESIDUAL in drawn:
+            left = stability_arrays(blocks, phi_deg=drawn[_RESIDUAL], **on)
+        codes, sliver = stability.reason_code, len(IMPOSSIBLE) - 1
+        reason[possible & ((codes != 0) | ~(stability.p2 > 0.0))] = sliver
+        reason[possible & (codes == FLOATS)] = sliver - 1
+        reason[possible & ((codes == OF_JOINT) | ((codes == 0) & (left.reason_code != 0)))] = (
+            sliver - 2
+        )
         realisations = Realisations(
             rock_mass=self,
             seed=seed,
@@ -281,11 +273,9 @@ class RockMass:
             reason_code=reason,
         )
         if _RESIDUAL in drawn:
-            nothing, left = np.zeros(n), stability_arrays(blocks, phi_deg=residual, **on)
-            after = replace(
-                realisations, stability=left, phi_deg=residual, phi_back_deg=residual,
-                cohesion_pa=nothing, water_m=nothing, jrc=nothing,
-            )  # fmt: skip
+            of_joint: dict[str, Any] = dict.fromkeys(("phi_deg", "phi_back_deg"), drawn[_RESIDUAL])
+            of_joint |= dict.fromkeys(("cohesion_pa", "water_m", "jrc"), np.zeros(n))
+            after = replace(realisations, stability=left, **of_joint)
             realisations = replace(realisations, after_slip=after)
         if realisations.n_blocks == 0:
             raise InputError(f"none of {n} realisations is a block: {realisations.why_impossible}")

@@ -32,8 +32,7 @@ MODELLED: tuple[ModeName, ...] = ("topple",)
 
 UNCOVERED = "no fragility model for this mode"
 BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
-ENDS = "water or roughness: it ends with the first slip, and no probability follows from it"
-AFTER = "; friction.phi_residual_deg, the friction that is left, gives an answer after it"
+ENDS = "water or roughness: it ends with the first slip; friction.phi_residual_deg gives an answer"
 SLIPS_ON = "after its first slip it does not stand on friction.phi_residual_deg"
 LOCKED = "locked: no horizontal acceleration moves it in this mode"
 
@@ -237,9 +236,7 @@ def scenario(
     warnings = _warnings(missing, reason[topples], modelled)
     for text in (BONDED, ENDS, SLIPS_ON):
         if count := int(np.count_nonzero(reason == text)):
-            warnings.append(
-                f"{count} blocks without an answer: {text}{AFTER if text == ENDS else ''}"
-            )
+            warnings.append(f"{count} blocks without an answer: {text}")
     return Scenario(
         measures=measures,
         model=getattr(answer, "model", None),

@@ -279,9 +279,7 @@ class ShakingPlan:
         mode_code = self.realisations.in_time.stability.mode_code
         displacement_m = np.where(at_rest & (mode_code != TOPPLE), 0.0, np.nan)
         rotation_rad = np.where(at_rest & (mode_code != SLIDE), 0.0, np.nan)
-        # what does not stand after its first slip is not run, and goes on as it then is
-        slips_on = (self.code == FAILS) & ~self.moves
-        final_code = np.where(slips_on, mode_code, np.int8(NO_MODE))
+        final_code = np.full(code.shape, NO_MODE, dtype=np.int8)
         about: dict[tuple[int, str], int] = {}
         runs = 0
         for answer in answers:

@@ -181,13 +181,12 @@ class FreeMotion:
         first = np.flatnonzero(np.diff(does, prepend=-1))
         last = np.append(first, does.size)[1:] - 1
         changes: list[ModeChange] = []
-        lasting = "", 0.0, 0.0
+        doing, since = "", 0.0
         for i, j in zip(first.tolist(), last.tolist(), strict=True):
             name = _named(int(touch[i]), backward=bool(backward[i]))
-            since = lasting[1] if lasting[0] == name else float(time_s[i])
-            lasting = name, since, float(time_s[j])
+            doing, since = name, since if name == doing else float(time_s[i])
             new = not changes or changes[-1].motion != name
-            if new and lasting[2] - since >= SHORTEST_S:
+            if new and time_s[j] - since >= SHORTEST_S:
                 changes.append(ModeChange(since, name))
         return tuple(changes)
 

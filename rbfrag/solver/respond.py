@@ -207,12 +207,9 @@ class _Shaken:
     start: BlockState | None
 
     def answer(
-        self,
-        model: Kind,
-        site: BlockOnPlanes,
-        remarks: tuple[str, ...] = (),
+        self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = (),
         mode: ModeName | None = None,
-    ) -> Response:
+    ) -> Response:  # fmt: skip
         """Return what a model answers about a block of a failure mode; None for the model's."""
         if self.start is not None and not model.carries_state:
             raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")

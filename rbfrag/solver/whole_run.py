@@ -140,9 +140,15 @@ class WholeRun:
 
     @property
     def final_mode(self) -> ModeName | None:
-        """Failure mode of the last motion that is one of a mode; None for no motion."""
+        """Failure mode of the last motion that is one of a mode; None for no motion.
+
+        A block that has turned over backward ends in a slump, whatever it turned about.
+        """
         if self.started_s is None:
             return None
+        free = self.free
+        if free and free.outcome is Outcome.TOPPLED and free.backward_rad > free.forward_rad:
+            return "slump"
         first = () if self.run is None else (self.mechanism.first.name,)
         names = (*first, *(change.motion for change in self.changes))
         return next((MODES_OF[name] for name in reversed(names) if name in MODES_OF), None)

@@ -157,3 +157,47 @@ def test_a_rocking_block_that_overturns_is_drawn(
     assert len(missing) == 1
     assert answer["toppled_s"] is not None
     assert (tmp_path / "falls.svg").read_text().count("<path") > 20
+
+
+BLOCK_FILE = """s1_m = 2.0
+s2_m = 3.0
+gamma_deg = 60.0
+beta_deg = 20.0
+phi_deg = 38.0
+density_kg_m3 = 2650.0
+water_m = 1.1372
+"""
+OUTLINE = "x_m,y_m,contact\n0,0,heel\n3.4641,0,toe\n2.3094,2,\n-1.1547,2,back\n"
+
+
+@pytest.mark.parametrize("command", ["respond", "critical"])
+def test_a_block_file_that_states_water_is_answered(
+    command: str, shell: Shell, refuses: Refuses, record: Path
+) -> None:
+    Path("wet.toml").write_text(BLOCK_FILE)
+    said = refuses(command, record, "--block", "wet.toml")
+    assert said.startswith("rbfrag: wet.toml: --water does not go with")
+    assert "uplift ends with the first slip (yield 0.2182 g, slide)" in said
+    left = shell.json(command, record, "--block", "wet.toml", "--phi-residual", "30")
+    dry = ("--s1", "2", "--s2", "3", "--gamma", "60", "--beta", "20", "--phi", "30")
+    alike = shell.json(command, record, *dry)
+    assert any("after its first slip" in text for text in left.pop("warnings"))
+    assert left == {name: value for name, value in alike.items() if name != "warnings"}
+    comments = "\n".join(f"# {line}" for line in BLOCK_FILE.splitlines()[2:])
+    Path("wet.csv").write_text(f"{comments}\n{OUTLINE}")
+    assert "not of outlines" in refuses(command, record, "--polygon", "wet.csv")
+
+
+def test_toe_and_modes_are_in_the_answer(shell: Shell, record: Path) -> None:
+    answer = shell.json("respond", record, "--height", "4", "--width", "1", "--phi", "16")
+    assert answer["mode"] == answer["final_mode"] == "topple"
+    assert answer["toe_slips_g"] == pytest.approx(0.4009, abs=6e-5)
+    assert answer["toe_needs_deg"] > 14.0
+    numbers = shell.json("respond", record, "--p2", "3", "--kr", "0.25")
+    assert (numbers["toe_needs_deg"], numbers["toe_slips_g"]) == (None, None)
+
+
+def test_yields_over_a_rotation_are_dry(refuses: Refuses) -> None:
+    Path("wet.toml").write_text(BLOCK_FILE)
+    said = refuses("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
+    assert "does not go with yields over a rotation" in said

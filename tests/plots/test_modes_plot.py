@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from rbfrag.campaign.shake_rockmass import shake
 from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import modes as module
 from rbfrag.plots.canvas import MODE_COLOURS
 from rbfrag.plots.modes import MOST_POINTS, plot_modes
@@ -134,3 +136,55 @@ def test_refusals_leave_no_file(changes, words, tmp_path):
     with pytest.raises(InputError, match=words):
         plot_modes(tmp_path / "a.png", **changes)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, caught):
+    figures = caught(module)
+    on = {"water_m": 1.0, "density_kg_m3": 2650.0}
+    plot_modes(tmp_path / "a.png", phi_deg=35.0, beta_deg=5.0, s1_m=2.0, **on)
+    (image,) = images(figures[0])
+    shown, size = image.get_array(), len(image.get_array())
+    random = np.random.default_rng(4)
+    modes, afloat = set(), 0
+    for _ in range(200):
+        a1, a3 = np.sort(random.integers(0, size, 2)) * 0.5 - 89.75
+        at = round((a3 + 89.75) * 2), round((a1 + 89.75) * 2)
+        if a1 == a3:
+            continue
+        block = Block.from_angles(a1, a3, 1.0 / np.cos(np.radians(a3)))
+        top_m = 2.0 * (np.cos(np.radians(5.0)) + block.cot_gamma * np.sin(np.radians(5.0)))
+        held = {**on, "water_m": float(np.clip(top_m, 0.0, 1.0))}
+        try:
+            found = stability(block, beta_deg=5.0, phi_deg=35.0, **held)
+        except InputError:
+            afloat += 1
+            assert shown.mask[at]
+            continue
+        assert MODES[shown[at]] == found.mode
+        modes.add(found.mode)
+    assert len(modes) == 4
+    assert afloat > 0
+    assert "s1 2 m, water 1 m" in figures[0].get_suptitle()
+    with pytest.raises(InputError, match="water_m needs s1_m"):
+        plot_modes(tmp_path / "a.png", phi_deg=35.0, **on)
+
+
+def test_cells_are_blocks_of_their_angles_and_coloured_as_they_end(tmp_path, caught):
+    figures = caught(module)
+    cells = module.chart_cells(phi_deg=35.0, beta_deg=15.0, s1_m=2.0)
+    a1, a3 = np.meshgrid(module._CELLS, module._CELLS)
+    assert np.allclose(cells.blocks.alpha1_deg, a1[a1 < a3], atol=1e-9)
+    assert np.allclose(cells.blocks.alpha3_deg, a3[a1 < a3], atol=1e-9)
+    assert (cells.s1_m == 2.0).all()
+    ended = shake(cells, GroundMotion(np.array([0.0, 0.45, 0.0]), 0.05), jobs=1)
+    plot_modes(tmp_path / "a.png", phi_deg=35.0, beta_deg=15.0, s1_m=2.0, ended=ended)
+    (image,) = images(figures[0])
+    shown = np.asarray(image.get_array())[a1 < a3]
+    moved = ended.final_code[0] >= 0
+    assert 300 < moved.sum() < moved.size
+    assert (shown[~moved] == 1.0).all()
+    for at in np.flatnonzero(moved)[::50]:
+        assert to_hex(shown[at, :3]) == MODE_COLOURS[MODES[ended.final_code[0, at]]]
+    labels = [t.get_text() for t in figures[0].axes[0].get_legend().get_texts()]
+    assert "stays: slide" in labels
+    assert "unstable at rest" in labels

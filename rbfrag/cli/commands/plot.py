@@ -362,11 +362,8 @@ def plot_rotation(
     if not planes.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
     for name in planes.keys() - {*names_of(PlaneFields)}:
-        raise InputError(
-            f"{name} does not go with yields over a rotation, which the first slip comes before: "
-            "leave it out",
-            fields=(name,),
-        )
+        text = f"{name} does not go with yields over a rotation, which follows a first slip"
+        raise InputError(f"{text}: leave it out", fields=(name,))
     shares = options.number_list(back_follows, "--back-follows")
     draw(block, out, back_follows=shares, **planes)
     lines = yield_lines(block, back_follows=shares, **planes)

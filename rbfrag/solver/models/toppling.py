@@ -14,7 +14,6 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import PLANES
@@ -38,11 +37,18 @@ class Toppling(Kind):
             history=shaking.history or site.block is not None,
         )
         answer = replace(answer, warnings=(*shaking.remarks, *answer.warnings))
-        if site.block is None:
+        if site.block is None or answer.history is None:
             return answer
-        degrees = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
-        answer = with_toe(answer, site.block, *degrees)
-        return answer if shaking.history else replace(answer, history=None)
+        beta_deg, phi_deg = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
+        slips_g = toe_slips_g(site.block, beta_deg, phi_deg)
+        need, at_s = toe_needs_in_time(site.block, beta_deg, answer.history) or (None, None)
+        warnings = answer.warnings
+        if need is not None and need > phi_deg:
+            warnings = (*warnings, slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g))
+        return replace(
+            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, warnings=warnings,
+            history=answer.history if shaking.history else None,
+        )  # fmt: skip
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
@@ -83,19 +89,6 @@ def _size(site: BlockOnPlanes) -> float:
         return site.block.p2
     assert site.p2 is not None
     return site.p2
-
-
-def with_toe(answer: Response, block: Block, beta_deg: float, phi_deg: float) -> Response:
-    """Return an answer that has its history with what the rotation needs at the toe."""
-    assert answer.history is not None
-    slips_g = toe_slips_g(block, beta_deg, phi_deg)
-    need, at_s = toe_needs_in_time(block, beta_deg, answer.history) or (None, None)
-    warnings = answer.warnings
-    if need is not None and need > phi_deg:
-        warnings = (*warnings, slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g))
-    return replace(
-        answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, warnings=warnings
-    )
 
 
 def _strength(site: BlockOnPlanes) -> float:

@@ -63,7 +63,7 @@ _USABLE: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
 }
 """Which values can be used, and the reason code of the others, by argument."""
 
-_SPILLS, FLOATS = 10, 11
+OF_JOINT, _SPILLS, FLOATS = 9, 10, 11
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -243,19 +243,11 @@ def stability_arrays(
 def water_held_m(
     water_m: ArrayLike, *, s1_m: ArrayLike, gamma_deg: ArrayLike, beta_deg: ArrayLike
 ) -> FloatArray:
-    """Return heights of water above the heel [m], cut off where it fills the back fracture.
-
-    Args:
-        water_m: heights that are stated [m].
-        s1_m: spacings of the base fractures [m].
-        gamma_deg: angles of the back planes from the bases [deg].
-        beta_deg: dips of the bases [deg].
-    """
+    """Return heights of water [m] as back fractures hold them: what is above their top runs off."""
     gamma, beta = np.radians(gamma_deg), np.radians(beta_deg)
     with np.errstate(invalid="ignore", divide="ignore"):
         top_m = s1_m * np.sin(beta + gamma) / np.sin(gamma)
-    held: FloatArray = np.minimum(water_m, np.maximum(top_m, 0.0))
-    return held
+    return np.asarray(np.minimum(water_m, np.maximum(top_m, 0.0)))
 
 
 def _tangent(angle_deg: Any) -> Any:

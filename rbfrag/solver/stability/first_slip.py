@@ -55,9 +55,7 @@ def after_first_slip(
     """Return planes as what follows the first slip sees them, and what is to be said of them.
 
     Args:
-        block: the block.
-        planes: keywords of :func:`rbfrag.solver.stability.single.stability`, and perhaps
-            ``phi_residual_deg``, without which they stay as they are.
+        planes: keywords of `stability`, and perhaps ``phi_residual_deg``, else left as they are.
 
     Raises:
         InputError: no earthquake decides about the block, or it does not stand on what is left.
@@ -80,9 +78,8 @@ def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None
     """Refuse to follow in time what ends with the first slip.
 
     Args:
-        block: the block.
-        planes: keywords of :func:`rbfrag.solver.stability.single.stability`.
-        kind: its kind; None for that of its mode.
+        planes: keywords of `stability`.
+        kind: kind of the block; None for that of its mode.
 
     Raises:
         InputError: water stands behind the block, or a base that it slips on is rough.
@@ -92,8 +89,8 @@ def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None
     judged = stability(block, **planes)
     backed = planes.get("back_fracture", True)
     facts = facts_of(kind) if kind else kind_of_mode(judged.mode, back_fracture=backed)
-    words = {"kind": facts.kind, "k": judged.yield_acceleration}
-    words["mode"] = words_of_mode(judged.mode)
+    said = {"k": judged.yield_acceleration, "mode": words_of_mode(judged.mode)}
     for name, text in (("water_m", UPLIFT), ("jrc", ROUGH)):
         if planes.get(name) and (name == "water_m" or slips_on_base(facts)):
-            raise InputError(text.format(**words), fields=(name, "phi_residual_deg"))
+            text = text.format(kind=facts.kind, **said)
+            raise InputError(text, fields=(name, "phi_residual_deg"))

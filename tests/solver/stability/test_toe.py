@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 import rbfrag
 from rbfrag import Block, stability
-from rbfrag.solver.stability.toe import about_toe, toe_needs_deg, toe_slips_g
+from rbfrag.motions.polarity import Polarity
+from rbfrag.solver.stability.toe import about_toe, toe_needs_deg, toe_needs_in_time, toe_slips_g
 
 
 def test_printed_oracle() -> None:
@@ -39,3 +42,50 @@ def test_predict_says_so() -> None:
     said = rbfrag.predict(**asked, pga_g=0.5).warnings
     assert about_toe(Block.rectangle(4.0, 1.0), 0.0, 16.0, 0.5) in said
     assert any("slide-rock" in text for text in said)
+
+
+@pytest.mark.parametrize(
+    ("polarity", "needs_deg", "at_s"), [("forward", 17.985, 13.840), ("reverse", 16.551, 14.035)]
+)
+def test_printed_needs_of_a_record(
+    records_dir: Path, polarity: Polarity, needs_deg: float, at_s: float
+) -> None:
+    record = records_dir / "slammer_csv" / "Chi-Chi_1999_TCU068-090.csv"
+    if not record.exists():
+        pytest.skip(f"{record} is not there")
+    block = Block.rectangle(4.0, 1.0)
+    on = {"block": block, "beta_deg": 0.0, "phi_deg": 16.0}
+    answer = rbfrag.respond(str(record), polarity=polarity, **on)
+    assert answer.toe_needs_deg == pytest.approx(needs_deg, abs=6e-4)
+    assert answer.toe_needs_s == pytest.approx(at_s, abs=6e-4)
+    assert answer.toe_slips_g == pytest.approx(0.4009, abs=6e-5)
+    (said,) = (text for text in answer.warnings if "at the toe" in text)
+    assert said.startswith(f"rotation without slip needs {needs_deg:.1f} deg at the toe at ")
+    assert said.endswith("phi = 16 gives way at 0.40 g: slide-rock, outside the model")
+    pga_g = rbfrag.read_motions(record)[0].pga_g
+    assert toe_needs_deg(block, 0.0, pga_g) == pytest.approx(17.995, abs=6e-4)
+    rough = rbfrag.respond(str(record), polarity=polarity, **{**on, "phi_deg": 20.0})
+    assert rough.toe_needs_deg == answer.toe_needs_deg
+    assert not any("at the toe" in text for text in rough.warnings)
+
+
+@pytest.mark.parametrize("beta", [-5.0, 0.0, 6.0])
+@pytest.mark.parametrize("k", [0.6, 0.9])
+def test_the_history_begins_with_the_closed_form(beta: float, k: float) -> None:
+    """A pulse that starts at k turns the block from rest: the form of the start is its limit."""
+    block = Block.from_fractures(3.0, 0.8, 80.0)
+    pulse = rbfrag.GroundMotion.from_nodes(
+        [0.0, 0.0, 1e-4, 1e-3, 1e-3, 2e-3], [0.0, k, k, k, 0.0, 0.0]
+    )
+    answer = rbfrag.respond(pulse, block=block, beta_deg=beta, phi_deg=40.0, history=True)
+    assert answer.history is not None
+    start = (answer.history.theta_rad > 0.0) & (answer.history.time_s < 5e-4)
+    first = replace(answer.history, **{
+        name: value[start] for name, value in vars(answer.history).items() if value is not None
+    })  # fmt: skip
+    found = toe_needs_in_time(block, beta, first)
+    assert found is not None
+    assert found[0] == pytest.approx(toe_needs_deg(block, beta, k), abs=1e-2)
+    still = rbfrag.respond(pulse.scaled(0.01), block=block, beta_deg=beta, phi_deg=40.0)
+    assert still.toe_needs_deg is None
+    assert still.toe_slips_g is not None
