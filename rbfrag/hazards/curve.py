@@ -127,15 +127,6 @@ class HazardCurve(Tabular):
         slope = -self._log_rate(log_level, 1)
         return np.asarray(np.maximum(slope, 0.0) * np.exp(self._log_rate(log_level)))
 
-    def rate_from(self, log_level: FloatArray) -> FloatArray:
-        """Return how often a year shaking fails what fails from a level on [1/a].
-
-        λ at ln x; below the first level that of the first, beyond the last level none.
-        """
-        first, last = np.log(self.levels[0]), np.log(self.levels[-1])
-        rate = np.exp(self._log_rate(np.clip(log_level, first, last)))
-        return np.where(log_level <= last, rate, 0.0)
-
 
 def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArray:
     """Return annual rates -ln(1 - P)/T of probabilities of exceedance in T years (Poisson)."""
