@@ -16,7 +16,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.uncertain import normal_product, normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
@@ -293,12 +293,8 @@ def _standard_draws(
         return [np.zeros((1, m)) for _ in sigmas], np.ones(1)
     if m == 1:
         steps = [normal_steps(_SIGMA_POINTS if s.any() else 1, _SIGMA_REACH) for s in sigmas]
-        weight = np.ones(1)
-        for _, of_one in steps:
-            weight = np.outer(weight, of_one).ravel()
-        return [
-            z.reshape(-1, 1) for z in np.meshgrid(*(x for x, _ in steps), indexing="ij")
-        ], weight
+        each, weight = normal_product(steps)
+        return [z[:, None] for z in each], weight
     if isinstance(draws, bool) or not 1 <= draws <= 2**16:
         raise InputError(f"draws = {draws}: give a number from 1 to 65536")
     from scipy.special import ndtri
