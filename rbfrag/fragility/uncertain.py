@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,17 +72,6 @@ def normal_product(
         weight = np.outer(weight, of_one).ravel()
     points = np.meshgrid(*(x for x, _ in axes), indexing="ij")
     return [each.ravel() for each in points], weight
-
-
-class Possible(Protocol):
-    """What blocks one may be."""
-
-    @property
-    def weight(self) -> FloatArray:
-        """Weights that sum to 1, shape (k,)."""
-
-    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the values that change, shape (k, n), for what is given, shape (n,) each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +149,10 @@ class _Certain:
         """Return nothing: no value changes."""
         del given
         return {}
+
+
+Possible = BlockScatter | Draws | _Certain
+"""What blocks one may be, with weights that sum to 1, shape (k,)."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -88,29 +88,6 @@ class AnyRate:
     mean: float
     outside: float
     warnings: tuple[str, ...]
-
-
-class StandingBlocks(Protocol):
-    """The blocks of one site."""
-
-    @property
-    def count(self) -> int:
-        """Number of blocks m."""
-
-    @property
-    def weight(self) -> FloatArray:
-        """Weights of the k draws of their parameters, which sum to 1, shape (k,)."""
-
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the laws by which they fail together; the first answers."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is taken for granted."""
-
-    def rate(self, curve: HazardCurve) -> AnyRate:
-        """Return how often any of them fails under a curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +244,11 @@ class ModelBlocks:
         joint = joint_rates(p.reshape(k * 3, m, -1), own, where, law).rate
         return np.concatenate([joint.reshape(1, k, 3), by_law])
 
+
+StandingBlocks = FragilityBlocks | ModelBlocks
+"""The blocks of one site: their number, the weights of the draws of their parameters, which sum to
+1, names of the laws by which they fail together, of which the first answers, and what is taken for
+granted; `rate` says how often any of them fails."""
 
 _FIRST_SITE = np.zeros(1, dtype=np.intp)
 
