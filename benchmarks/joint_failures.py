@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.stats import betabinom
 
 from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
@@ -26,7 +27,7 @@ from rbfrag.fragility.fit.data import FitData, fit_data, read_source
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.likelihood import most_likely
 from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
-from rbfrag.fragility.joint import FailureCount, Placement
+from rbfrag.fragility.joint import Placement, count_moments
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import method_named
 
@@ -185,10 +186,10 @@ def line(study: Study, place: str, kind: str) -> Line | None:
         if some is None:
             continue
         each = some["probability"].to_numpy()
-        count = FailureCount.of(each, placement_of(some), law)
+        mean, variance = count_moments(each, placement_of(some), law)
         rows.append((
-            number, float(some["failed"].sum()), count.mean, count.variance,
-            count.probability_any, 1.0 - np.prod(1.0 - each),
+            number, float(some["failed"].sum()), mean, variance,
+            any_of(each, mean, variance), 1.0 - np.prod(1.0 - each),
         ))  # fmt: skip
         if len(rows) == PORTFOLIOS:
             break
@@ -196,6 +197,20 @@ def line(study: Study, place: str, kind: str) -> Line | None:
         return None
     event, *columns = np.array(rows).T
     return Line(event.astype(np.intp), *columns[:3], (columns[3], columns[4]))
+
+
+def any_of(each: FloatArray, mean: float, variance: float) -> float:
+    """Return P of any failure by the beta-binomial law of a mean and a variance, or a binomial."""
+    n, share = each.size, mean / each.size
+    alone = n * share * (1.0 - share)
+    rho = (variance / alone - 1.0) / (n - 1.0) if n > 1 and alone > 0.0 else 0.0
+    if rho > 1e-9:
+        more = 1.0 / min(rho, 1.0 - 1e-12) - 1.0
+        none = float(betabinom.pmf(0, n, share * more, (1.0 - share) * more))
+    else:
+        p = 1.0 - variance / mean
+        none = (1.0 - p) ** (mean / p) if p > 0.0 else (1.0 - share) ** n
+    return float(np.clip(1.0 - none, each.max(), min(mean, 1.0)))
 
 
 def _by_earthquake(study: Study, chosen: pd.Series) -> Iterator[tuple[Dependence, pd.DataFrame]]:

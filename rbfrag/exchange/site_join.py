@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.hazards.maps.spatial_field import EARTH_RADIUS_KM, on_sphere
 from rbfrag.solver.results import FloatArray
 
 WITHIN_KM = 5.0
 """Farthest distance from a block to its site [km], where nothing else is stated."""
 
-_EARTH_KM = 6371.0
 _NEARLY = 1.1
 """A second site at up to this many times the distance of the first may be meant as well."""
 
@@ -109,19 +109,14 @@ def join_sites(
 def _nearest(own: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
     """Return the nearest site of each place, and the distances of it and of the second [km].
 
-    Chords between unit vectors order as arcs do, and know neither the date line nor the poles.
+    Chords order as arcs do, and know neither the date line nor the poles.
     """
     from scipy.spatial import cKDTree
 
-    chords, nearest = cKDTree(_unit_vectors(sites)).query(_unit_vectors(own), k=[1, 2])
-    arcs = 2.0 * _EARTH_KM * np.arcsin(np.minimum(0.5 * chords, 1.0))
+    chords, nearest = cKDTree(on_sphere(*sites.T)).query(on_sphere(*own.T), k=[1, 2])
+    arcs = 2.0 * EARTH_RADIUS_KM * np.arcsin(np.minimum(0.5 * chords / EARTH_RADIUS_KM, 1.0))
     # of one site there is no second
     return np.asarray(nearest)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
-
-
-def _unit_vectors(places: FloatArray) -> FloatArray:
-    lon, lat = np.radians(places.T)
-    return np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
 
 
 def _in_words(name: str, place: FloatArray) -> str:

@@ -20,7 +20,7 @@ from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formu
 from rbfrag.exchange.tables.files import table_path, table_writer
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
-from rbfrag.fragility.joint import UNKNOWN, FailureCount, Placement, count_moments
+from rbfrag.fragility.joint import UNKNOWN, Placement, count_moments, count_quantiles
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -175,9 +175,10 @@ def _total_failures(
         shared = count_moments(p[some], blocks.only(some), law)[1]
         shared -= float((p[some] * (1.0 - p[some])).sum())
         shared *= p.size * (p.size - 1.0) / max(some.size * (some.size - 1.0), 1.0)
-        count = FailureCount(p.size, float(p.sum()), alone + shared)
         tail = 0.5 - 0.5 * question.get("level", LEVEL)
-        ends = dict(zip(ends, map(float, count.quantile([tail, 1.0 - tail])), strict=True))
+        levels = tail, 1.0 - tail
+        counts = count_quantiles(p.size, float(p.sum()), alone + shared, levels)
+        ends = dict(zip(ends, map(float, counts), strict=True))
     return {"expected_failures": float(p.sum()), **ends}
 
 

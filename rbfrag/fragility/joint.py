@@ -359,75 +359,26 @@ def checked(
     return p, w
 
 
-@dataclass(frozen=True)
-class FailureCount:
-    """Number of failures among n blocks: the beta-binomial law of known mean and variance.
+def count_quantiles(n: int, mean: float, variance: float, q: ArrayLike) -> IntArray:
+    """Return numbers of failures among n blocks that are not exceeded with probabilities q.
 
-    Its beta distribution has the mean π = mean/n, and ρ = 1/(α + β + 1) solves
-    Var = n π(1-π)(1 + (n-1)ρ). Blocks of unlike P that are nearly independent scatter less than a
-    binomial number; then it is the binomial law of as many blocks as have this mean and variance.
-
-    Args:
-        mean: expected number of failures.
-        least_any: greatest P of one block, below which the probability of any failure cannot lie.
+    The law is beta-binomial, of this mean and variance: ρ = 1/(α + β + 1) solves
+    Var = n π(1-π)(1 + (n-1)ρ), π = mean/n. Blocks of unlike P that are nearly independent scatter
+    less than a binomial number; then it is the binomial law of as many blocks as have this mean and
+    variance.
     """
+    from scipy.stats import binom
 
-    n: int
-    mean: float
-    variance: float
-    least_any: float = 0.0
-
-    @classmethod
-    def of(cls, probability: ArrayLike, blocks: Placement, dependence: Dependence) -> FailureCount:
-        """Return the law of the failures of some blocks (see `count_moments`)."""
-        p = np.asarray(probability, dtype=np.float64)
-        mean, variance = count_moments(p, blocks, dependence)
-        return cls(blocks.size, mean, variance, float(p.max(initial=0.0)))
-
-    @property
-    def share(self) -> float:
-        """π, the mean over n."""
-        return self.mean / max(self.n, 1)
-
-    @property
-    def overdispersion(self) -> float:
-        """ρ, from 0 for independent blocks of equal P to 1 where all fail or none."""
-        alone = self.n * self.share * (1.0 - self.share)
-        if self.n < 2 or alone <= 0.0:
-            return 0.0
-        return min(1.0, (self.variance / alone - 1.0) / (self.n - 1.0))
-
-    @property
-    def probability_any(self) -> float:
-        """Probability that at least one fails, between the greatest P and the sum of all."""
-        share, rho = self.share, self.overdispersion
-        if not 0.0 < share < 1.0:
-            return share
-        if rho > _LEAST_RHO:
-            more = 1.0 / min(rho, _MOST_RHO) - 1.0
-            alpha, beta = share * more, (1.0 - share) * more
-            none = np.exp(betaln(alpha, beta + self.n) - betaln(alpha, beta))
-        else:
-            n, p = self._binomial()
-            none = (1.0 - p) ** n
-        return float(min(max(1.0 - none, self.least_any), self.mean, 1.0))
-
-    def quantile(self, q: ArrayLike) -> IntArray:
-        """Return the smallest number that is not exceeded with probability q, same shape as q."""
-        from scipy.stats import binom
-
-        share, rho, levels = self.share, self.overdispersion, np.asarray(q, dtype=np.float64)
-        if not 0.0 < share < 1.0:
-            counts = np.full(levels.shape, self.mean)
-        elif rho > _LEAST_RHO:
-            law = np.array(share), np.array(min(rho, _MOST_RHO))
-            counts = beta_binomial_quantiles(self.n, *law, levels.ravel()).reshape(levels.shape)
-        else:  # of whole blocks: the mean stays
-            n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
-            counts = binom.ppf(levels, n, self.mean / n)
-        return np.asarray(np.rint(counts), dtype=np.int64)
-
-    def _binomial(self) -> tuple[float, float]:
-        """Return n and P of the binomial law with this mean and variance; n is not whole."""
-        p = 1.0 - self.variance / self.mean
-        return (self.mean / p, p) if p > 0.0 else (float(self.n), self.mean / self.n)
+    share, levels = mean / max(n, 1), np.asarray(q, dtype=np.float64)
+    alone = n * share * (1.0 - share)
+    rho = (variance / alone - 1.0) / (n - 1.0) if n > 1 and alone > 0.0 else 0.0
+    if not 0.0 < share < 1.0:
+        counts = np.full(levels.shape, mean)
+    elif rho > _LEAST_RHO:
+        law = np.array(share), np.array(min(rho, _MOST_RHO))
+        counts = beta_binomial_quantiles(n, *law, levels.ravel()).reshape(levels.shape)
+    else:  # of whole blocks: the mean stays
+        p = 1.0 - variance / mean
+        whole = int(np.clip(np.ceil(mean / p if p > 0.0 else n), np.ceil(mean), n))
+        counts = binom.ppf(levels, whole, mean / whole)
+    return np.asarray(np.rint(counts), dtype=np.int64)

@@ -186,13 +186,13 @@ def answer_given(
     singles = single_numbers(given)
     if scatter is not None:
         if model is certain and singles is not None and scatter.single:
-            model = ShakenModel.over(certain, scatter)
+            model = ShakenModel.over(certain, scatter=scatter)
         else:
             from rbfrag.fragility.shaking_points import ShakingPoints
             from rbfrag.fragility.uncertain import UncertainModel
 
-            points = ShakingPoints(certain, scatter)
-            model = UncertainModel.over(certain, getattr(model, "possible", None), points)
+            points, possible = ShakingPoints(certain, scatter), getattr(model, "possible", None)
+            model = UncertainModel.over(certain, possible=possible, points=points)
     if singles is not None:
         answer = _answer_single(model, singles, quantiles)
         if scatter is None:
@@ -254,8 +254,8 @@ def _shaken_at_sites(
     if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
         return with_remarks(answer, (NOT_SHARED,))
     some, rest = uncertain_model(model, rest)
-    points = ShakingPoints(model, scatter)
-    along, sigma = UncertainModel.over(model, getattr(some, "possible", None), points).along(rest)
+    about = {"possible": getattr(some, "possible", None), "points": ShakingPoints(model, scatter)}
+    along, sigma = UncertainModel.over(model, **about).along(rest)
     tau = single("pgv_tau", given["pgv_tau"])
     low, high = shaken_share_range(along, tau, sigma, model.dependence, sites, answer.level)
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Self
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles
@@ -113,32 +113,36 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class ShakenModel(FragilityModel):
-    """A fitted model that answers for one measure with scatter and one certain block."""
-
-    scatter: Scatter = field(kw_only=True)
+class MeanModel(FragilityModel):
+    """A fitted model that answers by the mean over what is not known exactly."""
 
     @classmethod
-    def over(cls, model: FragilityModel, scatter: Scatter) -> ShakenModel:
-        """Return a model that answers for all that the shaking may be."""
-        return cls(
-            **{e.name: getattr(model, e.name) for e in fields(FragilityModel)}, scatter=scatter
-        )
+    def over(cls, model: FragilityModel, **about: Any) -> Self:
+        """Return a model that answers for all that block or shaking may be; None is what it is."""
+        own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
+        return cls(**own, **{name: value for name, value in about.items() if value is not None})
 
     @property
     def uncertain(self) -> bool:
         """Whether it answers for what is not known exactly."""
         return True
 
-    @property
-    def scattered(self) -> bool:
-        """Whether the shaking is uncertain."""
-        return True
-
     def bounds(self, given: Any) -> tuple[Bound, ...]:
         """Return nothing: what mechanics forbids is asked at each point."""
         del given
         return ()
+
+
+@dataclass(frozen=True)
+class ShakenModel(MeanModel):
+    """A fitted model that answers for one measure with scatter and one certain block."""
+
+    scatter: Scatter = field(kw_only=True)
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the shaking is uncertain."""
+        return True
 
     def answer(
         self,

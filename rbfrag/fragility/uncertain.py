@@ -9,9 +9,9 @@ lognormal fragility and a lognormal strength all of it is exact: the variances a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.method import SINGLE, BlockParameters, Bound, Eta, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, BlockParameters, Eta, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.fragility.shaking import MeanModel
 from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
@@ -31,7 +32,7 @@ REACH = 5.5
 STRENGTH_POINTS, OTHER_POINTS = 65, 33
 """Points of the strength, in which P is steepest, and of what else is uncertain."""
 
-_AT_ONCE = 1 << 15
+_AT_ONCE, _STEP = 1 << 15, 0.1
 
 
 def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray]:
@@ -49,15 +50,28 @@ def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray
     return x, weight / weight.sum()
 
 
-class Possible(Protocol):
-    """What blocks one may be."""
+def scatter_steps(
+    sigma: float, reach: float = 5.0, fewest: int = 9
+) -> tuple[FloatArray, FloatArray]:
+    """Return :func:`normal_steps` of .1 of a logarithm or less; of no scatter the mean alone.
 
-    @property
-    def weight(self) -> FloatArray:
-        """Weights that sum to 1, shape (k,)."""
+    Args:
+        sigma: standard deviation of the logarithm.
+        fewest: number of points that there are at least.
+    """
+    count = max(fewest, 2 * math.ceil(reach * sigma / _STEP) + 1)
+    return normal_steps(count if sigma else 1, reach)
 
-    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the values that change, shape (k, n), for what is given, shape (n,) each."""
+
+def normal_product(
+    axes: Sequence[tuple[FloatArray, FloatArray]],
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return points of independent variables together, shape (k,) each, and their weights."""
+    weight = np.ones(1)
+    for _, of_one in axes:
+        weight = np.outer(weight, of_one).ravel()
+    points = np.meshgrid(*(x for x, _ in axes), indexing="ij")
+    return [each.ravel() for each in points], weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +100,8 @@ class BlockScatter:
             normal_steps(STRENGTH_POINTS if name == block.strength else OTHER_POINTS, REACH)
             for name in names
         ]
-        points = np.meshgrid(*(x for x, _ in steps), indexing="ij")
-        weight = np.ones(1)
-        for _, of_one in steps:
-            weight = np.outer(weight, of_one).ravel()
-        z = {name: each.ravel() for name, each in zip(names, points, strict=True)}
-        return cls(block.fractions, z, weight)
+        points, weight = normal_product(steps)
+        return cls(block.fractions, dict(zip(names, points, strict=True)), weight)
 
     def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the values that change, shape (k, n), for what is given, shape (n,) each."""
@@ -141,8 +151,12 @@ class _Certain:
         return {}
 
 
+Possible = BlockScatter | Draws | _Certain
+"""What blocks one may be, with weights that sum to 1, shape (k,)."""
+
+
 @dataclass(frozen=True)
-class UncertainModel(FragilityModel):
+class UncertainModel(MeanModel):
     """A fitted model that answers for blocks and shaking that are not known exactly.
 
     Args:
@@ -151,38 +165,14 @@ class UncertainModel(FragilityModel):
         judged: whether it is asked how much lies outside the ranges that were fitted.
     """
 
-    possible: Possible = field(kw_only=True)
+    possible: Possible = field(kw_only=True, default_factory=_Certain)
     points: ShakingPoints | None = field(kw_only=True, default=None)
     judged: bool = field(kw_only=True, default=True)
-
-    @classmethod
-    def over(
-        cls,
-        model: FragilityModel,
-        possible: Possible | None = None,
-        points: ShakingPoints | None = None,
-        *,
-        judged: bool = True,
-    ) -> UncertainModel:
-        """Return a model that answers for all that a block may be, and its shaking."""
-        own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
-        some = _Certain() if possible is None else possible
-        return cls(**own, possible=some, points=points, judged=judged)
-
-    @property
-    def uncertain(self) -> bool:
-        """Whether it answers for what is not known exactly."""
-        return True
 
     @property
     def scattered(self) -> bool:
         """Whether the shaking is uncertain."""
         return self.points is not None
-
-    def bounds(self, given: Any) -> tuple[Bound, ...]:
-        """Return nothing: what mechanics forbids is asked of each block that it may be."""
-        del given
-        return ()
 
     def answer(
         self,
@@ -345,7 +335,7 @@ def drawn_model(
             first = int(np.flatnonzero(finding.holds)[0])
             raise InputError(f"draw {first + 1}: {finding.about(float(finding.value[first]))}")
     draws = Draws(values, weight / weight.sum())
-    return UncertainModel.over(model, draws), {**given, **draws.medians()}
+    return UncertainModel.over(model, possible=draws), {**given, **draws.medians()}
 
 
 def uncertain_model(
@@ -375,4 +365,4 @@ def uncertain_model(
     own = [sigma for sigma in sigmas if sigma in rest]
     if not own:
         return model, rest
-    return UncertainModel.over(model, BlockScatter.of(model.method.block, iter(own))), rest
+    return UncertainModel.over(model, possible=BlockScatter.of(model.method.block, iter(own))), rest

@@ -315,16 +315,21 @@ def hazard_at_sites(
         for own, some in KernelBlocks.of(part.model, reading.median, part.numbers, places):
             blocks.append((part.places[own], some))
     each = [(places, some, rates(some, mass, level, run)) for places, some in blocks]
-    result = _Rates.of(each, sound.size, len(mass.branches))
+    result, total = _whole(each, sound.size, len(mass.branches)), _total_half(each, level)
     if one_class:
-        result, where = result.mean(each, level), np.zeros(1, dtype=np.intp)
+        result, where = _of_class(result, total), np.zeros(1, dtype=np.intp)
     joints: tuple[JointRate | None, ...] = (None,) * len(sites)
     of_joints: tuple[str, ...] = ()
     if (joint or at_least is not None) and not one_class:
         joints, of_joints = joint_at_sites(each, mass, at_least, years, level)
     ends = _beyond(result, mass, where)
     texts = [
-        *remarks, *_unusable(reason, sound, one_class=one_class), *reading.warnings, *alone,
+        *remarks,
+        *unusable_in_words(
+            int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
+            FROM_MEAN if one_class else FROM_SUMS,
+        ),
+        *reading.warnings, *alone,
         *_of_curves(sites), *(part.model.form.advice for part in parts if part.model.form.advice),
         *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
         *_numbers_in_words(result), *of_joints,
@@ -332,7 +337,6 @@ def hazard_at_sites(
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
         edges, contribution = curve_contributions(first[0], reading, [some for _, some in blocks])
-    total = _total_half(each, level)
     whole = float(np.nansum(result.rate))
     nothing = np.full(result.rate.shape, np.nan)
     low, high = nothing, nothing
@@ -382,51 +386,36 @@ def _tau(reading: LevelShaking, meaning: CurveKeywords) -> float | None:
     return None if meaning.get("convert") else TAU.get(reading.name)
 
 
-@dataclass(frozen=True, eq=False)
-class _Rates:
-    """What the kernel gives of all blocks, NaN of those that cannot be used.
+def _whole(each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int) -> Rates:
+    """Return the rates of all blocks, NaN of those that cannot be used.
+
+    Without gradients, of which each model has its own; error and outside are parts of the rates.
+    """
+    rows = np.full((7 + branches, size), np.nan)
+    for places, _, one in each:
+        scale = np.maximum(one.rate, np.finfo(np.float64).tiny)
+        own = (one.rate, one.half, one.error / scale, one.outside / scale)
+        rows[:, places] = [*own, *one.ends, *one.branches]
+    return Rates(rows[0], rows[1], rows[:0], rows[2], rows[3], rows[7:], rows[4:7])
+
+
+def _of_class(result: Rates, half: float) -> Rates:
+    """Return the rates of a class: those of a block drawn from it.
 
     Args:
-        rate: annual rates [1/a], shape (m,).
-        half: what the intervals reach to on either side [1/a], shape (m,).
-        error: relative error of quadrature, shape (m,).
-        outside: share of the rate from outside the fitted ranges, shape (m,).
-        branches: rates in each branch, branches x m.
-        ends: P at the first and the last level and at the end, 3 x m.
+        half: what the interval of the sum of all rates reaches to on either side.
     """
-
-    rate: FloatArray
-    half: FloatArray
-    error: FloatArray
-    outside: FloatArray
-    branches: FloatArray
-    ends: FloatArray
-
-    @classmethod
-    def of(
-        cls, each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int
-    ) -> _Rates:
-        """Return the rates of all blocks from those of each model."""
-        rows = np.full((7 + branches, size), np.nan)
-        for places, _, one in each:
-            scale = np.maximum(one.rate, np.finfo(np.float64).tiny)
-            own = (one.rate, one.half, one.error / scale, one.outside / scale)
-            rows[:, places] = [*own, *one.ends, *one.branches]
-        return cls(rows[0], rows[1], rows[2], rows[3], rows[7:], rows[4:7])
-
-    def mean(self, each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: float) -> _Rates:
-        """Return the rates of a class: those of a block drawn from it."""
-        used = ~np.isnan(self.rate)
-        n, rate = used.sum(), self.rate[used]
-        share = rate / max(float(rate.sum()), np.finfo(np.float64).tiny)
-        return _Rates(
-            np.array([rate.mean()]),
-            np.array([_total_half(each, level) / n]),
-            np.array([share @ self.error[used]]),
-            np.array([share @ self.outside[used]]),
-            self.branches[:, used].mean(axis=1, keepdims=True),
-            self.ends[:, used].mean(axis=1, keepdims=True),
-        )
+    used = ~np.isnan(result.rate)
+    rate, tiny = result.rate[used], np.finfo(np.float64).tiny
+    share = rate / max(float(rate.sum()), tiny)
+    mean, branches, ends = (
+        values[..., used].mean(axis=-1, keepdims=True)
+        for values in (result.rate, result.branches, result.ends)
+    )
+    error, outside = (np.array([share @ values[used]]) for values in (result.error, result.outside))
+    return Rates(
+        mean, np.array([half / rate.size]), result.gradient, error, outside, branches, ends
+    )
 
 
 def _total_half(each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: float) -> float:
@@ -446,7 +435,7 @@ def _total_half(each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: floa
     return float(np.sqrt(np.square(halves).sum()))
 
 
-def _beyond(result: _Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:
+def _beyond(result: Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:
     """Return the rates from beyond the last level of the curves, at least and at most [1/a]."""
     ends = mass.ends
     assert ends is not None
@@ -454,14 +443,14 @@ def _beyond(result: _Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, 
     return last * result.ends[1], last * np.where(ends.open[ends.group[site]], 1.0, result.ends[2])
 
 
-def _probability(result: _Rates, weight: FloatArray, years: float) -> FloatArray:
+def _probability(result: Rates, weight: FloatArray, years: float) -> FloatArray:
     if not result.branches.size:
         return probability_in(years, result.rate)
     return np.asarray(weight @ probability_in(years, result.branches))
 
 
 def _quantiles(
-    result: _Rates, weight: FloatArray, level: float
+    result: Rates, weight: FloatArray, level: float
 ) -> tuple[FloatArray, FloatArray, dict[float, FloatArray]]:
     """Return the 5 and 95 % quantiles over the branches alone, and those of the mixture."""
     used = ~np.isnan(weight)
@@ -478,7 +467,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _branches(
-    curves: Sequence[HazardCurve], result: _Rates, weight: FloatArray | None
+    curves: Sequence[HazardCurve], result: Rates, weight: FloatArray | None
 ) -> tuple[BranchRate, ...]:
     if len(curves) == 1:
         return ()
@@ -492,15 +481,6 @@ def _branches(
     )
 
 
-def _unusable(
-    reason: NDArray[np.object_], sound: NDArray[np.bool_], *, one_class: bool
-) -> tuple[str, ...]:
-    return unusable_in_words(
-        int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
-        FROM_MEAN if one_class else FROM_SUMS,
-    )  # fmt: skip
-
-
 def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
     for curves in sites:
         for curve in curves:
@@ -508,7 +488,7 @@ def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
             yield from quantile_warning(curve, "a rate")
 
 
-def _numbers_in_words(result: _Rates) -> Iterator[str]:
+def _numbers_in_words(result: Rates) -> Iterator[str]:
     worst = np.nan_to_num(result.error[result.rate > NEVER]).max(initial=0.0)
     if worst > NUMERICAL_AIM:
         yield (

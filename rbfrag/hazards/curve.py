@@ -127,11 +127,6 @@ class HazardCurve(Tabular):
         rate = np.exp(self._log_rate(np.where(inside, u, 0.0)))
         return np.where(inside, rate, np.nan)
 
-    def density(self, log_level: FloatArray) -> FloatArray:
-        """Return -dλ/d(ln x) [1/a] at ln x between the levels of the curve."""
-        slope = -self._log_rate(log_level, 1)
-        return np.asarray(np.maximum(slope, 0.0) * np.exp(self._log_rate(log_level)))
-
 
 def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArray:
     """Return annual rates -ln(1 - P)/T of probabilities of exceedance in T years (Poisson)."""

@@ -38,7 +38,13 @@ def as_curves(
         InputError: something else, or a file that holds curves of several sites.
     """
     if isinstance(given, str | os.PathLike):
-        return [_one_curve(given, meaning)]
+        curves = suited_in(given, **meaning)
+        if len(curves) > 1:
+            raise InputError(
+                f"{given} has {len(curves)} sites, and the blocks stand at one: choose it by its "
+                "number or name"
+            )
+        return curves
     if isinstance(given, HazardCurve):
         return _by_magnitude([given], meaning)
     if not isinstance(given, Sequence):
@@ -47,16 +53,6 @@ def as_curves(
             "or a list of them"
         )
     return [curve for each in given for curve in as_curves(each, **meaning)]
-
-
-def _one_curve(path: str | os.PathLike[str], meaning: CurveKeywords) -> HazardCurve:
-    curves = suited_in(path, **meaning)
-    if len(curves) > 1:
-        raise InputError(
-            f"{path} has {len(curves)} sites, and the blocks stand at one: choose it by its number "
-            "or name"
-        )
-    return curves[0]
 
 
 def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) -> list[HazardCurve]:
@@ -107,9 +103,10 @@ def hazard_curves_in(
     text: str, source: str, *, imt: str | None = None, site: str | None = None
 ) -> list[HazardCurve]:
     """Return the hazard curves of a file's text."""
-    if is_openquake_curve(text):
+    first = text.lstrip().split("\n", 1)[0]
+    if first.startswith("#") and "investigation_time" in first:
         curves = openquake_curves(text, source)
-    elif is_nshm_curve(text):
+    elif first.startswith("{"):
         curves = nshm_curves(text, source)
     else:
         curves = table_curves(text, source)
@@ -169,25 +166,16 @@ def suited_curves(
         for name in ALONE:
             chosen = [curve for curve in curves if curve.known_as == name]
             if chosen:
-                return [_with_choice(curve, names) for curve in chosen]
+                text = (
+                    f"of {', '.join(names)} the curve of {chosen[0].imt} is taken, the measure "
+                    "that tells most of toppling by itself: imt chooses another"
+                )
+                return [replace(one, warnings=(*one.warnings, text)) for one in chosen]
     wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
     raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
 
 
-def _with_choice(curve: HazardCurve, names: list[str]) -> HazardCurve:
-    text = (
-        f"of {', '.join(names)} the curve of {curve.imt} is taken, the measure that tells most of "
-        "toppling by itself: imt chooses another"
-    )
-    return replace(curve, warnings=(*curve.warnings, text))
-
-
 _SPECTRAL = re.compile(r"([0-9.]+) Second Spectral Acceleration", re.IGNORECASE)
-
-
-def is_nshm_curve(text: str) -> bool:
-    """Whether the text is a JSON object."""
-    return text.lstrip().startswith("{")
 
 
 def nshm_curves(text: str, source: str) -> list[HazardCurve]:
@@ -246,12 +234,6 @@ _NO_CURVES = {
 """Columns of what the engine exports beside curves: PROBABILITY~IMT and IMT-PROBABILITY."""
 
 _SITE_COLUMNS = ("lon", "lat", "depth", "custom_site_id", "site_id")
-
-
-def is_openquake_curve(text: str) -> bool:
-    """Whether the text is such a file: a first line with # that names investigation_time."""
-    first = text.lstrip().split("\n", 1)[0]
-    return first.startswith("#") and "investigation_time" in first
 
 
 def openquake_curves(text: str, source: str) -> list[HazardCurve]:

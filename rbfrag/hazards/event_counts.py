@@ -419,7 +419,7 @@ def _failing(
     sample, block, many, excess = (each[order] for each in whole_of)
     row, at_once = np.nonzero(excess <= shift[:, block])
     failing, cost = weight[block] * many, _costs(portfolio, own[block], many, seed)
-    found = [(row, *(each[at_once] for each in (sample, failing, cost)))]
+    of_rows = [(row, *(each[at_once] for each in (sample, failing, cost)))]
     scattered = like[chance]
     for i, by in enumerate(shift if scattered.size else ()):
         z = sides[..., scattered]
@@ -430,8 +430,8 @@ def _failing(
         sample, block = np.nonzero(by_chance)
         many, block = by_chance[sample, block], scattered[block]
         cost = _costs(portfolio, own[block], many, seed)
-        found.append((np.full(sample.size, i), sample, weight[block] * many, cost))
-    row, sample, *values = (np.concatenate(column) for column in zip(*found, strict=True))
+        of_rows.append((np.full(sample.size, i), sample, weight[block] * many, cost))
+    row, sample, *values = (np.concatenate(column) for column in zip(*of_rows, strict=True))
     sums = [np.bincount(row * draws + sample, each, len(shift) * draws) for each in values]
     return np.array(sums, dtype=np.float64).reshape(2, -1, draws).swapaxes(0, 1)
 

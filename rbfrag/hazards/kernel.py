@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -15,7 +14,7 @@ from rbfrag.fragility.checks import outside_domain
 from rbfrag.fragility.intervals import ParameterErrors, quantiles_of
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.uncertain import normal_product, scatter_steps
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.mass import Grid, Indices, SiteMass, curve_mass, of_sites, under
 from rbfrag.hazards.shaking import LevelShaking
@@ -24,9 +23,6 @@ from rbfrag.solver.scatter import fraction, lognormal
 
 _VALUES_AT_ONCE = 1 << 17
 """Blocks times nodes that are worked on together: what they need stays near the processor."""
-
-_REACH, _EACH, _FEWEST_POINTS = 5.0, 0.1, 9
-"""How far what a block may be is integrated, in standard deviations, and in which steps of it."""
 
 _EDGE_EVERY = 10
 """Nodes between two edges of what the parts of a rate are given for."""
@@ -93,11 +89,8 @@ class KernelBlocks:
             if not places.size:
                 continue
             own = {name: sigma[places] for name, sigma in sigmas.items() if sigma[places].any()}
-            axes = [normal_steps(_points(float(sigma.max())), _REACH) for sigma in own.values()]
-            weight = np.ones(1)
-            for _, of_one in axes:
-                weight = np.outer(weight, of_one).ravel()
-            points = np.meshgrid(*(x for x, _ in axes), indexing="ij")
+            axes = [scatter_steps(float(sigma.max())) for sigma in own.values()]
+            points, weight = normal_product(axes)
             drawn = {name: value[places][None] for name, value in medians.items()}
             for (name, sigma), z in zip(own.items(), points, strict=True):
                 law = fraction if name in block.fractions else lognormal
@@ -162,10 +155,6 @@ class NodeTable(NamedTuple):
     probability: FloatArray
     slopes: tuple[FloatArray, ...] | None
     outside: FloatArray
-
-
-def _points(sigma: float) -> int:
-    return max(_FEWEST_POINTS, 2 * math.ceil(_REACH * sigma / _EACH) + 1)
 
 
 def table_of(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -17,15 +16,12 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.uncertain import normal_product, scatter_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.question.blocks import numbers_in
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
-
-_REACH, _STEP, _FEWEST_POINTS = 5.0, 0.1, 9
-"""How far a logarithm's scatter is integrated, in standard deviations, and in which steps of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,10 +185,8 @@ class Portfolio:
         """
         sigmas = (float(self.size_sigma.max()), float(self.strength_sigma.max()))
         scatters = (self.component.scatter, *sigmas)
-        axes = [normal_steps(_points(scatter), _REACH) for scatter in scatters]
-        grids = np.meshgrid(*(x for x, _ in axes), indexing="ij")
-        weight = np.einsum("i,j,k->ijk", *(w for _, w in axes))
-        return np.stack([grid.ravel() for grid in grids], axis=1), weight.ravel()
+        points, weight = normal_product([scatter_steps(scatter) for scatter in scatters])
+        return np.stack(points, axis=1), weight
 
     @cached_property
     def answering(self) -> tuple[FragilityModel, ...]:
@@ -253,11 +247,6 @@ class Portfolio:
                 + " and ".join(f"{n} = {v[wrong]:g}" for n, v in self.numbers.items())
             )
         return p, in_domain
-
-
-def _points(scatter: float) -> int:
-    """Return how many points the scatter of a logarithm takes."""
-    return max(_FEWEST_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1) if scatter else 1
 
 
 def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArray:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.uncertain import scatter_steps
 from rbfrag.hazards.conversions import CONVERSIONS, Component, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
@@ -20,8 +20,6 @@ from rbfrag.solver.results import FloatArray
 _SCATTER_POINTS = 25
 _REACH = 6.0
 """Standard deviations of the scatter that are integrated over, to both sides."""
-_STEP = 0.1
-"""Greatest step of the measure's logarithm."""
 
 NOTABLE = 0.01
 """Part of a rate, or probability, from which on a warning tells of it."""
@@ -84,8 +82,7 @@ class LevelShaking:
             spread: standard deviation of the logarithm of what results, beside the component's.
         """
         scatter = math.hypot(component.scatter, spread)
-        steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
-        xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
+        xi, weight = scatter_steps(scatter, _REACH, _SCATTER_POINTS)
         median = factor / component.ratio
         return cls(name, median * np.exp(scatter * xi), weight, median, warnings)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_fails
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.uncertain import normal_product, normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
@@ -88,29 +88,6 @@ class AnyRate:
     mean: float
     outside: float
     warnings: tuple[str, ...]
-
-
-class StandingBlocks(Protocol):
-    """The blocks of one site."""
-
-    @property
-    def count(self) -> int:
-        """Number of blocks m."""
-
-    @property
-    def weight(self) -> FloatArray:
-        """Weights of the k draws of their parameters, which sum to 1, shape (k,)."""
-
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the laws by which they fail together; the first answers."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is taken for granted."""
-
-    def rate(self, curve: HazardCurve) -> AnyRate:
-        """Return how often any of them fails under a curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,6 +245,11 @@ class ModelBlocks:
         return np.concatenate([joint.reshape(1, k, 3), by_law])
 
 
+StandingBlocks = FragilityBlocks | ModelBlocks
+"""The blocks of one site: their number, the weights of the draws of their parameters, which sum to
+1, names of the laws by which they fail together, of which the first answers, and what is taken for
+granted; `rate` says how often any of them fails."""
+
 _FIRST_SITE = np.zeros(1, dtype=np.intp)
 
 
@@ -293,12 +275,8 @@ def _standard_draws(
         return [np.zeros((1, m)) for _ in sigmas], np.ones(1)
     if m == 1:
         steps = [normal_steps(_SIGMA_POINTS if s.any() else 1, _SIGMA_REACH) for s in sigmas]
-        weight = np.ones(1)
-        for _, of_one in steps:
-            weight = np.outer(weight, of_one).ravel()
-        return [
-            z.reshape(-1, 1) for z in np.meshgrid(*(x for x, _ in steps), indexing="ij")
-        ], weight
+        each, weight = normal_product(steps)
+        return [z[:, None] for z in each], weight
     if isinstance(draws, bool) or not 1 <= draws <= 2**16:
         raise InputError(f"draws = {draws}: give a number from 1 to 65536")
     from scipy.special import ndtri

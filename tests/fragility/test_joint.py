@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,9 +15,9 @@ from scipy.stats import betabinom, binom, multivariate_normal
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import (
-    FailureCount,
     Placement,
     count_moments,
+    count_quantiles,
     joint_excess,
 )
 from rbfrag.fragility.joint_sampling import JointSampler
@@ -69,9 +68,8 @@ def test_one_block_and_equal_blocks_have_exact_moments() -> None:
     assert count_moments([0.2], one, LAW, [3.0]) == pytest.approx((0.6, 9 * 0.16))
     five = Placement.of(np.full(5, 0.3), 0.1)
     assert count_moments(np.full(5, 0.2), five, LAW) == pytest.approx((1.0, 25 * 0.16))
-    law = FailureCount.of(np.full(5, 0.2), five, LAW)
-    assert law.probability_any == pytest.approx(0.2)
-    assert law.quantile([0.5, 0.79, 0.81]).tolist() == [0, 0, 5]
+    counts = count_quantiles(5, 1.0, 25 * 0.16, [0.5, 0.79, 0.81])
+    assert counts.tolist() == [0, 0, 5]
 
 
 def test_variance_of_independent_blocks_is_their_sum() -> None:
@@ -107,60 +105,30 @@ def test_variance_of_many_blocks_is_summed_in_parts(monkeypatch: pytest.MonkeyPa
     st.sampled_from([LAW, ALONE]),
 )
 @settings(max_examples=100)
-def test_any_failure_lies_between_greatest_and_sum(
-    p: list[float], seed: int, law: Dependence
-) -> None:
-    found = FailureCount.of(p, anywhere(len(p), seed), law)
-    assert max(p) - 1e-12 <= found.probability_any <= min(1.0, sum(p)) + 1e-12
-    numbers = found.quantile([0.01, 0.5, 0.99])
+def test_numbers_lie_between_none_and_all(p: list[float], seed: int, law: Dependence) -> None:
+    moments = count_moments(p, anywhere(len(p), seed), law)
+    numbers = count_quantiles(len(p), *moments, [0.01, 0.5, 0.99])
     assert 0 <= numbers[0] <= numbers[1] <= numbers[2] <= len(p)
-
-
-def test_any_failure_is_near_that_of_samples() -> None:
-    random = np.random.default_rng(8)
-    for blocks in (Placement.of(random.uniform(-1.2, 1.7, 30), random.normal(size=30)),
-                   anywhere(30, 8)):  # fmt: skip
-        p = random.uniform(0.002, 0.15, 30)
-        found = FailureCount.of(p, blocks, LAW).probability_any
-        sampled = JointSampler(LAW, blocks).failures(p, 50_000, random).any(axis=1).mean()
-        assert found == pytest.approx(sampled, abs=0.04)
 
 
 def test_count_has_the_given_mean_and_variance() -> None:
     n, mean, variance = 20, 5.0, 14.0
-    law = FailureCount(n, mean, variance)
-    more = 1.0 / law.overdispersion - 1.0
+    more = 1.0 / ((variance / (mean * (1.0 - mean / n)) - 1.0) / (n - 1.0)) - 1.0
     theirs = betabinom(n, mean / n * more, (1.0 - mean / n) * more)
     assert (theirs.mean(), theirs.var()) == pytest.approx((mean, variance))
-    assert law.probability_any == pytest.approx(1.0 - theirs.pmf(0))
     levels = [0.05, 0.5, 0.95]
-    assert law.quantile(levels).tolist() == theirs.ppf(levels).tolist()
+    assert count_quantiles(n, mean, variance, levels).tolist() == theirs.ppf(levels).tolist()
 
 
 def test_count_that_scatters_less_than_a_binomial_number() -> None:
     # two blocks, nearly sure and nearly safe: 1 or so
-    law = FailureCount(2, 1.0, 0.18, 0.9)
-    assert law.overdispersion < 0.0
-    assert 0.9 <= law.probability_any <= 1.0
-    assert law.quantile(0.5) == 1
-    alone = FailureCount(10, 3.0, 2.1)
-    assert alone.probability_any == pytest.approx(1.0 - 0.7**10)
-    assert alone.quantile([0.1, 0.9]).tolist() == binom.ppf([0.1, 0.9], 10, 0.3).tolist()
+    assert count_quantiles(2, 1.0, 0.18, 0.5) == 1
+    alone = count_quantiles(10, 3.0, 2.1, [0.1, 0.9])
+    assert alone.tolist() == binom.ppf([0.1, 0.9], 10, 0.3).tolist()
 
 
 def test_count_of_nothing_or_all() -> None:
-    assert FailureCount(0, 0.0, 0.0).probability_any == 0.0
-    assert FailureCount(3, 0.0, 0.0).probability_any == 0.0
-    sure = FailureCount(3, 3.0, 0.0, 1.0)
-    assert (sure.probability_any, int(sure.quantile(0.5))) == (1.0, 3)
-
-
-def test_any_failure_grows_as_blocks_share_less() -> None:
-    p, blocks = np.full(10, 0.1), Placement.of(np.zeros(10), 0.0, site=np.arange(10))
-    laws = [Dependence(e, 0.0, 0.0, 1.0 - e, 1.0, 1.0, 1.0, 1.0) for e in (0.0, 0.3, 0.6, 0.9, 1.0)]
-    found = [FailureCount.of(p, blocks, law).probability_any for law in laws]
-    assert all(less < more for more, less in pairwise(found))
-    assert (found[0], found[-1]) == pytest.approx((1.0 - 0.9**10, 0.1))
+    assert [int(count_quantiles(3, mean, 0.0, 0.5)) for mean in (0.0, 3.0)] == [0, 3]
 
 
 def test_what_is_no_portfolio_is_refused() -> None:

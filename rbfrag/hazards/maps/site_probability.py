@@ -140,7 +140,7 @@ def site_probability(
         model = chosen
         if scatter is not None:
             points = ShakingPoints(chosen, scatter, score)
-            model = UncertainModel.over(chosen, None, points, judged=False)
+            model = UncertainModel.over(chosen, points=points, judged=False)
         for part in _chunks(np.arange(site.size), _CHUNK):
             answer = predict_many(
                 model, pairs_of(site[part], block[part]), quantiles_of(level),

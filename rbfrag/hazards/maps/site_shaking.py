@@ -43,7 +43,8 @@ class SiteShaking:
     ) -> SiteShaking:
         """Return the shaking of :func:`rbfrag.hazards.maps.site_probability.site_probability`."""
         names = model.term.inputs
-        given = integrated_deviations(names, std_ln)
+        # each measure varies by its own; one without is taken as certain
+        given = {name: std_ln[name] for name in names if name in std_ln}
         nothing = np.zeros(measures[names[0]].size)
         return cls(
             model=model,
@@ -76,13 +77,3 @@ class SiteShaking:
             name: self.median[site, None, i] * np.exp(logs[:, :, i])
             for i, name in enumerate(self.names)
         }
-
-
-def integrated_deviations(
-    names: tuple[str, ...], std_ln: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """Return the standard deviations that are integrated over of the measures that a model reads.
-
-    Each measure varies by its own; one without is taken as certain.
-    """
-    return {name: std_ln[name] for name in names if name in std_ln}

@@ -67,7 +67,7 @@ class SpatialField:
         places, self._of = np.unique(np.column_stack([lon, lat]), axis=0, return_inverse=True)
         # the order belongs to the approximation, not to the draws
         self._order = np.random.default_rng(0).permutation(len(places))
-        points = _on_sphere(*places[self._order].T)
+        points = on_sphere(*places[self._order].T)
         self._given = _earlier_neighbours(points)
         self._weight, self._new = _conditionals(points, self._given, range_km)
 
@@ -83,7 +83,7 @@ class SpatialField:
         return np.asarray(field[self._of])
 
 
-def _on_sphere(lon: FloatArray, lat: FloatArray) -> FloatArray:
+def on_sphere(lon: FloatArray, lat: FloatArray) -> FloatArray:
     """Return places as points [km], shape (n, 3)."""
     x, y = np.radians(lon), np.radians(lat)
     around = np.cos(y)
