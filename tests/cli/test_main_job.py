@@ -45,7 +45,9 @@ MOTION_KEYS = {
 def test_respond_json_has_the_contract_keys(shell: Shell, record: Path) -> None:
     stays = shell.json("respond", record, "--p2", "3", "--kr", "0.25")
     assert set(stays) == RESPOND_KEYS
-    assert stays["outcome"] == "stable"
+    assert (stays["outcome"], stays["how"]) == ("stable", "followed in time")
+    strong = shell.json("respond", record, "--p2", "3", "--kr", "9")
+    assert (strong["outcome"], strong["how"]) == ("stable", "by mechanics")
     assert stays["peak_theta_n"] > 0.0
     assert stays["toppled_s"] is None
     assert stays["samples_total"] == 599
