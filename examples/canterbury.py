@@ -2,7 +2,9 @@
 
     python examples/canterbury.py RECORDS --out FIGURE
 
-RECORDS is a folder with horizontal records of the stations HVSC, PARS and DFHS (public, GeoNet).
+RECORDS is a folder with horizontal records: of the Christchurch earthquake of February 2011 those
+of HVSC and LPCC as the NGA-West2 archive has them, of an aftershock and of Darfield those of HVSC,
+PARS and DFHS (public, GeoNet).
 For every toppling block of canterbury-face.toml and every record the outcome is simulated in both
 polarities and predicted three ways: from the record itself (its toppling spectrum), from PGV, PGA
 and mean period, and from PGV alone, by the reference models that rbfrag ships.
@@ -24,7 +26,13 @@ from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.single_run import TOPPLED
 
 HERE = Path(__file__).parent
-FILES = ("*HVSC*.0[09]0", "*PARS*.0[09]0", "*DFHS*.0[09]0")
+FILES = {
+    "HVSC Feb 2011": "*CCHURCH_HVSC*.AT2",
+    "LPCC Feb 2011": "*CCHURCH_LPCC*.AT2",
+    "HVSC": "*HVSC*.0[09]0",
+    "PARS": "*PARS*.0[09]0",
+    "DFHS": "*DFHS*.0[09]0",
+}
 ANSWERS = ("simulated", "from the record", "from PGV, PGA, Tm", "from PGV")
 
 
@@ -54,13 +62,13 @@ def study(records: Path) -> pd.DataFrame:
           f"p² {np.quantile(p2, 0.05):.3g} to {np.quantile(p2, 0.95):.3g} 1/s², "
           f"k_r {np.quantile(kr, 0.05):.2g} to {np.quantile(kr, 0.95):.2g}")  # fmt: skip
     rows = []
-    for pattern in FILES:
+    for station, pattern in FILES.items():
         for path in sorted(records.rglob(pattern)):
             motion = rbfrag.read_motions(path, units="g")[0]
             rows.append(
                 {
-                    "station": pattern.strip("*").split("*")[0],
-                    "component": path.suffix[1:],
+                    "station": station,
+                    "component": path.stem[-4:] if path.suffix == ".AT2" else path.suffix[1:],
                     "pga_g": motion.pga_g,
                     "pgv_m_s": motion.pgv_m_s,
                     "tm_s": motion.tm_s,
@@ -74,7 +82,7 @@ def draw(table: pd.DataFrame, path: str) -> None:
     """Draw the shares beside each other, with the intervals of the models."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+    figure = Figure(figsize=(8.2, 4.4), layout="constrained")
     axes = figure.add_subplot()
     place = np.arange(len(table))
     colours = ("#333333", "#b2182b", "#2166ac", "#92c5de")
@@ -85,8 +93,9 @@ def draw(table: pd.DataFrame, path: str) -> None:
                                table[f"{name}, high"] - table[name]]) * 100.0  # fmt: skip
         axes.bar(place + 0.2 * (i - 1.5), 100.0 * table[name], width=0.19, color=colour, label=name,
                  yerr=errors, capsize=2.5, error_kw={"lw": 1.0})  # fmt: skip
-    axes.set_xticks(place, [f"{r.station} {r.component}\nPGV {r.pgv_m_s:.2f} m/s"
-                            for r in table.itertuples()], fontsize=9)  # fmt: skip
+    words = [f"{r.station}\n{r.component}\n{r.pgv_m_s:.2f}\u00a0m/s" for r in table.itertuples()]
+    axes.set_xticks(place, [word.replace(" ", "\n", 1) for word in words], fontsize=8)
+    axes.set_xlabel("record and its PGV")
     axes.set_ylabel("blocks that topple [%]")
     figure.legend(loc="outside upper center", fontsize=9, frameon=False, ncols=4)
     axes.grid(True, axis="y", color="#dddddd", lw=0.6)

@@ -111,8 +111,7 @@ class PredictionArray(Tabular):
         """What answered each: ``by mechanics``, ``model NAME``; empty text without an answer."""
         names = np.full(self.probability.shape, f"model {self.model}", dtype=object)
         ruled = names if self.ruled is None else self.ruled.array()
-        answered = np.where(ruled == "", names, ruled)
-        return np.where(np.isnan(self.probability), "", answered)
+        return np.where(np.isnan(self.probability), "", np.where(ruled == "", names, ruled))
 
     @property
     def kinds(self) -> NDArray[np.object_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -217,7 +218,7 @@ def _together(
         in_domain[at] = part.in_domain
         reasons += [(at[places], texts) for places, texts in part.reasons.parts]
     reasons += [(each.places, each.texts) for each in refused]
-    ruled: list[ReasonPart] = [(at, part.how) for at, part in parts]
+    ruled: list[ReasonPart] = [(at, partial(getattr, part, "how")) for at, part in parts]
     nothing = np.empty(0, dtype=np.intp)
     unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
     if unstable.size:

@@ -95,11 +95,16 @@ class TestInterval:
 
 
 def test_one_to_one() -> None:
-    slope, median = one_to_one(table(slope=0.72), seed=1)
-    assert slope.verdict == median.verdict == "refuted"
+    slope, larger, edge = one_to_one(table(slope=0.72), seed=1)
+    assert slope.verdict == larger.verdict == "refuted"
     # a straight line through lognormal scatter follows the mean, which lies above the median
     assert slope.low < 0.72 * np.exp(0.5 * (0.2**2 + 0.1**2)) < slope.high
-    assert median.low < 0.72 < median.high
+    # the motions have one polarity each; 97.5 % of a lognormal scatter lie below 1.96 deviations
+    assert larger.n == slope.n
+    assert edge.low < 0.72 * np.exp(1.96 * np.hypot(0.2, 0.1)) < edge.high
+    assert edge.verdict == "refuted"
+    doubled = one_to_one(table(slope=1.0, scatter=0.02), seed=1)
+    assert [claim.verdict for claim in doubled] == ["confirmed"] * 3
 
 
 def test_rank_of_terms() -> None:
@@ -170,13 +175,14 @@ def test_lobes_as_bounds() -> None:
     data = table()
     ratio = 2.0 * np.pi / (data.tm_s * np.sqrt(data.p2))
     below = replace(data, kr_over_pga=0.999 * lobe_line("rectangular", ratio))
-    rectangular, half_sine, triangular = lobes_as_bounds(below, seed=1)
+    rectangular, half_sine, triangular, nearer = lobes_as_bounds(below, seed=1)
     assert rectangular.verdict == "confirmed"
     assert 0.0 < rectangular.high < 0.2  # 24 earthquakes cannot exclude more
     assert half_sine.value == triangular.value == 1.0
+    assert (triangular.verdict, nearer.verdict, nearer.value) == ("refuted", "refuted", 0.0)
     random = np.random.default_rng(0).normal(size=data.p2.size)
-    about = replace(data, kr_over_pga=lobe_line("triangular", ratio) * np.exp(0.1 * random))
-    assert lobes_as_bounds(about, seed=1)[2].verdict == "confirmed"
+    about = replace(data, kr_over_pga=lobe_line("triangular", ratio) * np.exp(0.1 * random - 0.1))
+    assert [claim.verdict for claim in lobes_as_bounds(about, seed=1)[2:]] == ["confirmed"] * 2
 
 
 def test_vertical_pairs_are_matched_not_aligned() -> None:

@@ -20,7 +20,7 @@ RESPOND_KEYS = {
     "kind", "outcome", "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s",
     "toppled_s", "error_estimate", "steps", "samples_moved", "samples_total", "warnings",
     "final_theta_rad", "displacement_m", "peak_displacement_m", "centroid_displacement_m",
-    "stopped_s", "mode_changes",
+    "stopped_s", "mode_changes", "how",
 }  # fmt: skip
 CRITICAL_KEYS = {
     "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "certified", "k_up_over_pga",
@@ -29,7 +29,7 @@ CRITICAL_KEYS = {
 PREDICT_KEYS = {
     "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s", "block_sd",
     "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s", "answers", "kind", "mode",
-    "shaking", "failure", "median_displacement_m", "event_low", "event_high", "data",
+    "shaking", "failure", "median_displacement_m", "event_low", "event_high", "data", "how",
 }  # fmt: skip
 SIMULATE_KEYS = {"combinations", "found", "below_limit", "runs", "seconds", "resumed"}
 FIT_KEYS = {
@@ -45,7 +45,9 @@ MOTION_KEYS = {
 def test_respond_json_has_the_contract_keys(shell: Shell, record: Path) -> None:
     stays = shell.json("respond", record, "--p2", "3", "--kr", "0.25")
     assert set(stays) == RESPOND_KEYS
-    assert stays["outcome"] == "stable"
+    assert (stays["outcome"], stays["how"]) == ("stable", "followed in time")
+    strong = shell.json("respond", record, "--p2", "3", "--kr", "9")
+    assert (strong["outcome"], strong["how"]) == ("stable", "by mechanics")
     assert stays["peak_theta_n"] > 0.0
     assert stays["toppled_s"] is None
     assert stays["samples_total"] == 599
