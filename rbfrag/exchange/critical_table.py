@@ -23,7 +23,7 @@ from rbfrag.db.merge.databases import MergeReport, merge_databases
 from rbfrag.db.motions import recording_id_for
 from rbfrag.db.rows import IMPORTED, EarthquakeInfo
 from rbfrag.db.schema import campaign, motion
-from rbfrag.errors import LONGEST_NAME, InputError, MergeConflictError
+from rbfrag.errors import LONGEST_NAME, InputError
 from rbfrag.files import is_number, source_text, toml_document
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.motions.quality import LARGEST_PGA_G
@@ -43,12 +43,9 @@ WORDS = {"status": ("found", "below_limit", "no_motion"), "polarity": ("forward"
 """What a column's words may mean; where the table has no such column, all rows are the first."""
 
 UNITS = {"p2": "1/s²", **{name: motion.c[name].info["unit"] for name in MEASURES}}
-NAMES = ("motion", "event", "recording")
-FIELDS = tuple(dict.fromkeys((*NEEDED, *NAMES, *CRITICAL, *MEASURES, "magnitude", *WORDS)))
+FIELDS = tuple(dict.fromkeys((*NEEDED, *CRITICAL, *MEASURES, "magnitude", *WORDS)))
 KEY = ("event", "motion", "polarity", "p2")
 ABOVE_ZERO = ("p2", "pga_g", "pgv_m_s", "tm_s")
-_MOST = 1.01  # no block moves below its k_r, and tables are rounded
-_REMARK = "out of a table: the samples are not known, so 1 sample, 1 s and a rest of 0 stand here"
 
 
 def import_critical_values(
@@ -57,9 +54,8 @@ def import_critical_values(
     *,
     db: str | os.PathLike[str] | None = None,
 ) -> MergeReport:
-    """Store critical values of toppling, with the measures of their motions, out of a table.
+    """Merge critical values of toppling, with the measures of their motions, out of a table.
 
-    They are merged as those of a database are (:func:`~rbfrag.db.merge.databases.merge_databases`).
     A motion is its earthquake and its name.
 
     Args:
@@ -68,10 +64,7 @@ def import_critical_values(
         db: the database (path, URL, or None for the default).
 
     Raises:
-        InputError: a map or table that cannot be read, a unit that is not known, a value that is
-            none, a line that repeats or contradicts another.
-        MergeConflictError: what is stored says otherwise; nothing is written.
-        DatabaseError: the database cannot be used.
+        InputError: a map or line that cannot be read, or that contradicts another or the database.
     """
     source = Path(table)
     columns, search_limit = _read_map(map)
@@ -81,39 +74,32 @@ def import_critical_values(
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / source.name
         _store(rows, place, settings, of_file)
-        try:
-            return merge_databases(place, db=db)
-        except MergeConflictError as error:
-            raise MergeConflictError(str(error).replace(f"{folder}{os.sep}", "")) from None
+        return merge_databases(place, db=db)
 
 
 def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], float]:
     """Return where each field stands, and the smallest k_r/PGA that was looked at."""
-    text, known = source_text(path, "a map of columns"), {}
-    try:
-        document = toml_document(text)
-        columns, limit = document.get("columns"), document.get("search_limit", SEARCH_LIMIT)
-        if not isinstance(columns, dict) or not is_number(limit) or not 0.0 < limit < 1.0:
-            raise InputError("it needs [columns], and a search_limit as k_r/PGA from 0 to 1")
-        missing = [name for name in NEEDED if name not in columns]
-        if missing or len(columns.keys() & set(CRITICAL)) != 1:
-            missing = missing or [" or ".join(CRITICAL)]
-            raise InputError(f"[columns] must name {', '.join(missing)}, each once")
-        for field, stated in columns.items():
-            about = {"column": stated} if isinstance(stated, str) else stated
-            words = ("unit",) if field in UNITS else WORDS.get(field, ())
-            if field not in FIELDS:
-                raise InputError(f"{field[:60]} is no field: there are {', '.join(FIELDS)}")
-            if not (isinstance(about, dict) and {"column"} <= about.keys() <= {"column", *words}):
-                keys = ", ".join(f'{word} = "…"' for word in ("column", *words))
-                raise InputError(f'write {field} = "COLUMN" or {field} = {{{keys}}}')
-            unit = str(about.get("unit", UNITS.get(field)))
-            if field in UNITS and unit_factor(UNITS[field], unit) is None:
-                units = ", ".join(FACTORS[UNITS[field]])
-                raise InputError(f"the unit {unit[:40]!r} of {field} is none of {units}")
-            known[field] = {key: str(value) for key, value in about.items()}
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    document, known = toml_document(source_text(path, "a map of columns")), {}
+    columns, limit = document.get("columns"), document.get("search_limit", SEARCH_LIMIT)
+    if not isinstance(columns, dict) or not is_number(limit) or not 0.0 < limit < 1.0:
+        raise InputError(f"{path}: it needs [columns], and a search_limit as k_r/PGA from 0 to 1")
+    missing = [name for name in NEEDED if name not in columns]
+    if missing or len(columns.keys() & set(CRITICAL)) != 1:
+        missing = missing or [" or ".join(CRITICAL)]
+        raise InputError(f"{path}: [columns] must name {', '.join(missing)}, each once")
+    for field, stated in columns.items():
+        about = {"column": stated} if isinstance(stated, str) else stated
+        words = ("unit",) if field in UNITS else WORDS.get(field, ())
+        if field not in FIELDS:
+            raise InputError(f"{path}: {field[:60]} is no field: there are {', '.join(FIELDS)}")
+        if not (isinstance(about, dict) and {"column"} <= about.keys() <= {"column", *words}):
+            keys = ", ".join(f'{word} = "…"' for word in ("column", *words))
+            raise InputError(f'{path}: write {field} = "COLUMN" or {field} = {{{keys}}}')
+        unit = str(about.get("unit", UNITS.get(field)))
+        if field in UNITS and unit_factor(UNITS[field], unit) is None:
+            ours = ", ".join(FACTORS[UNITS[field]])
+            raise InputError(f"{path}: the unit {unit[:40]!r} of {field} is none of {ours}")
+        known[field] = {key: str(value) for key, value in about.items()}
     return known, float(limit)
 
 
@@ -145,7 +131,7 @@ def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.Dat
             known = ", ".join(map(str, raw))[:200]
             raise InputError(f"{source} has no column {about['column']!r} of {field}: {known}")
         cells = raw[about["column"]]
-        if field in NAMES:
+        if field in KEY[:2]:
             rows[field] = cells
             refuse(cells.isna() | (cells.str.len() > LONGEST_NAME), field, "give it a name")
         elif field in WORDS:
@@ -165,7 +151,7 @@ def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.Dat
     observed, field = rows["status"] == "found", "kr" if "kr" in columns else "kr_over_pga"
     ratio = (rows[field] / (rows["pga_g"] if field == "kr" else 1.0)).where(observed)
     refuse(observed & ~(ratio > 0.0), field, "where no block topples, say so by the status")
-    refuse(ratio > _MOST, field, "it is above PGA, where no block moves: check both units")
+    refuse(ratio > 1.01, field, "it is above PGA, where no block moves: check both units")
     rows["kr_over_pga"] = ratio
     refuse(rows.duplicated([*KEY]), "motion", "its p² and polarity stand above: keep one")
     for field in columns.keys() & {*MEASURES, "magnitude"}:
@@ -178,42 +164,37 @@ def _store(rows: pd.DataFrame, place: Path, settings: Mapping[str, Any], started
     """Write the rows into a database of their own."""
     about = {"numerics_version": IMPORTED, "rbfrag_version": __version__, "started": started}
     about |= {"settings": canonical_json(settings), "finished": started}
+    common = {"kind": TOPPLING_BLOCK.kind, "settings": {}, "numerics_version": IMPORTED}
     records = []
     with opened_database(place, create=True) as engine, engine.begin() as connection:
-        for (event, name), of_motion in rows.groupby([*KEY[:2]]):
-            known = {k: v for k, v in of_motion.iloc[0].items() if v == v}
+        for (event, name), group in rows.groupby([*KEY[:2]]):
+            known = {k: v for k, v in group.iloc[0].items() if v == v}
             info = EarthquakeInfo(event, magnitude=known.get("magnitude"), guessed=False)
             sha256 = hashlib.sha256(canonical_json({IMPORTED: [event, name]}).encode()).hexdigest()
-            place_id = recording_id_for(connection, info, known.get("recording", name), "")
             values = {
-                "recording_id": place_id, "component": "", "is_vertical": False, "dt_s": 1.0,
-                "npts": 1, "final_velocity_m_s": 0.0, "final_displacement_m": 0.0,
-                "processing": "", "source_file": name, "trace_index": 0, "file_format": IMPORTED,
-                "flags": json.dumps([IMPORTED]), "remarks": json.dumps([_REMARK]),
-                "source_sha256": sha256, "samples_sha256": sha256, "added": started,
-                **{field: known.get(field) for field in MEASURES},
+                "recording_id": recording_id_for(connection, info, name, ""),
+                "component": "", "is_vertical": False, "dt_s": 1.0, "npts": 1, "processing": "",
+                "final_velocity_m_s": 0.0, "final_displacement_m": 0.0, "source_file": name,
+                "trace_index": 0, "file_format": IMPORTED, "flags": json.dumps([IMPORTED]),
+                "remarks": "[]", "source_sha256": sha256, "added": started,
+                "samples_sha256": sha256, **{field: known.get(field) for field in MEASURES},
             }  # fmt: skip
             motion_id = insert_row(connection, motion, values)
-            for row in of_motion.to_dict("records"):
-                inputs = {
-                    "polarity": row["polarity"], "p2": row["p2"], "kind": TOPPLING_BLOCK.kind,
-                    "settings": {}, "numerics_version": IMPORTED,
-                }  # fmt: skip
-                key = combination_key(
-                    motion_sha256=sha256, dt_s=1.0, vertical_sha256=None, **inputs
-                )
-                result = _result(row, settings["search_limit"])
+            samples: dict[str, Any] = {"motion_sha256": sha256, "dt_s": 1.0}
+            for row in group.to_dict("records"):
+                inputs: dict[str, Any] = {"polarity": row["polarity"], "p2": row["p2"], **common}
+                key = combination_key(**samples, vertical_sha256=None, **inputs)
+                result = _result(row, settings)
                 records.append(CombinationRecord(key, motion_id, None, result=result, **inputs))
         insert_combinations(connection, insert_row(connection, campaign, about), records)
 
 
-def _result(row: Mapping[str, Any], search_limit: float) -> CriticalResult:
+def _result(row: Mapping[str, Any], settings: Mapping[str, Any]) -> CriticalResult:
     """Return a critical value as a search returns it: its block was seen to topple."""
     ratio, p2, kr = row["kr_over_pga"], row["p2"], row["kr_over_pga"] * row["pga_g"]
     values = {"kr_over_pga": ratio, "kr": kr, "y_m_s": kr * STANDARD_GRAVITY_M_S2 / math.sqrt(p2)}
     seen = np.array([ratio] if ratio > 0.0 else [])
-    return CriticalResult(
-        kind=TOPPLING_BLOCK.kind, p2=p2, polarity=row["polarity"], pga_g=row["pga_g"],
-        status=row["status"], search_limit=search_limit, **(values if seen.size else {}),
-        points=SearchPoints(seen, np.full(seen.size, np.nan), ("toppled",) * seen.size),
-    )  # fmt: skip
+    points = SearchPoints(seen, np.full(seen.size, np.nan), ("toppled",) * seen.size)
+    of_row = {name: row[name] for name in ("polarity", "pga_g", "status")}
+    every = {**of_row, **(values if seen.size else {}), "search_limit": settings["search_limit"]}
+    return CriticalResult(kind=TOPPLING_BLOCK.kind, p2=p2, points=points, **every)

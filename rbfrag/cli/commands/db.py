@@ -216,9 +216,7 @@ def merge(
     _print_merge(merge_databases(other, db=db), json=json)
 
 
-@app.command(
-    "import", epilog="Example:  rbfrag db import critical.csv --map map.toml --db theirs.db"
-)
+@app.command("import", epilog="Example:  rbfrag db import critical.csv --map map.toml")
 @stacked
 def import_(
     *,

@@ -277,10 +277,7 @@ def _dependence(
 def _older(table: CombinationTable) -> list[str]:
     """Return what is said of results that the present numerics have not made."""
     if IMPORTED in table.numerics_version:
-        return [
-            "the critical values are imported: blocks up to one count as toppled, those above as "
-            "safe, and safe islands below it are not seen"
-        ]
+        return ["the critical values are imported: safe islands below them are not seen"]
     return [
         f"the results are of version {version} of the numerics, and this rbfrag computes by "
         f"version {NUMERICS_VERSION}: simulate again to have its own"
