@@ -65,8 +65,10 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     if dialect in ("postgresql", "postgres"):
         return text
     if dialect != "sqlite":
+        advice = "; its tables come over by docs/howto/import-a-table.md"
         raise InputError(
-            f"db {scheme}://…: rbfrag stores in SQLite (a path) or PostgreSQL (postgresql://…)",
+            f"db {scheme}://…: rbfrag stores in SQLite (a path) or PostgreSQL (postgresql://…)"
+            f"{advice if dialect in ('mysql', 'mariadb') else ''}",
             fields=("db",),
         )
     name = rest.removeprefix("/")

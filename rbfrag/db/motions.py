@@ -114,7 +114,7 @@ def add_motion(
     place = (earthquake, recording, storable(station or motion.station))
     stored = _find(connection, motion)
     if stored is None:
-        labels["recording_id"] = _recording_id_for(connection, *place)
+        labels["recording_id"] = recording_id_for(connection, *place)
         values = {**_measured(motion), **labels, "added": utc_now()}
         new = insert_if_new(connection, schema.motion, values)
         stored = _find(connection, motion)
@@ -122,7 +122,7 @@ def add_motion(
     else:
         new = False
         if stored["guessed"] and not earthquake.guessed:
-            labels["recording_id"] = _recording_id_for(connection, *place)
+            labels["recording_id"] = recording_id_for(connection, *place)
             update_rows(connection, schema.motion, schema.motion.c.id == stored["id"], labels)
             delete_orphans(connection, stored["recording_id"])
         elif not earthquake.guessed:
@@ -305,9 +305,8 @@ def _listed(row: RowMapping, name: str) -> list[Any]:
     return listed
 
 
-def _recording_id_for(
-    connection: Connection, event: EarthquakeInfo, name: str, station: str
-) -> int:
+def recording_id_for(connection: Connection, event: EarthquakeInfo, name: str, station: str) -> int:
+    """Return the row id of a recording of an earthquake, both made when new."""
     earthquake_id = earthquake_id_for(connection, event, recording=name)
     values = {"earthquake_id": earthquake_id, "name": name, "station": station}
     insert_if_new(connection, schema.recording, values)

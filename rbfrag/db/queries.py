@@ -13,7 +13,7 @@ from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable, Vertical
+from rbfrag.db.rows import IMPORTED, SPECTRAL_COLUMNS, CombinationTable, Vertical
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -306,9 +306,9 @@ def _pgd_in_doubt(row: RowMapping) -> bool:
     return not PGD_IN_DOUBT.isdisjoint(stored_json(row["flags"], list, where))
 
 
-def _age(numerics_version: str) -> tuple[int, str]:
-    """Return what sorts versions of the numerics, the newest last: they count up."""
-    return len(numerics_version), numerics_version
+def _age(numerics_version: str) -> tuple[bool, int, str]:
+    """Return what sorts versions of the numerics, the newest last: they count up from imported."""
+    return numerics_version != IMPORTED, len(numerics_version), numerics_version
 
 
 def _combination_query() -> Select[Any]:

@@ -55,7 +55,7 @@ OUTCOME = (
 _POLARITY = "forward: positive samples drive toppling out of the slope; reverse: negative ones do"
 _KIND = "response kind: the model that answers, such as toppling or sliding"
 _LINEAR = "true for the linear verification model, in which k_r is the critical angle in rad"
-_NUMERICS = "version of the solver; results of different versions are never mixed"
+_NUMERICS = "version of the solver, or imported out of a table; different ones are never mixed"
 _P2 = "frequency parameter p² of the block, m g r3 over the inertia about the toe"
 _KEY = (
     "SHA-256 over everything that decides the row: motions, polarity, kind, block, settings, "

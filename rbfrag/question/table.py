@@ -134,7 +134,7 @@ def field_of(header: str) -> tuple[str, str | None] | None:
         return None if name is None else (name, bracket[1])
     if end := _AT_THE_END.fullmatch(text.replace("²", "2")):
         name, unit = _called(end[1]), end[2].replace("_", "/")
-        if name is not None and declared()[name].unit and _factor(declared()[name].unit, unit):
+        if name is not None and declared()[name].unit and unit_factor(declared()[name].unit, unit):
             return name, unit
     return None
 
@@ -227,7 +227,7 @@ def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> 
                 else f"the columns {other} and {text} both state the {field.what}"
             )
             raise InputError(f"{source}: {twice}: leave one of them out")
-        factor = 1.0 if unit is None else _factor(field.unit, unit)
+        factor = 1.0 if unit is None else unit_factor(field.unit, unit)
         if factor is None and name in names_of(RowFields) and not field.unit:
             factor = 1.0  # losses are in any currency, weights of anything
         if factor is None:
@@ -242,7 +242,8 @@ def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> 
     return Header(columns, tuple(remarks))
 
 
-def _factor(unit: str, stated: str) -> float | None:
+def unit_factor(unit: str, stated: str) -> float | None:
+    """Return what turns numbers in a stated unit into one of :data:`FACTORS`; None if nothing."""
     own, word = (each.lower().translate(_SUPERSCRIPTS) for each in (unit, stated))
     return FACTORS.get(unit, {}).get(word, 1.0 if own and own == word else None)
 

@@ -34,7 +34,8 @@ FIRST = ("motions add", "simulate", "fit")
 NO_SENTENCE = {
     "models list": "--json", "motions list": "--json", "motions export": "the file",
     "db upgrade": "the schema", "db info": "--by suite: a table", "db check": "counts",
-    "db export": "counts of rows", "db merge": "counts of rows", "models default": "the model",
+    "db export": "counts of rows", "db merge": "counts of rows",
+    "db import": "counts of rows", "models default": "the model",
     "models check": "a table", "export nrml": "the file", "export pelicun": "the file",
     "motions add": "counts", **{f"plot {name}": "the file" for name in (
         "fit", "chart", "curve", "sensitivity", "calibration", "vertical", "spectrum", "response",
@@ -85,6 +86,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "pgv-curve.csv").write_text("\n".join(["pgv_m_s,annual_rate", *rows]))
     write_job(place / "FOLDER")
     (place / "blocks.csv").write_text("block_id,site_id,p2_1_s2,kr\na,0012,3,0.1\n")
+    names = "motion,event,p2,pga_g,pgv_m_s,pgd_m,kr"
+    (place / "critical.csv").write_text(f"{names}\na,e,3,0.3,0.4,0.1,0.05\n")
+    columns = "\n".join(f'{name} = "{name}"' for name in names.split(","))
+    (place / "map.toml").write_text(f"[columns]\n{columns}\n")
     for name in ("rockmass.toml", "mass.toml"):
         shutil.copy(ROOT / "docs" / "examples" / "rockmass.toml", place / name)
     with pytest.MonkeyPatch.context() as patch:

@@ -22,10 +22,12 @@ from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
+    from rbfrag.db.merge.databases import MergeReport
     from rbfrag.db.queries import DatabaseInfo, SuiteCount
 
 app = command_group(
-    "Upgrade, describe, check, export and merge databases.", "Example:  rbfrag db info"
+    "Upgrade, describe, check, export and merge databases, and import tables.",
+    "Example:  rbfrag db info",
 )
 
 
@@ -211,7 +213,28 @@ def merge(
     Merging twice changes nothing. If the two contradict each other, nothing is written."""
     from rbfrag.db.merge.databases import merge_databases
 
-    report = merge_databases(other, db=db)
+    _print_merge(merge_databases(other, db=db), json=json)
+
+
+@app.command("import", epilog="Example:  rbfrag db import critical.csv --map map.toml")
+@stacked
+def import_(
+    *,
+    table: str = argument("CSV with a critical value a line.", metavar="TABLE.csv"),
+    map: str = option("TOML: the column and the unit of each field.", ..., metavar="FILE"),
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Add critical values of toppling, with measures of their motions, out of a table.
+
+    Importing twice changes nothing. If what is stored says otherwise, nothing is written."""
+    from rbfrag.exchange.critical_table import import_critical_values
+
+    _print_merge(import_critical_values(table, map, db=db), json=json)
+
+
+def _print_merge(report: MergeReport, *, json: bool) -> None:
+    """Print what was added to a database, and what was there."""
     if json:
         print_json(report.as_dict())
         return

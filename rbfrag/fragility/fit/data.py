@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.db.rows import CombinationTable, Selection
+from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError
 from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
@@ -321,7 +321,9 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             f"rbfrag simulate, of kind {named}"
         )
     of_outcomes = method.reads == "outcomes"
-    if of_outcomes and not np.isfinite(source.failed).any():
+    # what cannot be simulated is judged by its critical values
+    imported = method.block.points == "strengths" and IMPORTED in table.numerics_version
+    if of_outcomes and not imported and not np.isfinite(source.failed).any():
         raise FitError(
             f"method {method.name} fits what blocks did, and no outcomes are stored: simulate kind "
             f"{named} again, which adds those of the grid, or fit critical values, by method wls "

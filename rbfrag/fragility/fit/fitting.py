@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Required, Unpack
 import numpy as np
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.db.rows import CombinationTable, Selection
+from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
@@ -290,6 +290,8 @@ def _dependence(
 
 def _older(table: CombinationTable) -> list[str]:
     """Return what is said of results that the present numerics have not made."""
+    if IMPORTED in table.numerics_version:
+        return ["the critical values are imported: safe islands below them are not seen"]
     return [
         f"the results are of version {version} of the numerics, and this rbfrag computes by "
         f"version {NUMERICS_VERSION}: simulate again to have its own"

@@ -270,3 +270,24 @@ def test_a_recorded_accelerogram(open_page, records_dir):
     expect(page.locator("#spectrum-words")).to_contain_text("Its PGV is 0.109")
     expect(page.locator("#spectrum-words")).to_contain_text("0.0839")
     expect(page.locator("#spectrum-words")).to_contain_text("may topple")
+
+
+def test_a_record_decides_the_headline(open_page, tmp_path):
+    opened = open_page("?p2=3&kr=0.35&pgv=0.6")
+    page = opened.page
+    expect(page.locator("#by-record")).to_be_hidden()
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#by-record-title")).to_have_text("Does pulse.csv topple it?")
+    answer = page.locator("#by-record-answer")
+    expect(answer).to_have_text("No")
+    (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    import rbfrag
+
+    [motion] = rbfrag.read_motions(tmp_path / "pulse.csv")
+    kr = max(rbfrag.critical(motion, p2=3.0, polarity=each).kr for each in ("forward", "reverse"))
+    for factor, said in ((0.99, "Yes"), (1.01, "No"), (0.9, "Yes")):
+        page.fill("#kr", f"{factor * kr:.4f}")
+        expect(answer).to_have_text(said)
+        expect(page.locator("#probability")).to_contain_text("%")
+    page.click("#drop-record")
+    expect(page.locator("#by-record")).to_be_hidden()

@@ -111,6 +111,16 @@ export function sayOfModel(sentence) {
   if (!about.textContent?.includes(sentence)) about.append(sentence);
 }
 
+/** Put the answer of the reader's own record before that of the measures.
+ * @param {{name: string, answer: string, words: string} | null} verdict */
+export function showByRecord(verdict) {
+  byId("by-record").hidden = !verdict;
+  byId("by-record-title").textContent = verdict ? `Does ${verdict.name} topple it?` : "";
+  byId("by-record-answer").textContent = verdict?.answer ?? "";
+  writeText(byId("by-record-words"), verdict?.words ?? "");
+  byId("strip").dataset.record = verdict ? `record: ${verdict.answer.toLowerCase()} · ` : "";
+}
+
 /**
  * Show that there is no answer, and why.
  * @param {string} why

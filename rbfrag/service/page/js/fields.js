@@ -120,6 +120,14 @@ export function fieldNamedIn(sentence) {
   return null;
 }
 
+/** A sentence of the service with the labels of the page for names of fields.
+ * @param {string} sentence */
+export function inLabels(sentence) {
+  const named = new RegExp(`${NAMED.source}(?=[ ,]*(?:=|is|and|needs|goes|does|has))`, "g");
+  const label = (/** @type {string} */ id) => document.querySelector(`label[for="${id}"]`);
+  return sentence.replace(named, (word, name) => label(name)?.textContent ?? word);
+}
+
 /**
  * Say what is wrong beside the field that the sentence names, or in a place for the rest.
  * @param {string} sentence
@@ -128,7 +136,7 @@ export function fieldNamedIn(sentence) {
 export function sayWrong(sentence, elsewhere) {
   const input = fieldNamedIn(sentence);
   const place = (input && document.getElementById(`${input.id}-error`)) ?? elsewhere;
-  place.textContent = sentence;
+  place.textContent = inLabels(sentence);
   if (input) open(input);
   input?.setAttribute("aria-invalid", "true");
 }

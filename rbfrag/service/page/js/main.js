@@ -3,7 +3,7 @@
 import { sayOfBlock, showAnswer, showNoAnswer } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
 import { blockDrawing, whyNoAnswer } from "./block.js";
-import { formFields, nothingWrong, sayWrong } from "./fields.js";
+import { formFields, inLabels, nothingWrong, sayWrong } from "./fields.js";
 import { figures } from "./figures.js";
 import { afterPause, latest } from "./latest.js";
 import { addressOf, fromAddress, showAddress } from "./link.js";
@@ -13,6 +13,7 @@ import { byId } from "./page.js";
 import { USUAL_PHI } from "./question.js";
 import { recordPanel } from "./record_panel.js";
 import * as service from "./service.js";
+import { blockTable } from "./table.js";
 import { tools } from "./tools.js";
 import { reached, tokenMissing, unreachable, whenTokenGiven } from "./trouble.js";
 
@@ -117,8 +118,8 @@ async function answerQuestion(asked) {
     await sheets.show(asked, answer, found, () => asked === question);
     // X(p) bounds what a block does that a slope backs
     if (found.kind === "toppling") {
-      const { p2 } = found.numbers;
-      record.placeBlock({ p2, y: answer.y_m_s }, found.rectangle_r3_m * p2);
+      const { p2, kr } = found.numbers;
+      record.placeBlock({ p2, kr, y: answer.y_m_s }, found.rectangle_r3_m * p2);
     } else record.placeBlock(null);
     busy(asked !== question);
   } catch (error) {
@@ -146,9 +147,10 @@ function failed(error) {
   }
   reached();
   sayWrong(error.message, byId("form-error"));
-  nothingKnown(error.message);
+  nothingKnown(inLabels(error.message));
 }
 
+blockTable(() => question);
 whenTokenGiven(() => ask(question));
 tools(() => addressOf(question, record.shown()));
 service.askVersion().then(

@@ -1,13 +1,13 @@
 /** The panel of the reader's record: its spectrum, its doubts, and what it means for the block. */
 
-import { showWarnings } from "./answer.js";
+import { showByRecord, showWarnings } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
 import { isHalfTyped, nothingWrong, sayWrong } from "./fields.js";
 import { afterPause, latest } from "./latest.js";
 import { quantity } from "./numbers.js";
 import { byId, textIn } from "./page.js";
 import { recordsFrom, syntheticPulse, valueAt } from "./record.js";
-import { askSpectrum } from "./service.js";
+import { askCritical, askSpectrum } from "./service.js";
 import { spectrumPlot } from "./spectrum.js";
 import { reached, unreachable } from "./trouble.js";
 
@@ -19,7 +19,8 @@ const BOUND = 1.02;
 
 /**
  * @typedef {import("./spectrum.js").Spectrum} Spectrum
- * @typedef {{p2: number, y: number}} Place of the block: its p² [1/s²] and toppling velocity [m/s]
+ * @typedef {{p2: number, y: number, kr: number}} Place of the block: its p² [1/s²], toppling
+ *   velocity [m/s] and strength
  */
 
 /**
@@ -38,7 +39,7 @@ export function recordPanel(tell) {
 
   const ask = latest(async (/** @type {File} */ asked) => {
     byId("record-said").textContent = `Waiting for the spectrum of ${asked.name} …`;
-    const reading = Object.fromEntries(READING.map((id) => [id, textIn(id)]));
+    const reading = readingNow();
     const trace = chosenTrace();
     const name = trace ? `${asked.name}, trace ${trace}` : asked.name;
     try {
@@ -93,9 +94,27 @@ export function recordPanel(tell) {
     tell.changed();
   }
 
+  const readingNow = () => Object.fromEntries(READING.map((id) => [id, textIn(id)]));
+
   function compare() {
     byId("spectrum-words").textContent = spectrum ? inWords(spectrum, block) : "";
+    const able = spectrum && block ? canTopple(spectrum, block) : null;
+    if (!spectrum || !block || able === null) return showByRecord(null);
+    const words = `The block is ${able ? "not " : ""}more than 2 % above its toppling spectrum.`;
+    showByRecord({ name: spectrum.name, answer: able ? "Perhaps" : "No", words });
+    if (able && file) decide({ file, spectrum, block });
   }
+
+  const decide = latest(async (/** @type {{file: File, spectrum: Spectrum, block: Place}} */ of) => {
+    try {
+      const kr = await askCritical(of.file, readingNow(), of.block.p2);
+      if (of.spectrum !== spectrum || of.block !== block) return;
+      const words = `It topples blocks of this size up to k_r = ${quantity(kr, "g")}.`;
+      showByRecord({ name: spectrum.name, answer: of.block.kr <= kr ? "Yes" : "No", words });
+    } catch (error) {
+      if (!(error instanceof Refusal || error instanceof Unreachable)) throw error; // still perhaps
+    }
+  });
 
   /** @param {File} taken */
   function take(taken) {
@@ -144,6 +163,13 @@ export function recordPanel(tell) {
       if (file && other) askSoon(file);
     },
   };
+}
+
+/** Whether a record can topple a block by its spectrum; null where that does not reach.
+ * @type {(spectrum: Spectrum, block: Place) => boolean | null} */
+function canTopple(spectrum, { p2, y }) {
+  const xs = /** @type {const} */ (["forward", "reverse"]).map((each) => valueAt(spectrum, each, p2));
+  return xs.every(Number.isFinite) ? xs.some((x) => y <= BOUND * x) : null;
 }
 
 /**
