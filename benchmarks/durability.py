@@ -99,9 +99,10 @@ def run_to_the_end(place: str, blocks: Blocks, jobs: int) -> None:
 
 
 def stored(place: str) -> int:
-    """Return the number of combinations stored."""
+    """Return the number of combinations, and of pairs of shocks, stored."""
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        return database_info(connection).rows["combination"]
+        rows = database_info(connection).rows
+    return rows["combination"] + rows["shock_pair"]
 
 
 def digest(place: str) -> str:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rbfrag.campaign.kind import Sequences
 from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
-from rbfrag.campaign.sequences import Sequences
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
