@@ -2,6 +2,7 @@
 
     python -m benchmarks.durability --kills 20 --seed 1
     python -m benchmarks.durability --kills 20 --server postgresql://user@host/name
+    python -m benchmarks.durability --kills 10 --kind sliding --sequence
 
 Main process and workers are killed by SIGKILL at random moments, each kill followed by the same
 command. With --server both databases are made in schemas of random names, which are dropped.
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = (sys.executable, "-c", "from rbfrag.cli.main import run; run()")
 PATIENCE_S = 120.0
+Blocks = str | Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -74,9 +76,10 @@ def make_database(place: str, motions: int, npts: int = 600) -> None:
             )
 
 
-def campaign(place: str, p2: str, jobs: int) -> list[str]:
+def campaign(place: str, blocks: Blocks, jobs: int) -> list[str]:
     """Return the command of the campaign."""
-    return [*COMMAND, "simulate", "--db", place, "--p2", p2, "--jobs", str(jobs)]
+    words = ("--p2", blocks) if isinstance(blocks, str) else blocks
+    return [*COMMAND, "simulate", "--db", place, *words, "--jobs", str(jobs)]
 
 
 def environment() -> dict[str, str]:
@@ -84,17 +87,22 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
-def run_to_the_end(place: str, p2: str, jobs: int) -> None:
+def run_to_the_end(place: str, blocks: Blocks, jobs: int) -> None:
     """Run the campaign undisturbed."""
     subprocess.run(
-        campaign(place, p2, jobs), env=environment(), check=True, capture_output=True, timeout=600
+        campaign(place, blocks, jobs),
+        env=environment(),
+        check=True,
+        capture_output=True,
+        timeout=600,
     )
 
 
 def stored(place: str) -> int:
-    """Return the number of combinations stored."""
+    """Return the number of combinations, and of pairs of shocks, stored."""
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        return database_info(connection).rows["combination"]
+        rows = database_info(connection).rows
+    return rows["combination"] + rows["shock_pair"]
 
 
 def digest(place: str) -> str:
@@ -107,13 +115,13 @@ def digest(place: str) -> str:
 
 
 def kill_once(
-    place: str, p2: str, jobs: int, rng: random.Random, target: str, per_motion: int
+    place: str, blocks: Blocks, jobs: int, rng: random.Random, target: str, per_motion: int
 ) -> Kill | None:
     """Start the campaign and kill it at a random moment; None when it ended before.
 
     Args:
         place: the database.
-        p2: the block sizes.
+        blocks: the sizes p² of a toppling campaign, or the options of another.
         jobs: number of workers.
         rng: decides when.
         target: ``main`` or ``worker``.
@@ -121,7 +129,7 @@ def kill_once(
     """
     goal = stored(place) + per_motion * rng.randint(0, 2)
     running = subprocess.Popen(
-        campaign(place, p2, jobs), env=environment(), stdout=subprocess.DEVNULL,
+        campaign(place, blocks, jobs), env=environment(), stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + PATIENCE_S
@@ -179,20 +187,22 @@ def _lives(pid: int) -> bool:
     return state != "Z"
 
 
-def kill_and_resume(place: str, p2: str, *, kills: int, seed: int, jobs: int = 2) -> Iterator[Kill]:
+def kill_and_resume(
+    place: str, blocks: Blocks, *, kills: int, seed: int, jobs: int = 2, per_motion: int
+) -> Iterator[Kill]:
     """Yield the kills of one campaign, main process and workers in turn by chance.
 
     Args:
         place: the database.
-        p2: the block sizes.
+        blocks: the sizes p² of a toppling campaign, or the options of another.
         kills: how many, if the campaign lasts.
         seed: of the moments and the targets.
         jobs: number of workers.
+        per_motion: combinations of one motion.
     """
     rng = random.Random(seed)
-    per_motion = 2 * len(p2.split(","))
     for _ in range(kills):
-        done = kill_once(place, p2, jobs, rng, rng.choice(("main", "worker")), per_motion)
+        done = kill_once(place, blocks, jobs, rng, rng.choice(("main", "worker")), per_motion)
         if done is None:
             return
         yield done
@@ -226,29 +236,35 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--motions", type=int, default=60)
-    parser.add_argument("--p2", default="10,1")
+    parser.add_argument("--p2", help="toppling and rocking: sizes [1/s²]; 10,1 if left out")
+    parser.add_argument("--kind", default="toppling")
+    parser.add_argument("--sequence", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--server", help="PostgreSQL URL; without it SQLite")
     asked = parser.parse_args()
+    blocks = ["--kind", asked.kind, *(["--sequence"] if asked.sequence else [])]
+    if asked.kind in ("toppling", "rocking"):
+        blocks += ["--p2", asked.p2 or "10,1"]
     with (
         tempfile.TemporaryDirectory() as folder,
         two_places(asked.server, Path(folder)) as (killed, undisturbed),
     ):
         for place in (killed, undisturbed):
             make_database(place, asked.motions)
-        run_to_the_end(undisturbed, asked.p2, asked.jobs)
+        run_to_the_end(undisturbed, blocks, asked.jobs)
         whole = stored(undisturbed)
         done = []
         for kill in kill_and_resume(
-            killed, asked.p2, kills=asked.kills, seed=asked.seed, jobs=asked.jobs
-        ):
+            killed, blocks, kills=asked.kills, seed=asked.seed, jobs=asked.jobs,
+            per_motion=whole // asked.motions,
+        ):  # fmt: skip
             done.append(kill)
             print(
                 f"kill {len(done):2d}: {kill.target:6s} at {kill.combinations}/{whole} "
                 f"combinations, exit status {kill.status}, orphans {kill.orphans}",
                 flush=True,
             )
-        run_to_the_end(killed, asked.p2, asked.jobs)
+        run_to_the_end(killed, blocks, asked.jobs)
         equal = digest(killed) == digest(undisturbed)
         main_kills = sum(kill.target == "main" for kill in done)
         print(

@@ -53,6 +53,7 @@ COMMANDS = {
     "serve": "Answer over HTTP, and serve the page.",
     "bench": "Measure speed against error beside general ODE solvers.",
     "demo": "Run the whole chain from records to a prediction.",
+    "warm-up": "Compile every kernel now, so that no later command waits.",
 }
 """The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
 
@@ -86,11 +87,12 @@ class _Commands(TyperGroup):
     def get_command(self, _: Any, cmd_name: str) -> Any:
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f"rbfrag.cli.commands.{cmd_name}")
+        name = cmd_name.replace("-", "_")
+        module = import_module(f"rbfrag.cli.commands.{name}")
         group = getattr(module, "app", None)
         if group is None:
             group = typer.Typer(rich_markup_mode=None, add_completion=False)
-            group.command(cmd_name, epilog=module.EXAMPLE)(getattr(module, cmd_name))
+            group.command(cmd_name, epilog=module.EXAMPLE)(getattr(module, name))
         command = typer.main.get_command(group)
         command.name = cmd_name
         read_plainly(command)

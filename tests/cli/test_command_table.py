@@ -24,13 +24,16 @@ from rbfrag.errors import InputError
 from rbfrag.question.fields import option_of
 
 COMMAND_FOLDER = Path(__file__).parents[2] / "rbfrag" / "cli" / "commands"
-MODULES = [import_module(f"rbfrag.cli.commands.{name}") for name in COMMANDS]
+MODULES = [import_module(f"rbfrag.cli.commands.{name.replace('-', '_')}") for name in COMMANDS]
 
 MOST_PARAMETERS = 12
 
 
 def test_the_table_names_every_module_and_its_first_line() -> None:
-    assert {path.stem for path in COMMAND_FOLDER.glob("*.py")} == {*COMMANDS, "__init__"}
+    assert {path.stem for path in COMMAND_FOLDER.glob("*.py")} == {
+        *(name.replace("-", "_") for name in COMMANDS),
+        "__init__",
+    }
     group: Any = typer.main.get_command(app)
     for name, line in COMMANDS.items():
         command = group.get_command(None, name)
