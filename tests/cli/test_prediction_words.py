@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
-from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
+import rbfrag
+from rbfrag.fragility.words import (
+    block_in_words,
+    glossary,
+    model_in_words,
+    percent,
+    prediction_in_words,
+    with_interval,
+)
 from tests.cli.conftest import Shell
 
 
@@ -36,10 +45,10 @@ def test_one_block_falls_or_stands() -> None:
     [
         (0.004, 0.001, 0.008, "of 1,000 such cases 4 fall (1 to 8 "),
         (0.9996, 0.99, 1.0, "of 10,000 such cases 9,996 fall (9,900 to 10,000 "),
-        (1e-7, 1e-9, 1e-6, "cases fewer than 1 falls (fewer than 1 as"),
-        (0.99999, 0.99998, 0.999999, "in nearly all such cases it falls (95 %)."),
+        (1e-7, 1e-9, 1e-6, "cases fewer than 1 falls (as far as"),
+        (0.99999, 0.99998, 0.999999, "of 10,000 such cases more than 9,999 fall (as far as"),
         (0.0101, 0.01, 0.02, "cases 1 falls (1 to 2 as"),
-        (0.5, 0.5, 0.5, "50 fall (50 as"),
+        (0.5, 0.5, 0.5, "50 fall (as"),
     ],
 )
 def test_counts_tell_p_from_0_and_1(p: float, low: float, high: float, said: str) -> None:
@@ -72,6 +81,48 @@ def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
 )  # fmt: skip
 def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
     assert percent(share) == said
+
+
+def test_an_interval_that_says_no_more_is_left_out() -> None:
+    assert with_interval(1e-5, 1e-6, 3e-5) == "below 0.01 %"
+    assert with_interval(0.13, 0.11, 0.152) == "13 % (11 % to 15 %)"
+    assert with_interval(0.13, 0.131, 0.1312) == "13 %"
+
+
+@pytest.mark.parametrize(
+    ("term", "method", "said"),
+    [
+        ("pgv_kr", "bounded", "PGV, size-dependent"),
+        ("pgv", "wls", "PGV, wls"),
+        ("pgv_pga_sa10_sa30", "overturning", "PGV, PGA, SA(1 s), SA(3 s), rocking"),
+        ("pgv_pga_m", "confined", "PGV, PGA, magnitude, confined toppling"),
+        ("xp", "record", "toppling spectrum, PGA"),
+        ("pgv, pga", "bounded", "two names"),
+    ],
+)
+def test_models_have_names_that_people_say(term: str, method: str, said: str) -> None:
+    assert model_in_words({"term": term, "method": method, "model": "two names"}) == said
+
+
+def test_models_of_the_reference_are_told_apart(shell: Shell) -> None:
+    rows = shell.json("models", "list")
+    of = [(row["kind"], model_in_words({**row, "model": row["name"]})) for row in rows]
+    same = [each for each in of if of.count(each) > 1]
+    assert {kind for kind, _ in same} == {"slumping"}  # which differ by what counts as failure
+
+
+def test_words_that_a_geologist_cannot_know_are_told_once(shell: Shell) -> None:
+    assert glossary("The block has p_s² = 3.") == ""
+    assert glossary("p² = 3", "p² and k_r").count("p²:") == 1
+    printed = shell("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6").stdout
+    assert printed.splitlines()[-1].startswith("(p²: 15/p² m is a rectangle's diagonal; k_r: ")
+    assert "model        PGV, size-dependent" in printed
+    named = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")["model"]
+    assert named == "bounded-pgv_kr"
+    # 15/p²: a rectangle's p² is 3 g/2 over its diagonal
+    assert 1.5 * 9.80665 / rbfrag.Block.rectangle(2.4, 0.5).p2 == pytest.approx(
+        math.hypot(2.4, 0.5)
+    )
 
 
 def test_other_suited_models_are_listed_and_none_is_said_to_be_wrong(shell: Shell) -> None:

@@ -112,7 +112,7 @@ def test_many_blocks_are_counted_in_cells(table, model, tmp_path, drawn):
 
 def test_the_variance_panel_shows_the_bins_of_the_fit(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png")
-    dots, line = drawn[0].axes[3].lines
+    dots, missed, line = drawn[0].axes[3].lines
     x, variance = line.get_data()
     assert variance == pytest.approx(1e-4 + 2e-3 * x)
     found = np.isfinite(table.y_m_s)
@@ -123,6 +123,9 @@ def test_the_variance_panel_shows_the_bins_of_the_fit(table, model, tmp_path, dr
     expected = (residual**2).mean(axis=1) * 360.0 / 358.0
     assert dots.get_ydata() == pytest.approx(expected)
     assert dots.get_xdata() == pytest.approx(x.reshape(18, 20).mean(axis=1))
+    ratio = (1e-4 + 2e-3 * dots.get_xdata()) / expected
+    off = (ratio <= 0.5) | (ratio >= 2.0)
+    assert list(missed.get_xdata()) == list(dots.get_xdata()[off])
     assert expected == pytest.approx(1e-4 + 2e-3 * dots.get_xdata(), rel=1.2)
 
 

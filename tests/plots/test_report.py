@@ -29,14 +29,14 @@ SHAPE = ("--height", "2.4", "--width", "0.5", "--dip", "3", "--phi", "35", "--pg
 CURVE = "pgv_m_s,annual_rate\n0.05,0.08\n0.1,0.03\n0.2,0.009\n0.4,0.0022\n0.8,0.0004\n1.6,5e-5\n"
 
 
-def words_of(path: Path) -> str:
+def words_of(path: Path, pages: int = 1) -> str:
     """Return the text of a report, its lines joined."""
     if path.suffix == ".pdf":
         pypdf = pytest.importorskip("pypdf")
-        pages = pypdf.PdfReader(path).pages
-        assert len(pages) == 1
-        assert [round(float(edge)) for edge in pages[0].mediabox[2:]] == [595, 842]
-        text = pages[0].extract_text()
+        found = pypdf.PdfReader(path).pages
+        assert len(found) == pages
+        assert [round(float(edge)) for edge in found[0].mediabox[2:]] == [595, 842]
+        text = " ".join(page.extract_text() for page in found)
     else:
         text = re.sub(r"<(style|svg).*?</\1>", " ", path.read_text("utf-8"), flags=re.DOTALL)
         text = re.sub(r"<sub>(.)</sub>", r"_\1", text)
@@ -69,6 +69,45 @@ def test_a_report_says_what_was_asked_and_answered(shell: Shell, suffix: str) ->
         assert text in words, text
     for warning in told["warnings"][:-1]:
         assert warning[1:].split(":")[0] in words
+
+
+TABLE = (
+    "block_id,height [m],width [m],beta [deg],phi [deg],displacement [m],pgv [m/s],kind\n"
+    "A1,2.4,0.5,3,35,,0.6,\nA2,1.2,0.4,0,40,,0.4,rocking\nB,2.5,2.5,20,32,0.1,,\n"
+    "C,1,0.5,60,35,,0.6,\nD,4,0.8,2,x,,0.9,\n"
+)
+
+
+def test_a_table_becomes_one_document(shell: Shell) -> None:
+    Path("blocks.csv").write_text(TABLE)
+    Path("curve.csv").write_text(CURVE)
+    rate = ("--hazard", "curve.csv", "--component", "rotd50")
+    for suffix in ("pdf", "html"):
+        out = f"blocks.{suffix}"
+        told = shell.json("report", "blocks.csv", "--pgv", "0.5", *rate, "--out", out)["blocks"]
+        one = shell.json("predict", *SHAPE)
+        assert [told[0]["probability"], len(told)] == [one["probability"], 3]
+        words = words_of(Path(out), pages=3)
+        for text in (
+            "Seismic fragility of rock blocks", "annual rate",
+            "A1 toppling (backed by a slope) 1.1 %",
+            "A2 rocking (stands free)", "B sliding", "unstable at rest", "'x' is not a number",
+            f"{told[1]['hazard']['annual_rate']:.3g} 1/a", "sliding-pgv",
+        ):  # fmt: skip
+            assert text in words, text
+    page = Path("blocks.html").read_text("utf-8")
+    assert page.count("<svg") == 6
+    names = re.findall(r'\bid="([^"]*)"', page)
+    assert len(names) == len(set(names))
+
+
+def test_a_table_that_makes_no_document(refuses: Refuses) -> None:
+    Path("blocks.csv").write_text(TABLE)
+    asked = ("report", "blocks.csv", "--pgv", "0.5", "--out")
+    assert "write .pdf or .html" in refuses(*asked, "a.png")
+    Path("blocks.csv").write_text("height [m],width [m],pgv [m/s]\n1,x,0.5\n")
+    assert "'x' is not a number" in refuses("report", "blocks.csv", "--out", "a.pdf")
+    assert not list(Path().glob("a.*"))
 
 
 def test_the_same_question_gives_the_same_file(tmp_path: Path) -> None:

@@ -69,6 +69,19 @@ def test_losses_without_a_curve_are_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_shares_of_a_rate_are_those_of_the_shell(tmp_path, caught):
+    figures = caught(hazard_module)
+    x = np.geomspace(0.01, 3.0, 60)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * np.exp(-x / 0.02))
+    answer = hazard(curve, 3.0, 0.01, component="single")
+    plot_contribution(curve, answer, tmp_path / "a.png")
+    heights = [bar.get_height() for bar in figures[0].axes[1].patches]
+    whole = 100.0 * answer.contribution[0].sum() / answer.annual_rate[0]
+    assert sum(heights) == pytest.approx(whole)
+    assert 50.0 < whole <= 100.0
+    assert figures[0].axes[1].get_ylabel().startswith("share of the rate [%]")
+
+
 def test_names_of_sites_and_events_are_letters_and_stay_on_the_sheet(tmp_path, caught, overlapping):
     figures = caught(hazard_module)
     x = np.geomspace(0.01, 10.0, 20)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rbfrag.cli.hazard_sentences import survival_in_words
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.survival import survival
 from rbfrag.plots import survival as module
@@ -41,6 +44,24 @@ def test_a_few_branches_are_named(n, tmp_path, caught, overlapping):
     assert {"m/s" in hazards.get_xlabel(), "%" in standing.get_ylabel()} == {True}
     texts = [*legend.get_texts(), *weights.get_yticklabels()]
     assert overlapping(figure, texts) == []
+
+
+def test_the_title_says_p_as_the_shell_does(tmp_path, caught):
+    figures = caught(module)
+    curves = branches(1)
+    found = answer(curves)
+    plot_survival(curves, found, tmp_path / "a.png")
+    title = figures[0].get_suptitle()
+    (sentence, *_) = survival_in_words(found)
+    assert (
+        title.partition("probability of ")[2]
+        == sentence.partition("probability of ")[2].partition(";")[0]
+    )
+
+
+def test_large_factors_have_no_exponent():
+    (_, factor) = survival_in_words(replace(answer(branches(1)), factor_5_percent=893.4))
+    assert "about 890 times as high" in factor
 
 
 def test_many_branches_are_drawn_alike_and_those_of_most_weight_listed(

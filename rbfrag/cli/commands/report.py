@@ -63,7 +63,7 @@ def report(
 
     known: dict[str, Any] = {**given, **measures}
     rows, remarks = stated_rows(blocks, known, sheet=sheet) if blocks else ([known], ())
-    title = heading.title or (TITLE if len(rows) == 1 else f"{TITLE}s")
+    title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
     with given.named():
         entries = write_report(
             out, rows, RateQuestion(rate.hazard, rate.years, vars(meaning)), title=title,
