@@ -44,8 +44,6 @@ _CELLS = np.arange(-88.5, 90.0, 3.0)
 _OF_CELLS = ("s1_m", "phi_residual_deg")
 
 _OPAQUE = {"fails": 0.85, "stays": 0.35}
-"""How blocks that fail, and others that move, are coloured."""
-
 _HATCHED = (
     (UNSTABLE, "////", "unstable at rest"),
     (LOCKED, "xxx", "locked: no acceleration\nmoves it in this mode"),

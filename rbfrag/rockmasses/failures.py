@@ -190,9 +190,8 @@ def final_modes(shaken: ShakenMass, i: int) -> dict[ModeName, dict[str, int]]:
     for mode in MODES:
         blocks = shaken.realisations.of_mode(mode)
         if blocks.any():
-            ends = shaken.final_code[i, blocks] % len(names)
-            counts = np.bincount(ends, minlength=len(names)).tolist()
-            table[mode] = dict(zip(names, counts, strict=True))
+            counts = np.bincount(shaken.final_code[i, blocks] % len(names), minlength=len(names))
+            table[mode] = dict(zip(names, counts.tolist(), strict=True))
     return table
 
 

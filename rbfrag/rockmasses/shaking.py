@@ -288,9 +288,7 @@ class ShakingPlan:
             )
             displacement_m[:, answer.place] = answer.displacement_m
             rotation_rad[:, answer.place] = answer.rotation_rad
-            final_code[:, answer.place] = np.where(
-                self.moves[:, answer.place], answer.final_code, final_code[:, answer.place]
-            )
+            final_code[:, answer.place] = answer.final_code
             runs += answer.runs
             for key, count in answer.about.items():
                 about[key] = about.get(key, 0) + count

@@ -298,9 +298,8 @@ def plot_modes(
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3.
 
-    With water, cohesion or roughness the chart is that of blocks of one spacing --s1. With
-    --ultimate the block of each cell is followed under --motion, and its colour is the mode in
-    which it ends.
+    With water, cohesion or roughness the chart is of blocks of one spacing --s1; with --ultimate
+    its colours are the modes in which they end under --motion.
     """
     from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots import plot

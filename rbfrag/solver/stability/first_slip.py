@@ -20,17 +20,12 @@ ENDED = frozenset({*JOINT, "cohesion_pa", "density_kg_m3", "phi_back_deg"})
 
 STATE_RESIDUAL = "state phi_residual_deg, the friction angle that is left, for the answer after it"
 
-UPLIFT = (
-    "water_m does not go with a probability or a time history of {kind}: uplift ends with the "
-    "first slip (yield {k:.4g} g, {mode}), which opens the fracture, and no displacement or "
-    f"probability follows from it: {STATE_RESIDUAL}"
+_ENDS = (
+    " ends with the first slip (yield {k:.4g} g, {mode}), and no displacement or probability "
+    f"follows from it: {STATE_RESIDUAL}"
 )
-
-ROUGH = (
-    "jrc does not go with a probability or a time history of {kind}: roughness ends with the first "
-    "slip (yield {k:.4g} g, {mode}), and no displacement or probability follows from it: "
-    f"{STATE_RESIDUAL}"
-)
+UPLIFT = f"water_m does not go with a probability or a time history of {{kind}}: uplift{_ENDS}"
+ROUGH = f"jrc does not go with a probability or a time history of {{kind}}: roughness{_ENDS}"
 
 SLIPS_ON = (
     "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "

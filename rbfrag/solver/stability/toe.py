@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
 
-SLIDE_ROCK = "; phi = {phi:g} gives way{at}: slide-rock, outside the model"
-
 
 def _balance(block: Block, beta_deg: float) -> tuple[float, float, float, float]:
     """Return thrust and pressure at the toe over the weight, each a constant and per k."""
@@ -72,7 +70,8 @@ def about_toe(block: Block, beta_deg: float, phi_deg: float, pga_g: float) -> st
 def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float | None) -> str:
     """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
     at = "" if slips_g is None else f" at {slips_g:.2f} g"
-    return NEEDS.format(need=need_deg, where=where) + SLIDE_ROCK.format(phi=phi_deg, at=at)
+    said = f"phi = {phi_deg:g} gives way{at}: slide-rock, outside the model"
+    return f"{NEEDS.format(need=need_deg, where=where)}; {said}"
 
 
 def toe_needs_in_time(
