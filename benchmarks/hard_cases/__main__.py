@@ -17,7 +17,7 @@ from pathlib import Path
 from benchmarks.hard_cases import Row
 from benchmarks.page import ROOT, machine_sentence, write_table
 
-PAGE = ROOT / "docs" / "evidence" / "verification.md"
+PAGE = ROOT / "docs" / "evidence" / "hard-cases.md"
 MARK = "hard cases"
 HEAD = (
     "| module | what | against | tried | wrong | within its error estimate, or certified | not |\n"
