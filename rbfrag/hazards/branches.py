@@ -56,8 +56,35 @@ def branch_curves(
 
 
 def branch_weights(given: Weights | None, curves: Sequence[HazardCurve]) -> FloatArray | None:
-    """Return the weights of the curves of a site, NaN for one that is no branch, or None."""
-    return checked_weights(_stated_weights(given, curves), len(curves))
+    """Return the weights of the curves of a site, which sum to 1; None where none is given.
+
+    Args:
+        given: numbers in the order of the curves, None for one that is no branch and has the weight
+            NaN; also as text: 0.5,0.3,0.2; or the name of a file of realizations.
+
+    Raises:
+        InputError: another number of weights, one that is none, or a sum other than 1.
+    """
+    if isinstance(given, str | os.PathLike):
+        stated = os.fspath(given)
+        try:
+            given = [float(part) for part in stated.split(",")]
+        except ValueError:
+            given = realization_weights(stated, curves)
+    if given is None or all(one is None for one in given):
+        return None
+    if len(given) != len(curves):
+        raise InputError(f"{len(given)} weights for {len(curves)} curves: give one for each")
+    values = np.array([math.nan if one is None else one for one in given], dtype=np.float64)
+    known = values[~np.isnan(values)]
+    if not ((known >= 0.0) & (known <= 1.0)).all():
+        raise InputError(f"weights {', '.join(f'{one:g}' for one in known)}: each is from 0 to 1")
+    if abs(known.sum() - 1.0) > _ADDS_UP:
+        raise InputError(
+            f"the weights of {known.size} branches add up to {known.sum():.6g}, not 1: give the "
+            "curves and weights of all branches"
+        )
+    return np.asarray(values / known.sum())
 
 
 def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
@@ -77,31 +104,6 @@ def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
             f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks "
             "stand at one: choose it by its number or name"
         )
-
-
-def checked_weights(weights: Sequence[float | None] | None, n: int) -> FloatArray | None:
-    """Return weights that sum to 1, NaN for curves without; None where none is given.
-
-    Args:
-        weights: weights of the curves, None for one that is no branch.
-
-    Raises:
-        InputError: another number of weights, one that is none, or a sum other than 1.
-    """
-    if weights is None or all(one is None for one in weights):
-        return None
-    if len(weights) != n:
-        raise InputError(f"{len(weights)} weights for {n} curves: give one for each")
-    values = np.array([math.nan if one is None else one for one in weights], dtype=np.float64)
-    given = values[~np.isnan(values)]
-    if not ((given >= 0.0) & (given <= 1.0)).all():
-        raise InputError(f"weights {', '.join(f'{one:g}' for one in given)}: each is from 0 to 1")
-    if abs(given.sum() - 1.0) > _ADDS_UP:
-        raise InputError(
-            f"the weights of {given.size} branches add up to {given.sum():.6g}, not 1: give the "
-            "curves and weights of all branches"
-        )
-    return np.asarray(values / given.sum())
 
 
 def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[float]) -> FloatArray:
@@ -178,20 +180,3 @@ def realization_weights(
         if number is not None and number not in weights:
             raise InputError(f"{path}: there is no rlz_id {number}, and a curve is of it")
     return [None if number is None else weights[number] for number in numbers]
-
-
-def _stated_weights(
-    given: Weights | None, curves: Sequence[HazardCurve]
-) -> Sequence[float | None] | None:
-    """Return the weight of each curve, None where none are given.
-
-    Args:
-        given: numbers in the order of the curves, also as text: 0.5,0.3,0.2; or the name of a file
-            of realizations.
-    """
-    if not isinstance(given, str | os.PathLike):
-        return given
-    try:
-        return [float(part) for part in os.fspath(given).split(",")]
-    except ValueError:
-        return realization_weights(given, curves)
