@@ -292,6 +292,7 @@ def hazard_at_sites(
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
     reading = LevelShaking.of(first[0], **meaning)
+    by_law = reading.magnitudes_from_g is not None
     alone = (between_measures.PGA_ALONE,) if reading.name == "pga_g" else ()
     if alone and answering.get("model") is None:
         raise InputError(
@@ -376,14 +377,8 @@ def hazard_at_sites(
         warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
-        tau=_tau(reading, meaning),
+        tau=LAW_TAU if by_law else None if meaning.get("convert") else TAU.get(reading.name),
     )
-
-
-def _tau(reading: LevelShaking, meaning: CurveKeywords) -> float | None:
-    if reading.magnitudes_from_g is not None:
-        return LAW_TAU
-    return None if meaning.get("convert") else TAU.get(reading.name)
 
 
 def _whole(each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int) -> Rates:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from dataclasses import dataclass, replace
@@ -19,7 +20,6 @@ from rbfrag.hazards.shaking import LevelShaking
 from rbfrag.solver.results import FloatArray
 
 _VALUE = re.compile(r"mean|rlz\d+")
-_WEIGHTS = re.compile(r"\bweights=\[([^\]]*)\]")
 _PLACE = re.compile(r"\b(lon|lat)=([-+.\de]+)")
 _SAME_PLACE = 0.01
 """Degrees that a curve and its disaggregation may lie apart."""
@@ -55,7 +55,7 @@ class Disaggregation:
     def read(cls, path: str | os.PathLike[str]) -> Disaggregation:
         """Return what a file of the OpenQuake engine says of PGA: Mag-*.csv or Mag_Dist-*.csv.
 
-        Beside imt, iml and mag it has a column ``mean`` or one for each realization, probabilities
+        Beside imt, iml and mag it has a column ``mean`` or that of one realization, probabilities
         of exceedance by the earthquakes of one bin; what else they are divided by is summed.
 
         Raises:
@@ -65,40 +65,28 @@ class Disaggregation:
         head = ",".join(next(rows, (0, []))[1])
         names = [name.strip() for name in next(rows, (0, []))[1]]
         values = [name for name in names if _VALUE.fullmatch(name)]
-        values = ["mean"] if "mean" in values else values
-        if not {"imt", "iml", "mag"} <= {*names} or not values:
+        if not {"imt", "iml", "mag"} <= {*names} or len(values) != 1:
             raise InputError(
                 f"{path}: a disaggregation by magnitude has the columns imt, iml, mag, and mean or "
-                "rlz0: export disagg-stats or disagg-rlzs of OpenQuake, with Mag among "
-                "disagg_outputs"
+                "one realization: export disagg-stats of OpenQuake, with Mag among disagg_outputs"
             )
-        weights = np.ones(1)
-        if len(values) > 1:
-            stated = _WEIGHTS.search(head)
-            texts = stated[1].split(",") if stated else []
-            weights = np.array([number_at(text, f"{path}, line 1") for text in texts])
-            if weights.size != len(values):
-                raise InputError(
-                    f"{path}, line 1: states {weights.size} weights for {len(values)} realizations"
-                )
         sums: dict[float, dict[float, float]] = {}
         whole: dict[float, float] = {}
         for line, cells in rows:
             row, where = dict(zip(names, cells, strict=False)), f"{path}, line {line}"
             if row.get("imt") != "PGA":
                 continue
-            level, magnitude, *poe = (
+            level, magnitude, poe = (
                 number_at(row.get(name, ""), where) for name in ("iml", "mag", *values)
             )
-            sound = all(0.0 <= p < 1.0 for p in poe)
-            if not (sound and 0.0 <= level < np.inf and 0.0 < magnitude < 11.0):
+            if not (0.0 <= poe < 1.0 and 0.0 <= level < np.inf and 0.0 < magnitude < 11.0):
                 raise InputError(
-                    f"{where}: iml {level:g}, mag {magnitude:g}, {', '.join(map(str, poe))}: a "
-                    "level, a magnitude and probabilities below 1 are wanted"
+                    f"{where}: iml {level:g}, mag {magnitude:g}, {poe:g}: a level, a magnitude and "
+                    "a probability below 1 are wanted"
                 )
             of = sums.setdefault(level, {})
-            of[magnitude] = of.get(magnitude, 0.0) - float(weights @ np.log1p(-np.array(poe)))
-            whole[level] = whole.get(level, 0.0) + float(weights @ poe)
+            of[magnitude] = of.get(magnitude, 0.0) - math.log1p(-poe)
+            whole[level] = whole.get(level, 0.0) + poe
         levels = sorted(x for x, own in sums.items() if x > 0.0 and any(own.values()))
         if not levels:
             raise InputError(f"{path}: there is no disaggregation of PGA in it")

@@ -53,13 +53,13 @@ def test_shares_are_those_of_rates_at_the_levels(tmp_path: Path) -> None:
     )
 
 
-def test_distances_are_summed_and_realizations_weighed(tmp_path: Path) -> None:
-    text = HEAD.format(", weights=[0.25, 0.75], rlz_ids=[0, 1]") + (
-        "imt,iml,poe,mag,dist,rlz0,rlz1\nPGA,.1,.1,5.5,10,.02,.04\nPGA,.1,.1,5.5,30,.01,.02\n"
-        "PGA,.1,.1,6.5,10,.03,.01\n"
+def test_distances_are_summed(tmp_path: Path) -> None:
+    text = HEAD.format(", weights=[1.0], rlz_ids=[0]") + (
+        "imt,iml,poe,mag,dist,rlz0\nPGA,.1,.1,5.5,10,.02\nPGA,.1,.1,5.5,30,.01\n"
+        "PGA,.1,.1,6.5,10,.03\n"
     )
     known = Disaggregation.read(written(tmp_path, text))
-    r = -np.log1p(-np.array([[0.02, 0.04], [0.01, 0.02], [0.03, 0.01]])) @ [0.25, 0.75]
+    r = -np.log1p(-np.array([0.02, 0.01, 0.03]))
     assert known.share[0, 0] == pytest.approx((r[0] + r[1]) / r.sum())
 
 
@@ -119,11 +119,11 @@ def test_survival_stands_on_the_same_rate(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("mag,mean", "eps,mean"), "columns imt, iml, mag, and mean or rlz0"),
+        (("mag,mean", "eps,mean"), "columns imt, iml, mag, and mean or one realization"),
         (("PGA", "SA(0.3)"), "no disaggregation of PGA"),
         (("6.0E-02", "1.2"), "line 4: iml 0.4, mag 7.25, 1.2"),
         (("6.0E-02", "many"), "line 4: 'many' is not a number"),
-        (("mean\n", "rlz0,rlz1\n"), "states 0 weights for 2 realizations"),
+        (("mean\n", "rlz0,rlz1\n"), "mean or one realization"),
     ],
 )
 def test_what_is_no_disaggregation_is_refused(
