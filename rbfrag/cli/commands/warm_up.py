@@ -17,7 +17,7 @@ def warm_up() -> None:
     cache folder. Run it once at install time, by a user who may write there; what is compiled
     already is not compiled again.
     """
-    from rbfrag.campaign.warm_up import warm_up as prepared
+    from rbfrag.cli.warm_up import warm_up as prepared
 
     say_when_compiling()
     started = time.perf_counter()
