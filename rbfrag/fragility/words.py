@@ -138,13 +138,14 @@ def glossary(*texts: str) -> str:
 def model_in_words(document: Mapping[str, Any]) -> str:
     """Return what people call the model of an answer: what it reads, and what tells it apart."""
     from rbfrag.fragility.measures import TERMS
+    from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.fragility.methods import method_named
 
     if (term := TERMS.get(document["term"])) is None:  # several models
         return str(document["model"])
     read = (_MEASURES.get(n) or n.partition("_")[0].upper() for n in term.inputs)
     method = method_named(document["method"])
-    kind = method.block.kind.replace("_", " ").removeprefix("toppling")
+    kind = "" if method.block is TOPPLING_BLOCK else method.block.kind.replace("_", " ")
     own = "" if method.forms[term.name].rank == 0 else method.name
     sized = "size-dependent" if "block's" in term.title else ""
     return ", ".join(filter(None, (*read, sized, kind, own)))

@@ -182,4 +182,4 @@ def _draw_variance(
     axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
     missing = f"{off.sum()} bins that it misses by a factor above 2"
     labels = [f"{binned.counts.size} bins of equal count", "fitted variance", missing]
-    axes.legend([dots, curve, missed], labels, loc="upper left", fontsize=8, frameon=False)
+    axes.legend([dots, curve, missed], labels, loc="best", fontsize=8, frameon=False)
