@@ -228,7 +228,7 @@ def import_(
     """Add critical values of toppling, with measures of their motions, out of a table.
 
     Importing twice changes nothing. If what is stored says otherwise, nothing is written."""
-    from rbfrag.exchange.critical_table import import_critical_values
+    from rbfrag.exchange.tables.critical_values import import_critical_values
 
     _print_merge(import_critical_values(table, map, db=db), json=json)
 

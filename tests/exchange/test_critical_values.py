@@ -19,7 +19,7 @@ from rbfrag.db.merge.databases import MergeReport
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import IMPORTED
 from rbfrag.errors import InputError, MergeConflictError
-from rbfrag.exchange.critical_table import NEEDED, import_critical_values
+from rbfrag.exchange.tables.critical_values import NEEDED, import_critical_values
 from rbfrag.fragility.fit.data import FitSource
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.solver.results import NUMERICS_VERSION
