@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,6 +180,6 @@ def _draw_variance(
     axes.set_xlim(left, right)
     axes.set_xlabel(model.term.label)
     axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
-    missing = f"{off.sum()} bins that it misses by a factor above 2"
-    labels = [f"{binned.counts.size} bins of equal count", "fitted variance", missing]
-    axes.legend([dots, curve, missed], labels, loc="best", fontsize=8, frameon=False)
+    labels = [f"{off.size} bins", "fitted variance", f"{off.sum()} bins missed by a factor above 2"]
+    above: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 3}
+    axes.legend([dots, curve, missed], labels, **above, fontsize=8, frameon=False)
