@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
-from rbfrag.solver.stability.joint import OnJoint
 from rbfrag.solver.stability.modes import words_of_mode
-from rbfrag.solver.stability.single import refuse_undecided, stability
 
-JOINT = (*OnJoint.__annotations__, "phi_residual_deg")
+if TYPE_CHECKING:
+    from rbfrag.solver.block.geometry import Block
+
+# the fields of `joint.OnJoint`, which single numbers do not load
+JOINT = ("water_m", "jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg")
 """What is stated of a joint beside bond and friction."""
 
 ENDED = frozenset({*JOINT, "cohesion_pa", "density_kg_m3", "phi_back_deg"})
@@ -55,6 +56,8 @@ def after_first_slip(
     Raises:
         InputError: no earthquake decides about the block, or it does not stand on what is left.
     """
+    from rbfrag.solver.stability.single import refuse_undecided, stability
+
     stated = dict(planes)
     residual_deg = stated.pop("phi_residual_deg", None)
     if residual_deg is None:
@@ -81,6 +84,8 @@ def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None
     """
     if not (planes.get("water_m") or planes.get("jrc")):
         return
+    from rbfrag.solver.stability.single import stability
+
     judged = stability(block, **planes)
     backed = planes.get("back_fracture", True)
     facts = facts_of(kind) if kind else kind_of_mode(judged.mode, back_fracture=backed)
