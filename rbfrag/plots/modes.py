@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -197,7 +198,7 @@ def _title(
         )
     if ended is not None:
         return (
-            f"modes in which blocks end under {ended.shaking.motion.label}\n"
+            f"modes in which blocks end under\n{shorten(ended.shaking.motion.label, 70)}\n"
             rf"lines and names: modes at first, {friction}, $\beta$ = {beta_deg:g}°"
         )
     return (
