@@ -123,6 +123,10 @@ def _in_proportion(
         of = middle(ratio)
         sa = of * pgv * 2.0 * math.pi / (period_s * g) if period_s else of * pgv / (seconds * g)
         return sa, f"{ratio.replace('_over_', '/')} = {of:.3g}"
+    if pgv is not None and name == "arias_m_s" and name in domain:
+        # twice the acceleration is four times the intensity
+        of = middle(name) / math.prod(domain["pgv_m_s"])
+        return of * pgv**2, f"Arias/PGV² = {of:.3g} s/m"
     raise InputError(
         f"model {model.name!r} reads {' and '.join(model.term.inputs)}, and {name} is not in "
         f"proportion to {first}: state it, or draw another model",
