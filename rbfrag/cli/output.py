@@ -254,8 +254,11 @@ def show_prediction(
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    said = (*words.prediction_in_words(document), *words.block_in_words(document["method"], given))
-    print_sentences(said)
+    sentences = (
+        *words.prediction_in_words(document),
+        *words.block_in_words(document["method"], given),
+    )
+    print_sentences(sentences)
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
     else:
@@ -271,7 +274,7 @@ def show_prediction(
         print()
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
-    print_glossary(*said, *shown)
+    print_glossary(*sentences, *shown)
     print_warnings(warnings, [name for name in declared() if "_" in name])
 
 

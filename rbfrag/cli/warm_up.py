@@ -22,6 +22,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.solver.excitation import kept_excitation
 from rbfrag.solver.integrator.block_excitation import block_excitation
+from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.respond import respond
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.search.from_rest import first_change
@@ -48,9 +49,10 @@ def warm_up() -> Iterator[str]:
     with TemporaryDirectory(prefix="rbfrag-warm-up-") as folder:
         yield "responses and searches"
         motion, upward = _motion(1.0), _motion(0.4)
+        free_standing = next(kind for kind, facts in KINDS.items() if facts.free_standing)
         for vertical in (None, upward):
             respond(motion, p2=3.0, kr=0.1, vertical=vertical)
-            respond(motion, p2=3.0, kr=0.1, vertical=vertical, kind="rocking", restitution=0.9)
+            respond(motion, p2=3.0, kr=0.1, vertical=vertical, kind=free_standing, restitution=0.9)
             respond(motion, ky=0.1, vertical=vertical)
             for p2 in (0.1, 30.0):
                 critical(motion, p2=p2, vertical=vertical, full_map=True)

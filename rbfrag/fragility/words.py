@@ -131,8 +131,8 @@ GLOSSARY = {
 
 def glossary(*texts: str) -> str:
     """Return what words of some texts mean, each once; empty where none needs it."""
-    found = (f"{word}: {GLOSSARY[word]}" for word in GLOSSARY if any(word in t for t in texts))
-    return "; ".join(found)
+    meanings = (f"{word}: {GLOSSARY[word]}" for word in GLOSSARY if any(word in t for t in texts))
+    return "; ".join(meanings)
 
 
 def model_in_words(document: Mapping[str, Any]) -> str:

@@ -14,8 +14,8 @@ from rbfrag.plots import kind_chart, plot
 
 @pytest.mark.parametrize(
     ("model", "labels"),
-    [("rocking-sa10", 9), ("rocking-pga_sa10", 8), ("sliding-pgv_pga_m", 9), ("sliding-pgv_pga_ia", 9),
-     ("slumping-2deg-pgv_pga_m", 9), ("confined_toppling-pgv_pga", 9)],
+    [("rocking-sa10", 9), ("rocking-pga_sa10", 8), ("sliding-pgv_pga_m", 9),
+     ("sliding-pgv_pga_ia", 9), ("slumping-2deg-pgv_pga_m", 9), ("confined_toppling-pgv_pga", 9)],
 )  # fmt: skip
 def test_labels_and_caption(tmp_path: Path, caught, model: str, labels: int) -> None:  # type: ignore[no-untyped-def]
     figures = caught(kind_chart)

@@ -69,15 +69,15 @@ def report(
             out, rows, RateQuestion(rate.hazard, rate.years, vars(meaning)), title=title,
             date=heading.date, **answering,
         )  # fmt: skip
-    told = [entry.contents for entry in entries if entry.contents is not None]
+    reports = [entry.contents for entry in entries if entry.contents is not None]
     if json:
-        documents = [each.document for each in told]
+        documents = [each.document for each in reports]
         print_json({"file": out, **(documents[0] if blocks is None else {"blocks": documents})})
         return
     if len(rows) == 1:
-        print_sentences(told[0].sentences)
+        print_sentences(reports[0].sentences)
     else:
         print_rows([{**dict(zip_longest(COLUMNS, e.cells)), "reason": e.reason} for e in entries])
         print()
     print(out)
-    print_warnings(dict.fromkeys((*remarks, *(text for each in told for text in each.remarks))))
+    print_warnings(dict.fromkeys((*remarks, *(text for each in reports for text in each.remarks))))

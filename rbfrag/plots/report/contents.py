@@ -160,7 +160,7 @@ def contents_of(
     )
 
 
-class Entry(NamedTuple):
+class ReportedBlock(NamedTuple):
     """One block of a report: what is said of it, or why nothing is."""
 
     name: str
@@ -182,7 +182,7 @@ COLUMNS = ("block", "fails by", "P", "interval", "annual rate")
 
 def entries_of(
     rows: Sequence[Mapping[str, Any]], rate: RateQuestion | None, **answering: Unpack[RangeFields]
-) -> list[Entry]:
+) -> list[ReportedBlock]:
     """Answer a question about each of several blocks; one alone must be answered.
 
     Args:
@@ -197,10 +197,10 @@ def entries_of(
         try:
             if "reason" in row:
                 raise InputError(row["reason"])
-            entries.append(Entry(name, contents_of(given, rate, **answering)))
+            entries.append(ReportedBlock(name, contents_of(given, rate, **answering)))
         except InputError as error:
             errors.append(error)
-            entries.append(Entry(name, None, str(error)))
+            entries.append(ReportedBlock(name, None, str(error)))
     if len(errors) == len(rows):
         raise errors[0]
     return entries

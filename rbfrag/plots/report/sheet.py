@@ -12,7 +12,7 @@ from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.plots.canvas import BLUE, freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
+from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, ReportedBlock, Table
 from rbfrag.plots.report.panels import panels_of
 from rbfrag.version import __version__
 
@@ -48,7 +48,7 @@ _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 
 
 @in_own_style
-def write_sheet(entries: Sequence[Entry], title: str, date: str, target: Path) -> None:
+def write_sheet(entries: Sequence[ReportedBlock], title: str, date: str, target: Path) -> None:
     """Write a report as pages of A4, PDF, or of one block PNG, by the suffix of the file."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
@@ -67,7 +67,7 @@ def write_sheet(entries: Sequence[Entry], title: str, date: str, target: Path) -
                     page.savefig(book, format="pdf")
 
 
-def _pages(entries: Sequence[Entry], title: str, date: str) -> Iterator[Figure]:
+def _pages(entries: Sequence[ReportedBlock], title: str, date: str) -> Iterator[Figure]:
     """Yield the pages: one of a single block; or the summary, and half a page for each block."""
     answered = [(e.name, e.contents) for e in entries if e.contents is not None]
     draws: list[Callable[[Figure], None]] = [
@@ -85,7 +85,9 @@ def _pages(entries: Sequence[Entry], title: str, date: str) -> Iterator[Figure]:
         yield figure
 
 
-def _list(figure: Figure, entries: Sequence[Entry], first: int, title: str, date: str) -> None:
+def _list(
+    figure: Figure, entries: Sequence[ReportedBlock], first: int, title: str, date: str
+) -> None:
     (part,) = figure.subfigures(1, 1, squeeze=False)[0]
     _write(part, _LEFT, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
     _write(part, _RIGHT, 0.964, date, fontsize=9, ha="right")

@@ -12,7 +12,7 @@ from pathlib import Path
 from rbfrag.files import write_text
 from rbfrag.plots.canvas import freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, Entry, Table
+from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, ReportedBlock, Table
 from rbfrag.plots.report.panels import Panel, panels_of
 
 _SIZE_IN = (5.4, 4.6)
@@ -44,7 +44,7 @@ sub { font-size: 75%; line-height: 0; }
 
 
 @in_own_style
-def write_html(entries: Sequence[Entry], title: str, date: str, target: Path) -> None:
+def write_html(entries: Sequence[ReportedBlock], title: str, date: str, target: Path) -> None:
     """Write a report as a page that needs nothing but itself: the summary, and each block."""
     several = len(entries) > 1
     answered = [(e.name, e.contents) for e in entries if e.contents is not None]
@@ -63,7 +63,7 @@ def write_html(entries: Sequence[Entry], title: str, date: str, target: Path) ->
     write_text("\n".join(part for part in parts if part) + "\n", target)
 
 
-def _summary(entries: Sequence[Entry]) -> str:
+def _summary(entries: Sequence[ReportedBlock]) -> str:
     """Return a table of all blocks; a reason takes the cells of an answer."""
     rows = [f"<tr>{''.join(f'<th><b>{name}</b></th>' for name in COLUMNS)}</tr>"]
     for entry in entries:

@@ -12,7 +12,7 @@ from rbfrag.fragility.measures import spectral
 from rbfrag.hazards.curve import CurveKeywords
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.plots.canvas import new_figure
-from rbfrag.plots.report.contents import Entry, RateQuestion, entries_of
+from rbfrag.plots.report.contents import RateQuestion, ReportedBlock, entries_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
 from rbfrag.question.fields import MeasureFields, RangeFields
@@ -90,7 +90,7 @@ def write_report(
     title: str = TITLE,
     date: str = "",
     **answering: Unpack[RangeFields],
-) -> list[Entry]:
+) -> list[ReportedBlock]:
     """Write the report of blocks, each a row of its fields.
 
     Returns:

@@ -67,8 +67,8 @@ def after_first_slip(
     left = {name: value for name, value in stated.items() if name not in ENDED}
     left["phi_deg"] = residual_deg
     if stability(block, **left).yield_acceleration <= 0.0:
-        said = {"k": first.yield_acceleration, "mode": words_of_mode(first.mode)}
-        raise InputError(SLIPS_ON.format(**said), fields=("phi_residual_deg",))
+        finding = {"k": first.yield_acceleration, "mode": words_of_mode(first.mode)}
+        raise InputError(SLIPS_ON.format(**finding), fields=("phi_residual_deg",))
     return left, (AFTER_SLIP,)
 
 
@@ -89,8 +89,8 @@ def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None
     judged = stability(block, **planes)
     backed = planes.get("back_fracture", True)
     facts = facts_of(kind) if kind else kind_of_mode(judged.mode, back_fracture=backed)
-    said = {"k": judged.yield_acceleration, "mode": words_of_mode(judged.mode)}
+    finding = {"k": judged.yield_acceleration, "mode": words_of_mode(judged.mode)}
     for name, text in (("water_m", UPLIFT), ("jrc", ROUGH)):
         if planes.get(name) and (name == "water_m" or slips_on_base(facts)):
-            text = text.format(kind=facts.kind, **said)
+            text = text.format(kind=facts.kind, **finding)
             raise InputError(text, fields=(name, "phi_residual_deg"))

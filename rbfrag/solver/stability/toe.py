@@ -70,8 +70,8 @@ def about_toe(block: Block, beta_deg: float, phi_deg: float, pga_g: float) -> st
 def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float | None) -> str:
     """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
     at = "" if slips_g is None else f" at {slips_g:.2f} g"
-    said = f"phi = {phi_deg:g} gives way{at}: slide-rock, outside the model"
-    return f"{NEEDS.format(need=need_deg, where=where)}; {said}"
+    consequence = f"phi = {phi_deg:g} gives way{at}: slide-rock, outside the model"
+    return f"{NEEDS.format(need=need_deg, where=where)}; {consequence}"
 
 
 def toe_needs_in_time(
