@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         db = ("--db", str(Path(folder) / "job.db"))
         added, add_s = run("motions", "add", *(parts or [str(root)]), *db)
         done, simulate_s = run("simulate", *jobs, *db)
-        fits = [run("fit", "--term", term, *db) for term in chosen.term]
+        fits = [run("fit", "--term", term, "--method", "wls", *db) for term in chosen.term]
         _, again_s = run("simulate", *jobs, *db)
     cells = [
         ["`rbfrag motions add`", f"{len(added['added'])} traces", *add_s],
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             *simulate_s,
         ],
         *(
-            [f"`rbfrag fit --term {term}`", fit_words(fitted), *fit_s]
+            [f"`rbfrag fit --term {term} --method wls`", fit_words(fitted), *fit_s]
             for term, (fitted, fit_s) in zip(chosen.term, fits, strict=True)
         ),
         ["`rbfrag simulate` again", "everything is stored", *again_s],

@@ -36,10 +36,12 @@ from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables import files
+from rbfrag.exchange.tables.critical_values import import_critical_values
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.branches import realization_weights
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
+from rbfrag.hazards.disaggregation import Disaggregation
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
@@ -111,6 +113,19 @@ REALIZATIONS = (
 )
 
 PLANES = (b"dip_deg,dip_direction_deg\n22,85\n18,97\n25,90\n",)
+CRITICAL_MAP = (
+    b'search_limit = 0.01\n[columns]\nmotion = "name"\nevent = "event"\npga_g = { column = "pga", '
+    b'unit = "cm/s2" }\npgv_m_s = { column = "pgv", unit = "cm/s" }\npgd_m = { column = "pgd", '
+    b'unit = "cm" }\ntm_s = "tm"\np2 = "p2"\nkr = "kr"\n',
+)
+CRITICAL_TABLE = (
+    b"name,event,pga,pgv,pgd,tm,p2,kr\na,e1,300,40,10,0.6,3,0.1\nb,e1,250,30,8,0.5,3,0.08\n",
+)
+DISAGGREGATION = (
+    b"#,,,,\"generated_by='OpenQuake engine 3.26.2', investigation_time=50.0, lon=174.776, "
+    b'lat=-41.279"\nimt,iml,poe,mag,mean\nPGA,4.0E-01,7.0E-02,5.25,1.0E-02\n'
+    b"PGA,4.0E-01,7.0E-02,7.25,6.0E-02\nPGA,2.0E-02,4.5E-01,5.25,3.0E-01\n",
+)
 GMM_TABLE = (b"rjb_km,PGV [cm/s],pgv_sigma,pgv_tau\n5,40,0.6,0.3\n20,20,0.65,0.35\n",)
 
 METADATA = (
@@ -242,6 +257,14 @@ def _read_weights(path: Path) -> object:
     return realization_weights(path, [curve])
 
 
+def _import(path: Path) -> object:
+    beside = path.with_name(f"beside{'.csv' if path.suffix == '.toml' else '.toml'}")
+    beside.write_bytes((CRITICAL_TABLE if path.suffix == ".toml" else CRITICAL_MAP)[0])
+    table, columns = (beside, path) if path.suffix == ".toml" else (path, beside)
+    with tempfile.TemporaryDirectory() as folder:
+        return import_critical_values(table, columns, db=Path(folder) / "imported.db")
+
+
 def _predict(path: Path) -> object:
     out = path.with_name(f"answers{path.suffix}")
     return predict_table(path, out, given={"pgv_m_s": 0.5}, model=None, level=0.95, db=None)
@@ -273,6 +296,9 @@ READERS: tuple[Reader, ...] = (
     Reader("hazard curve JSON", ".json", lambda: HAZARD_JSON, read_hazard_curves),
     Reader("realizations", ".csv", lambda: REALIZATIONS, _read_weights),
     Reader("ground-motion medians", ".csv", lambda: GMM_TABLE, read_gmm_table),
+    Reader("critical values", ".csv", lambda: CRITICAL_TABLE, _import),
+    Reader("map of critical values", ".toml", lambda: CRITICAL_MAP, _import),
+    Reader("disaggregation", ".csv", lambda: DISAGGREGATION, Disaggregation.read),
     Reader("metadata", ".csv", lambda: METADATA, read_metadata),
     Reader("index of intervals", INDEX, lambda: (b"list.txt 0.01\n",), _read_index),
     Reader("zip of records", ".zip", _zips, read_motions),

@@ -49,7 +49,7 @@ COMMANDS = {
     "export": "Write fragility functions for other tools.",
     "models": "List, show and choose fitted fragility models.",
     "plot": "Draw models, data, spectra, responses and failure modes.",
-    "db": "Upgrade, describe, check, export and merge databases.",
+    "db": "Upgrade, describe, check, export and merge databases, and import tables.",
     "serve": "Answer over HTTP, and serve the page.",
     "bench": "Measure speed against error beside general ODE solvers.",
     "demo": "Run the whole chain from records to a prediction.",

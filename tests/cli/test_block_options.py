@@ -128,7 +128,7 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
     [
         (("--height", "2"), "--width is missing: --height, --width together"),
         ((*SIDES, "--width", "0"), "--width = 0 is not above 0 m"),
-        ((*SIDES, "--dip", "3", "--beta", "3"), "--dip does not go with --beta"),
+        ((*SIDES, "--dip", "3", "--beta", "3"), "--beta does not go with --dip"),
         (("--dip", "3"), "or by its shape, such as --height and --width"),
         ((*ALPHA1, "--dip", "3"), "--phi is missing"),
         ((*SIDES, "--dip", "20"), "unstable at rest"),

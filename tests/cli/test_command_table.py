@@ -121,7 +121,7 @@ def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> N
     )
     refused = run(made, ["--dip", "3", "--beta", "3"]).exception
     assert isinstance(refused, InputError)
-    assert refused.spelled(option_of).startswith("--dip does not go with --beta")
+    assert refused.spelled(option_of).startswith("--beta does not go with --dip")
 
 
 def test_the_table_refuses_by_what_is_given_and_known() -> None:

@@ -20,7 +20,8 @@ RESPOND_KEYS = {
     "kind", "outcome", "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s",
     "toppled_s", "error_estimate", "steps", "samples_moved", "samples_total", "warnings",
     "final_theta_rad", "displacement_m", "peak_displacement_m", "centroid_displacement_m",
-    "stopped_s", "mode_changes", "how",
+    "stopped_s", "mode_changes", "how", "mode", "final_mode", "toe_needs_deg", "toe_needs_s",
+    "toe_slips_g",
 }  # fmt: skip
 CRITICAL_KEYS = {
     "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "certified", "k_up_over_pga",
@@ -110,9 +111,9 @@ def test_from_files_to_a_probability(shell: Shell, tmp_path: Path) -> None:
     answer = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.3")
     assert set(answer) == PREDICT_KEYS
     assert 0.0 <= answer["ci_low"] <= answer["probability"] <= answer["ci_high"] <= 1.0
-    assert answer["model"] == "wls-pgv"
+    assert answer["model"] == "logistic-pgv"
     assert shell.json("models", "list")[0]["is_default"] is True
-    assert shell.json("models", "show", "wls-pgv")["coefficients"] == report["coefficients"]
+    assert shell.json("models", "show", "logistic-pgv")["coefficients"] == report["coefficients"]
     assert shell.json("db", "info")["rows"]["combination"] == 24
     (row,) = shell.json("db", "info", "--by", "suite")["suites"]
     assert (row["suite"], row["kind"], row["combinations"]) == ("made-up", "toppling", 24)

@@ -74,7 +74,10 @@ def test_how_many_rows_are_answered() -> None:
 
 def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
     fails = {"share": 0.2, "ci_low": 0.15, "ci_high": 0.26}
-    for unknown, end in ((0.0, "26 %)."), (0.3, "; of another 30 % it is open whether they do.")):
+    for unknown, end in (
+        (0.0, "26 %) fail."),
+        (0.3, "; of another 30 % it is open whether they do."),
+    ):
         document = {
             "modes": {"slide": {"share": 1.0}}, "blocks": 200, "scenario": None,
             "shaking": {

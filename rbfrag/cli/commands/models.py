@@ -14,7 +14,7 @@ from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.stack import argument, command_group, stacked
 
 app = command_group(
-    "List, show and choose fitted fragility models.", "Example:  rbfrag models show wls-pgv"
+    "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
 )
 
 Name = Annotated[
@@ -57,7 +57,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     )  # fmt: skip
 
 
-@app.command("show", epilog="Example:  rbfrag models show wls-pgv")
+@app.command("show", epilog="Example:  rbfrag models show logistic-pgv")
 @stacked
 def show_model(
     printing: options.Printing,
@@ -82,7 +82,7 @@ def show_model(
     print_report(FitReport.from_model(FragilityModel.from_row(row)), printing)
 
 
-@app.command("default", epilog="Example:  rbfrag models default wls-pgv")
+@app.command("default", epilog="Example:  rbfrag models default logistic-pgv")
 def set_default_model(name: Name, db: options.Db = None) -> None:
     """Choose the default of a kind, instead of the model of the best score."""
     from rbfrag.db.engine import opened_database

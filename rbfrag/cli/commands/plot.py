@@ -53,7 +53,7 @@ class Held:
     )
 
 
-@app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
+@app.command("fit", epilog="Example:  rbfrag plot fit --model logistic-pgv --out fit.png")
 @stacked
 def plot_fit(
     *,

@@ -23,4 +23,4 @@ def warm_up() -> None:
     started = time.perf_counter()
     for what in prepared():
         print(f"warm-up: {what}", file=sys.stderr, flush=True)
-    print(f"every kernel is compiled; {time.perf_counter() - started:.0f} s")
+    print(f"Every kernel is compiled, in {time.perf_counter() - started:.0f} s.")
