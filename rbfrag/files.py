@@ -154,21 +154,23 @@ def csv_rows(text: str, where: object = "") -> Iterator[tuple[int, list[str]]]:
         raise InputError(f"{place} {reader.line_num}: not a CSV file: {error}") from None
 
 
-def toml_document(text: str) -> dict[str, Any]:
+def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> dict[str, Any]:
     """Return what TOML says.
 
     Raises:
-        InputError: it is not TOML, nested too deeply, or holds a key or number out of all bounds.
+        InputError: it is not TOML, nested too deeply, or holds a key or number out of all bounds;
+            the message names the source.
     """
+    named = "" if source is None else f"{os.fspath(source)}: "
     if _DOTTED.search(text):
-        raise InputError("not valid TOML for us: a key of more than 20 parts")
+        raise InputError(f"{named}not valid TOML for us: a key of more than 20 parts")
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise InputError("not valid TOML for us: tables or arrays nested too deeply") from None
+        raise InputError(f"{named}not valid TOML for us: tables nested too deeply") from None
     # beside its own error, the parser passes on that of an integer of thousands of digits
     except ValueError as error:
-        raise InputError(f"not valid TOML: {error}") from None
+        raise InputError(f"{named}not valid TOML: {error}") from None
 
 
 def json_document(text: str) -> Any:

@@ -453,7 +453,8 @@ def test_what_is_typed_into_the_page_is_answered_likewise(
         if not expected.numbers:
             expect(page.locator("#probability")).to_have_attribute("data-state", "none")
             if "at rest" not in expected.reason:  # which the page says of its drawing
-                assert opened.text("#sentence") == refusal_of(question)
+                said = "async (said) => (await import('/js/fields.js')).inLabels(said)"
+                assert opened.text("#sentence") == page.evaluate(said, refusal_of(question))
             continue
         opened.settled()
         if "displacement_m" in question:  # asked for once the block is known to slide

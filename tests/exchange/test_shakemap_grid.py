@@ -170,5 +170,5 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
 def test_hdf5_is_refused_with_what_to_take_instead(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(InputError, match=r"is HDF5, .* take grid\.xml of the same ShakeMap"):
+    with pytest.raises(InputError, match=r"is HDF5 .*: take grid\.xml of the same ShakeMap"):
         read_shakemap(path)

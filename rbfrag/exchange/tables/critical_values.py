@@ -79,7 +79,7 @@ def import_critical_values(
 
 def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], float]:
     """Return where each field stands, and the smallest k_r/PGA that was looked at."""
-    document, known = toml_document(source_text(path, "a map of columns")), {}
+    document, known = toml_document(source_text(path, "a map of columns"), path), {}
     columns, limit = document.get("columns"), document.get("search_limit", SEARCH_LIMIT)
     if not isinstance(columns, dict) or not is_number(limit) or not 0.0 < limit < 1.0:
         raise InputError(f"{path}: it needs [columns], and a search_limit as k_r/PGA from 0 to 1")

@@ -74,7 +74,7 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
     if suffix not in (".toml", ".csv"):
         raise InputError(f"{source}: a block file ends in .toml or .csv, not {suffix!r}")
     text = source_text(source, "a block file", _LARGEST_BYTES)
-    stated = _from_toml(source, text) if suffix == ".toml" else _from_csv(source, text)
+    stated = toml_document(text, source) if suffix == ".toml" else _from_csv(source, text)
     if gamma_deg is not None:
         if "gamma_deg" in stated:
             raise InputError(
@@ -112,13 +112,6 @@ def _block(stated: dict[str, Any]) -> Block:
     forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
     given = ", ".join(sorted(keys)) or "none of them"
     raise InputError(f"a block is given by exactly {forms}; the file states {given}")
-
-
-def _from_toml(source: Path, text: str) -> dict[str, Any]:
-    try:
-        return toml_document(text)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:

@@ -41,7 +41,8 @@ export function blockTable(present) {
     } catch (error) {
       const said = [Refusal, Unreachable, RangeError].some((kind) => error instanceof kind);
       if (!said) throw error;
-      byId("table-error").textContent = inLabels(/** @type {Error} */ (error).message);
+      const words = /** @type {Error} */ (error).message; // our own name the table's columns
+      byId("table-error").textContent = error instanceof RangeError ? words : inLabels(words);
     }
   }
 }
