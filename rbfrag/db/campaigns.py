@@ -230,14 +230,19 @@ def _insert_points(
     points: Mapping[str, SearchPoints],
     grids: Mapping[str, SearchPoints],
 ) -> None:
-    rows: list[tuple[object, ...]] = []
+    # a search may come back to a point, and the grid may meet one: the first row of each strength
+    met: dict[tuple[object, ...], tuple[object, ...]] = {}
+    numbered: dict[tuple[object, ...], tuple[object, ...]] = {}
     for key, blocks in points.items():
-        rows += _point_rows(known[key].id, blocks, repeat(None))
-    insert_rows(connection, simulation, POINT_COLUMNS, rows)
-    rows = []
+        for row in _point_rows(known[key].id, blocks, repeat(None)):
+            met.setdefault(row[:2], row)
     for key, blocks in grids.items():
-        rows += _point_rows(known[key].id, blocks, count())
-    insert_rows(connection, simulation, POINT_COLUMNS, rows, on_conflict=GRID_MEETS_POINT)
+        for row in _point_rows(known[key].id, blocks, count()):
+            numbered.setdefault(row[:2], row)
+    others = [row for place, row in met.items() if place not in numbered]
+    insert_rows(connection, simulation, POINT_COLUMNS, others)
+    meeting = GRID_MEETS_POINT
+    insert_rows(connection, simulation, POINT_COLUMNS, [*numbered.values()], on_conflict=meeting)
 
 
 def _insert_intervals(

@@ -20,6 +20,7 @@ from sqlalchemy import (
     make_url,
 )
 
+from rbfrag.db.ledger import keep_ledger
 from rbfrag.db.sqlite_file import LONGEST_WAIT_S, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import (
     DatabaseBusyError,
@@ -71,6 +72,7 @@ def unchecked_engine(
     else:
         engine = _server_engine(url, read_only)
     event.listen(engine, "handle_error", _raise_explained)
+    keep_ledger(engine)
     return engine
 
 

@@ -54,9 +54,10 @@ def open_database(
         # A transaction, so that what cannot be written is found out now and not after hours.
         with engine.begin() as connection:
             if isinstance(place, Path):
-                check_sqlite_database(raw_sqlite(connection), place)
+                check_sqlite_database(raw_sqlite(connection), place, read_only=read_only)
             else:
-                _check_server_database(connection, database_label(engine.url))
+                label = database_label(engine.url)
+                _check_server_database(connection, label, read_only=read_only)
     except BaseException:
         engine.dispose()
         raise
@@ -75,15 +76,20 @@ def opened_database(
         engine.dispose()
 
 
-def _check_server_database(connection: Connection, label: str) -> None:
+def _check_server_database(connection: Connection, label: str, *, read_only: bool) -> None:
+    revision = stated_revision(connection)
+    if revision is None:
+        raise NotADatabaseError(
+            f"{label} holds no rbfrag tables yet: add motions to it, by rbfrag motions add"
+        )
+    check_revision(revision, label, read_only=read_only)
+
+
+def stated_revision(connection: Connection) -> str | None:
+    """Return the schema revision that a database states."""
     revisions = (
         connection.scalars(text(f"SELECT version_num FROM {VERSION_TABLE}")).all()
         if inspect(connection).has_table(VERSION_TABLE)
         else ()
     )
-    revision = sole_revision([*map(str, revisions)], label)
-    if revision is None:
-        raise NotADatabaseError(
-            f"{label} holds no rbfrag tables yet: add motions to it, by rbfrag motions add"
-        )
-    check_revision(revision, label)
+    return sole_revision([*map(str, revisions)], database_label(connection.engine.url))

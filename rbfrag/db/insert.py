@@ -1,4 +1,5 @@
-"""The one place that writes rows: inserts that may be repeated, updates, and their digests."""
+"""The one place that writes rows: inserts that may be repeated, updates, deletions, their digests
+and what the ledger counts of them."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ from sqlalchemy import (
     Select,
     Table,
     bindparam,
+    delete,
     insert,
     select,
     tuple_,
@@ -25,8 +27,11 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 
 from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
+from rbfrag.db.ledger import tally
 from rbfrag.errors import DatabaseError
 
+# psycopg forgets the count when the cursor closes, unless it is asked to keep it
+_COUNTED = {"preserve_rowcount": True}
 _KEYS_AT_ONCE = 500
 _ROWS_AT_ONCE = 5_000
 
@@ -38,16 +43,20 @@ def insert_if_new(connection: Connection, table: Table, values: Mapping[str, obj
         True when the row was inserted.
     """
     build = postgresql.insert if connection.dialect.name == "postgresql" else sqlite.insert
-    # psycopg forgets the count when the cursor closes, unless it is asked to keep it.
-    statement = build(table).values(**_digested(table, values)).on_conflict_do_nothing().inline()
-    done = connection.execute(statement, execution_options={"preserve_rowcount": True})
+    row = _digested(table, values)
+    statement = build(table).values(**row).on_conflict_do_nothing().inline()
+    done = connection.execute(statement, execution_options=_COUNTED)
+    if done.rowcount == 1:
+        _tally_one(connection, table, row)
     return done.rowcount == 1
 
 
 def insert_row(connection: Connection, table: Table, values: Mapping[str, object]) -> int:
     """Insert one row and return its id."""
-    done = connection.execute(insert(table).values(**_digested(table, values)))
+    row = _digested(table, values)
+    done = connection.execute(insert(table).values(**row))
     assert done.inserted_primary_key is not None
+    _tally_one(connection, table, row)
     return int(done.inserted_primary_key[0])
 
 
@@ -68,7 +77,7 @@ def insert_rows(
         columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
             scalars are not understood by every driver.
-        on_conflict: SQL that says what becomes of a row whose key is there.
+        on_conflict: SQL that says what becomes of a row whose primary key is there.
     """
     if not rows:
         return
@@ -77,11 +86,46 @@ def insert_rows(
         raise ValueError(f"table {table.name} has no column {unknown[0]!r}")
     digests = table_digests(table, columns, rows)
     mark = "?" if connection.dialect.paramstyle == "qmark" else "%s"
-    connection.exec_driver_sql(
+    statement = (
         f"INSERT INTO {table.name} ({', '.join(columns)}, digest) "
-        f"VALUES ({', '.join(mark for _ in columns)}, {mark}) ON CONFLICT {on_conflict}",
-        [(*row, digest) for row, digest in zip(rows, digests, strict=True)],
+        f"VALUES ({', '.join(mark for _ in columns)}, {mark}) ON CONFLICT "
     )
+    values = [(*row, digest) for row, digest in zip(rows, digests, strict=True)]
+    connection.exec_driver_sql("SAVEPOINT many")
+    done = connection.exec_driver_sql(f"{statement} DO NOTHING", values, execution_options=_COUNTED)
+    if done.rowcount == len(rows):
+        tally(connection, table, columns, rows, digests)
+    else:  # some key was there: only one by one it shows which
+        connection.exec_driver_sql("ROLLBACK TO SAVEPOINT many")
+        for row in values:
+            _insert_one(connection, table, (*columns, "digest"), row, f"{statement} {on_conflict}")
+    connection.exec_driver_sql("RELEASE SAVEPOINT many")
+
+
+def _insert_one(
+    connection: Connection,
+    table: Table,
+    columns: Sequence[str],
+    row: tuple[object, ...],
+    statement: str,
+) -> None:
+    """Insert a row by a statement that may change the one of its key instead."""
+    named = dict(zip(columns, row, strict=True))
+    before = None
+    if "DO UPDATE" in statement:
+        key = [column == named[column.name] for column in table.primary_key.columns]
+        before = connection.scalar(select(table.c.digest).where(*key).with_for_update())
+    done = connection.exec_driver_sql(statement, row, execution_options=_COUNTED)
+    if done.rowcount:
+        _tally_one(connection, table, named)
+        if before is not None:
+            _tally_one(connection, table, {**named, "digest": before}, sign=-1)
+
+
+def _tally_one(
+    connection: Connection, table: Table, row: Mapping[str, Any], *, sign: int = 1
+) -> None:
+    tally(connection, table, [*row], [[*row.values()]], [row["digest"]], sign=sign)
 
 
 def update_rows(
@@ -100,6 +144,15 @@ def update_rows(
             .where(*(column == row[column.name] for column in table.primary_key.columns))
             .values(**values, digest=changed["digest"])
         )
+        _tally_one(connection, table, {**row}, sign=-1)
+        _tally_one(connection, table, changed)
+
+
+def delete_rows(connection: Connection, table: Table, *where: ColumnElement[bool]) -> None:
+    """Delete the rows that meet all conditions."""
+    for row in connection.execute(select(table).where(*where).with_for_update()).mappings():
+        _tally_one(connection, table, {**row}, sign=-1)
+    connection.execute(delete(table).where(*where))
 
 
 def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:
@@ -185,15 +238,19 @@ def renew_digests(connection: Connection, table: Table, before: Table | None = N
             had = [tuple(row._mapping[name] for name in before.c.keys()) for row in rows]  # noqa: SIM118
             then = table_digests(before, before.c.keys(), had)
             sound = [row.digest == digest for row, digest in zip(rows, then, strict=True)]
-        changes = [
-            {"anew": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
-            for row, digest, kept in zip(
-                rows, table_digests(table, columns, values), sound, strict=True
-            )
-            if kept
+        anew = table_digests(table, columns, values)
+        kept = [
+            pair for pair, each in zip(zip(rows, anew, strict=True), sound, strict=True) if each
         ]
-        if changes:
+        if kept:
+            changes = [
+                {"anew": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
+                for row, digest in kept
+            ]
             connection.execute(change, changes)
+            changed, digests = zip(*kept, strict=True)
+            tally(connection, table, columns, changed, [row.digest for row in changed], sign=-1)
+            tally(connection, table, columns, changed, digests)
         last = [rows[-1]._mapping[key.name] for key in keys]
         rows = connection.execute(query.where(tuple_(*keys) > tuple_(*last))).all()
 

@@ -19,11 +19,14 @@ DEFAULT_NAME = "rbfrag.db"
 REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
 """The database that is shipped with rbfrag, read-only and without samples, if there is one."""
 
-REVISIONS = ("0007", "0008")
+REVISIONS = ("0007", "0008", "0009")
 """Every schema revision this rbfrag knows, oldest first."""
 
 SCHEMA_REVISION = REVISIONS[-1]
 """The revision that this rbfrag works with."""
+
+READABLE = ("0008", SCHEMA_REVISION)
+"""Revisions that are read as they are: 0009 only adds the ledger, which readers do without."""
 
 VERSION_TABLE = "rbfrag_revision"
 """Alembic's version table; its own name, so that a PostgreSQL schema may be shared."""
@@ -99,14 +102,15 @@ def sole_revision(revisions: Sequence[str], where: str) -> str | None:
     return revisions[0] if revisions else None
 
 
-def check_revision(revision: str, where: str) -> None:
+def check_revision(revision: str, where: str, *, read_only: bool = False) -> None:
     """Refuse a database whose schema this rbfrag does not work with.
 
     Args:
         revision: the revision stored in the database.
         where: the database as the user names it, for the message.
+        read_only: whether it is only read.
     """
-    if revision == SCHEMA_REVISION:
+    if revision == SCHEMA_REVISION or (read_only and revision in READABLE):
         return
     if revision in REVISIONS:
         raise SchemaVersionError(

@@ -279,7 +279,7 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
     """
     file = Path(path)
     with closing(connect_sqlite(file, read_only=True)) as connection:
-        check_sqlite_database(connection, file)
+        check_sqlite_database(connection, file, read_only=True)
         try:
             rows = [decode_model(row) for row in connection.execute(_SELECT)]
         except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import Connection, Select, and_, delete, select
+from sqlalchemy import Connection, Select, and_, select
 
 from rbfrag.db.connect import database_label
-from rbfrag.db.insert import insert_row, update_rows, utc_now
+from rbfrag.db.insert import delete_rows, insert_row, update_rows, utc_now
 from rbfrag.db.model_file import (
     STORED,
     ModelRow,
@@ -47,7 +47,7 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
         )
     values["is_default"] = row.is_default or chosen.get(row.name, False)
     # first of all: a damaged model may be replaced, but not changed
-    connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
+    delete_rows(connection, fragility_model, fragility_model.c.name == row.name)
     if values["is_default"]:
         _clear_default(connection, row.kind)
     insert_row(connection, fragility_model, values)

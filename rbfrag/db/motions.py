@@ -11,10 +11,10 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, RowMapping, Select, and_, case, delete, exists, or_, select
+from sqlalchemy import Connection, RowMapping, Select, and_, case, exists, or_, select
 
 from rbfrag.db import schema
-from rbfrag.db.insert import insert_if_new, storable, update_rows, utc_now
+from rbfrag.db.insert import delete_rows, insert_if_new, storable, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.schema import earthquake, suite, suite_motion
@@ -325,9 +325,9 @@ def delete_orphans(connection: Connection, recording_id: int) -> None:
         select(recording.c.earthquake_id).where(recording.c.id == recording_id)
     )
     used = exists().where(schema.motion.c.recording_id == recording.c.id)
-    connection.execute(delete(recording).where(recording.c.id == recording_id, ~used))
+    delete_rows(connection, recording, recording.c.id == recording_id, ~used)
     used = exists().where(recording.c.earthquake_id == event.c.id)
-    connection.execute(delete(event).where(event.c.id == event_id, event.c.guessed, ~used))
+    delete_rows(connection, event, event.c.id == event_id, event.c.guessed, ~used)
 
 
 def _refuse_contradiction(

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case, func, select
 
-from rbfrag.db.location import SCHEMA_REVISION
+from rbfrag.db.engine import stated_revision
+from rbfrag.db.ledger import last_sound
 from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
 from rbfrag.db.rows import IMPORTED, SPECTRAL_COLUMNS, CombinationTable, Vertical
@@ -39,6 +40,7 @@ class DatabaseInfo:
         numerics_versions: versions of the solver that made its combinations.
         default_model: name of the model of toppling that answers when none is named; None
             without one, or where a model is damaged.
+        last_sound: when ``rbfrag db check`` last found nothing, UTC; None for never.
     """
 
     revision: str
@@ -47,6 +49,7 @@ class DatabaseInfo:
     combinations_by_status: dict[str, int]
     numerics_versions: tuple[str, ...]
     default_model: str | None
+    last_sound: str | None
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
     except (DatabaseError, UnknownModelError):  # none, or one that is damaged
         default_model = None
     return DatabaseInfo(
-        revision=SCHEMA_REVISION,  # opening refuses any other
+        revision=stated_revision(connection) or "",
         dialect=connection.dialect.name,
         rows={
             name: int(connection.scalar(select(func.count()).select_from(table)) or 0)
@@ -251,6 +254,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
         },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
         default_model=default_model,
+        last_sound=last_sound(connection),
     )
 
 

@@ -561,6 +561,24 @@ fragility_model = _table(
     ),
 )
 
+# apart from the others: it is of no content, and databases of schema 0008 have none
+ledger = Table(
+    "ledger",
+    MetaData(naming_convention=metadata.naming_convention),
+    _column("of_table", Text, "the table that is counted", primary_key=True),
+    _column(
+        "campaign", Integer, "id of the campaign that the rows belong to; 0 for none",
+        primary_key=True, autoincrement=False,
+    ),
+    _column("row_count", BigInteger, "number of rows that rbfrag wrote"),
+    _column("digests", BigInteger, "their digests, joined by exclusive or"),
+    _optional("found_sound", Text, "when rbfrag db check last found nothing, UTC; may be missing"),
+    info={
+        "meaning": "How many rows of each table and campaign rbfrag wrote: by it rbfrag db check "
+        "finds rows that another program deleted or added."
+    },
+)  # fmt: skip
+
 vertical = motion.alias("vertical")
 """The vertical motion of a combination or response, where it has one."""
 

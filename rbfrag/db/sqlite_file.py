@@ -130,7 +130,7 @@ def _refuse_unreadable_log(path: Path) -> None:
         )
 
 
-def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
+def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_only: bool) -> None:
     """Check from inside that an SQLite file is an rbfrag database of this schema."""
     try:
         (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -154,7 +154,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
         raise NotADatabaseError(
             f"{path} is marked as rbfrag's but holds no schema: restore it from a copy"
         )
-    check_revision(revision, str(path))
+    check_revision(revision, str(path), read_only=read_only)
 
 
 def explained_sqlite_error(

@@ -27,7 +27,7 @@ from rbfrag.db.location import (
     locate,
     sole_revision,
 )
-from rbfrag.db.schema import metadata
+from rbfrag.db.schema import ledger, metadata
 from rbfrag.db.sqlite_file import explained_sqlite_error
 from rbfrag.errors import (
     DatabaseError,
@@ -81,6 +81,7 @@ def migrate(engine: Engine) -> None:
         config.attributes["connection"] = connection
         if _revision_of_ours(connection) is None:
             metadata.create_all(connection, checkfirst=False)
+            ledger.create(connection)
             command.stamp(config, "head", purge=True)
         else:
             command.upgrade(config, "head")

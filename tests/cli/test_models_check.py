@@ -13,13 +13,16 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.schema import fragility_model
+from rbfrag.db.upgrade import upgrade_database
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import write_suite
 
 
 @pytest.fixture
 def database(tmp_path: Path) -> Path:
-    return Path(shutil.copy(REFERENCE, tmp_path / "rbfrag.db"))
+    copy = Path(shutil.copy(REFERENCE, tmp_path / "rbfrag.db"))
+    upgrade_database(copy)
+    return copy
 
 
 def change(database: Path, statement: str) -> None:

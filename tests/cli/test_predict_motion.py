@@ -49,6 +49,7 @@ def test_the_shell_has_the_bits_of_python(shell: Shell, record: Path) -> None:
 
 def test_a_stored_record_by_its_number(shell: Shell, record: Path, tmp_path: Path) -> None:
     shutil.copy(REFERENCE, tmp_path / "rbfrag.db")
+    shell("db", "upgrade")
     shell("motions", "add", record, "--raw")
     number = max(row["id"] for row in shell.json("motions", "list"))
     stored = shell.json("predict", *BLOCK, "--motion", number)

@@ -124,6 +124,7 @@ class TestCheck:
         assert problems == {
             "points to a row of motion that is not there",
             "points to a row of suite that is not there",
+            "rows were added by another program: 0 were written, 1 are there",
         }
 
 
@@ -361,4 +362,4 @@ def test_rows_are_looked_at_in_any_number(filled: Engine, monkeypatch: Any) -> N
         connection.execute(update(schema.combination).values(settings="{"))
         connection.execute(delete(schema.simulation))
         findings = _checked(connection)
-    assert len({finding.row for finding in findings}) == 6
+    assert len({finding.row for finding in findings if finding.table == "combination"}) == 6

@@ -20,6 +20,7 @@ from rbfrag.db.check.maps import contradictions
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_if_new, insert_row, renew_digests, update_rows
 from rbfrag.db.keys import response_key
+from rbfrag.db.ledger import renew_ledger
 from rbfrag.db.merge.databases import MergeReport, merge_databases
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, model_rows, save_model
@@ -68,6 +69,7 @@ def _change(engine: Engine, *statements: Any) -> None:
             connection.execute(statement)
         for table in schema.metadata.tables.values():
             renew_digests(connection, table)  # of what is said now
+        renew_ledger(connection)
 
 
 class TestTogether:

@@ -18,6 +18,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.merge.databases import MergeReport
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import IMPORTED
+from rbfrag.db.upgrade import upgrade_database
 from rbfrag.errors import InputError, MergeConflictError
 from rbfrag.exchange.tables.critical_values import NEEDED, import_critical_values
 from rbfrag.fragility.fit.data import FitSource
@@ -136,7 +137,7 @@ def test_nothing_is_there_twice(bring: Callable[..., MergeReport]) -> None:
 def test_fits_read_own_results_before_imported_ones(
     bring: Callable[..., MergeReport], tmp_path: Path
 ) -> None:
-    shutil.copy(REFERENCE, tmp_path / "ours.db")
+    upgrade_database(shutil.copy(REFERENCE, tmp_path / "ours.db"))
     bring()
     with (
         opened_database(tmp_path / "ours.db", read_only=True) as engine,

@@ -84,6 +84,7 @@ def _print_info(content: DatabaseInfo, *, json: bool) -> None:
             "dialect": content.dialect,
             "numerics": content.numerics_versions,
             "default model": content.default_model,
+            "last found sound": content.last_sound or "never checked",
         }
     )
     print()
@@ -113,15 +114,21 @@ def check(
         "Combinations to compute again, chosen at random; 0 leaves this out.", 20, min=0
     ),
     seed: int = option("Seed of the random choice.", 0),
+    accept: bool = option(
+        "Take the rows that are there for those that were written, once a loss is known.", False
+    ),
     json: options.Json = False,
 ) -> None:
     """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
     computed again. Exit 1 if any is found."""
     from rbfrag.db.check.damage import Damage
     from rbfrag.db.check.database import check_database, coverage
+    from rbfrag.db.check.ledger import accept_rows, mark_sound
     from rbfrag.db.engine import opened_database
+    from rbfrag.db.insert import utc_now
 
-    again = None
+    begun, again = utc_now(), None
+    accepted = accept_rows(db) if accept else []
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         findings = check_database(connection)
         covered = coverage(connection)
@@ -138,6 +145,8 @@ def check(
                 # what a damaged row can raise there, nobody can list; the row is found already
                 why = f"{type(error).__name__}: {error}"
                 findings.append(Damage("database", "-", f"computing again broke off ({why})"))
+    if not findings:
+        mark_sound(db, begun)
     if json:
         computed = None if again is None else asdict(again)
         if computed is not None:
@@ -146,6 +155,7 @@ def check(
             {
                 "sound": not findings,
                 "findings": [asdict(finding) for finding in findings],
+                "accepted": [asdict(each) for each in accepted],
                 "resimulated": computed,
                 "covered": covered,
             }
@@ -156,6 +166,8 @@ def check(
                 f"computed again: {again.sampled} of {again.eligible} combinations, "
                 f"{again.exact} exact, {again.within_error} within the solver's error"
             )
+        for each in accepted:
+            print(f"accepted: {each.table} {each.row}: {each.problem}")
         if findings:
             print_table(
                 ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]

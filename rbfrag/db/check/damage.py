@@ -9,6 +9,7 @@ COMPUTE_AGAIN = (
     "restore the database from a copy, or add the motions to a new database and run  "
     "rbfrag simulate  there"
 )
+ACCEPT = "restore the database from a copy, or take it as known, by rbfrag db check with accept"
 FIT_AGAIN = "fit it again in its place, by rbfrag fit"
 
 

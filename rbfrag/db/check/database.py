@@ -24,8 +24,10 @@ from sqlalchemy.sql.elements import ColumnElement
 from rbfrag.db.check.combinations import check_combinations
 from rbfrag.db.check.damage import FIT_AGAIN, RESTORE, Damage
 from rbfrag.db.check.inputs import check_responses, check_shock_pairs
+from rbfrag.db.check.ledger import check_ledger
 from rbfrag.db.check.motions import check_motions, check_spectra
 from rbfrag.db.insert import table_digests
+from rbfrag.db.ledger import has_ledger
 from rbfrag.db.model_file import STORED, decode_model
 from rbfrag.db.schema import earthquake, fragility_model, metadata, motion, recording
 from rbfrag.errors import DatabaseError, RbfragError
@@ -45,6 +47,12 @@ _STORAGE: Mapping[type, tuple[str, ...]] = {
 }
 """What SQLite may hold in a column of each type; it takes anything anywhere."""
 
+_OF_ROWS = {
+    True: "rows deleted, added, or altered with their digest by another program, by the ledger",
+    False: "not covered, for this database is of before the ledger: whole rows that were deleted, "
+    "and values altered together with their digest; rbfrag db upgrade adds the ledger",
+}
+
 ALTERED = "its values are not those that were written: its digest differs"
 
 
@@ -54,8 +62,8 @@ def check_database(connection: Connection) -> list[Damage]:
     Looks at the file itself (SQLite), references, the samples against their sha256 and their
     intensity measures, toppling spectra, keys against what they are hashes of, brackets,
     y = kr·g/p, the map of intervals, simulations against both, histories, rows that nothing
-    refers to, the digest of each row, numbers that are not finite, and the models. Makes no
-    simulation.
+    refers to, the digest of each row, rows deleted or added by other programs, numbers that are
+    not finite, and the models. Makes no simulation.
     """
     findings: list[Damage] = []
     of_sqlite = (_check_sqlite_file, _check_types) if connection.dialect.name == "sqlite" else ()
@@ -81,7 +89,7 @@ def coverage(connection: Connection) -> str:
         f"covered: {rows} rows of {len(metadata.tables)} tables, each column but "
         f"{', '.join(NOT_COVERED)} by the digest of its row; samples and measures of "
         f"{connection.scalar(samples)} motions; spectra, keys, brackets, maps, histories, models; "
-        "not covered: whole rows that were deleted, and values altered together with their digest"
+        f"{_OF_ROWS[has_ledger(connection)]}"
     )
 
 
@@ -178,4 +186,5 @@ _LOOKS = (
     check_responses,
     check_shock_pairs,
     _check_models,
+    check_ledger,
 )

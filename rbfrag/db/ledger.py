@@ -1,0 +1,148 @@
+"""The ledger: how many rows of each table rbfrag wrote, and the XOR of their digests.
+
+A row that another program deletes or adds leaves no trace in the other rows; the ledger tells of
+it. It is kept in memory and written by one statement when the transaction commits.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from functools import reduce
+from itertools import groupby, repeat
+from operator import itemgetter, xor
+
+from sqlalchemy import Connection, Engine, Table, delete, event, func, inspect, select, update
+
+from rbfrag.db.schema import combination, ledger, metadata
+
+Tallies = dict[tuple[str, int], tuple[int, int]]
+"""Number of rows and XOR of their digests, by table and campaign; 0 for rows of no campaign."""
+
+_OWNERS = ("campaign_id", "combination_id")
+"""What says whose a row is: a campaign, or a combination, which is of one."""
+_KEPT = "rbfrag_ledger"
+_IDS_AT_ONCE = 500
+_WRITE = (
+    "INSERT INTO ledger (of_table, campaign, row_count, digests) VALUES ({0}, {0}, {0}, {0}) "
+    "ON CONFLICT (of_table, campaign) DO UPDATE SET "
+    "row_count = ledger.row_count + excluded.row_count, digests = "
+    # XOR, for which SQLite and PostgreSQL have no sign in common
+    "(ledger.digests | excluded.digests) - (ledger.digests & excluded.digests)"
+)
+
+
+def keep_ledger(engine: Engine) -> None:
+    """Have each transaction of an engine write the rows that :func:`tally` was told of."""
+    event.listen(engine, "begin", _forget)
+    event.listen(engine, "commit", _write)
+
+
+def tally(
+    connection: Connection,
+    table: Table,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    digests: Sequence[int],
+    *,
+    sign: int = 1,
+) -> None:
+    """Note rows that the open transaction inserts or deletes.
+
+    Args:
+        columns: names of the columns of `rows`.
+        sign: 1 for rows that come, -1 for rows that go.
+    """
+    owner = next((name for name in _OWNERS if name in table.c), "")
+    owners = map(itemgetter(columns.index(owner)), rows) if owner else repeat(0)
+    kept = connection.info.setdefault(_KEPT, {})
+    for of, group in groupby(zip(owners, digests, strict=False), itemgetter(0)):
+        values = [digest for _, digest in group]
+        number, together = kept.get((table.name, owner, of), (0, 0))
+        kept[table.name, owner, of] = number + sign * len(values), reduce(xor, values, together)
+
+
+def has_ledger(connection: Connection) -> bool:
+    """Return whether a database has a ledger: one of schema 0008 and before has none."""
+    return inspect(connection).has_table(ledger.name)
+
+
+def written_tallies(connection: Connection) -> Tallies:
+    """Return what the ledger says, the open transaction included."""
+    _write(connection)
+    rows = connection.execute(select(ledger))
+    return {(row.of_table, row.campaign): (row.row_count, row.digests) for row in rows}
+
+
+def stored_tallies(connection: Connection) -> Tallies:
+    """Return what the tables hold."""
+    return {
+        (name, campaign): (len(digests), reduce(xor, digests, 0))
+        for name, table in sorted(metadata.tables.items())
+        for campaign, digests in _digests_by_campaign(connection, table).items()
+    }
+
+
+def renew_ledger(connection: Connection) -> None:
+    """Take the rows that are there for the rows that were written."""
+    _forget(connection)
+    connection.execute(delete(ledger))
+    _insert(connection, stored_tallies(connection))
+
+
+def note_sound(connection: Connection, time: str) -> None:
+    """Note that :func:`rbfrag.db.check.database.check_database` found nothing at that time."""
+    connection.execute(update(ledger).values(found_sound=time))
+
+
+def last_sound(connection: Connection) -> str | None:
+    """Return when a check last found nothing; None for never, or without a ledger."""
+    if not has_ledger(connection):
+        return None
+    time: str | None = connection.scalar(select(func.max(ledger.c.found_sound)))
+    return time
+
+
+def _digests_by_campaign(connection: Connection, table: Table) -> dict[int, list[int]]:
+    query = select(table.c.digest)
+    if "campaign_id" in table.c:
+        query = query.add_columns(table.c.campaign_id)
+    elif "combination_id" in table.c:
+        query = query.add_columns(combination.c.campaign_id).join(combination)
+    by_campaign: dict[int, list[int]] = defaultdict(list)
+    for digest, *campaign in connection.execute(query, execution_options={"yield_per": 10_000}):
+        # SQLite holds anything anywhere; what is no digest is found by the check of digests
+        whose = campaign[0] if campaign else 0
+        by_campaign[whose].append(digest if isinstance(digest, int) else 0)
+    return by_campaign
+
+
+def _forget(connection: Connection) -> None:
+    connection.info.pop(_KEPT, None)
+
+
+def _write(connection: Connection) -> None:
+    kept = connection.info.pop(_KEPT, {})
+    of_points = sorted({of for _, owner, of in kept if owner == "combination_id"})
+    campaigns = dict(_campaigns(connection, of_points))
+    sums: Tallies = {}
+    for (name, owner, of), (number, digests) in kept.items():
+        key = name, campaigns[of] if owner == "combination_id" else of
+        before = sums.get(key, (0, 0))
+        sums[key] = before[0] + number, before[1] ^ digests
+    _insert(connection, sums)
+
+
+def _campaigns(connection: Connection, ids: Sequence[int]) -> Iterator[tuple[int, int]]:
+    for start in range(0, len(ids), _IDS_AT_ONCE):
+        some = ", ".join(map(str, ids[start : start + _IDS_AT_ONCE]))
+        query = f"SELECT id, campaign_id FROM combination WHERE id IN ({some})"
+        yield from ((row[0], row[1]) for row in connection.exec_driver_sql(query))
+
+
+def _insert(connection: Connection, tallies: Tallies) -> None:
+    # in one order, so that two transactions wait for each other and never both at once
+    rows: Iterable[tuple[object, ...]] = sorted((*key, *sums) for key, sums in tallies.items())
+    if rows:
+        mark = "?" if connection.dialect.paramstyle == "qmark" else "%s"
+        connection.exec_driver_sql(_WRITE.format(mark), [*rows])
