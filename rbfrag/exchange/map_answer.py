@@ -15,6 +15,7 @@ from rbfrag.exchange.block_rows import PLACE, Blocks
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
+from rbfrag.fragility.words import row_in_words
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
@@ -24,6 +25,7 @@ from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.question.words import numbers_in_words
+from rbfrag.solver.kinds import by_model
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -208,6 +210,7 @@ def shakemap(
             "event": event.description,
             "magnitude": event.magnitude,
             "time": event.time,
+            "how": by_model(chosen.name),
             "model": chosen.name,
             "term": chosen.term.name,
             "method": chosen.row.method,
@@ -218,7 +221,7 @@ def shakemap(
             "seed": seed,
         },
         warnings=tuple(warnings),
-        title=f"{name}\n{_what(table, own)}; model {chosen.name}"
+        title=f"{name}\n{_what(table, own)}; model {row_in_words(chosen.row)}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
         shape=(shaken.rows, shaken.columns)

@@ -16,7 +16,7 @@ from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
-from rbfrag.solver.kinds import mode_of_kind
+from rbfrag.solver.kinds import by_model, mode_of_kind
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -313,7 +313,7 @@ def single(name: str, value: object) -> float:
 def _answer_single(
     model: FragilityModel, given: dict[str, float], quantiles: Quantiles
 ) -> Prediction:
-    method, warnings, how = model.method, model.notes, f"model {model.name}"
+    method, warnings, how = model.method, model.notes, by_model(model.name)
     try:
         values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
         clear = not model.uncertain and is_clear(model, values)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rbfrag.db.model_file import ModelRow
 
 
 def percent(share: float) -> str:
@@ -149,6 +152,11 @@ def model_in_words(document: Mapping[str, Any]) -> str:
     own = "" if method.forms[term.name].rank == 0 else method.name
     sized = "size-dependent" if "block's" in term.title else ""
     return ", ".join(filter(None, (*read, sized, kind, own)))
+
+
+def row_in_words(row: ModelRow) -> str:
+    """Return what people call a stored model."""
+    return model_in_words({"model": row.name, "term": row.term, "method": row.method})
 
 
 _MEASURES = {

@@ -40,7 +40,7 @@ from rbfrag.hazards.uncertainty import (
     rate_interval,
     share_interval,
 )
-from rbfrag.solver.kinds import mode_of_kind
+from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
 
 Run = Callable[[Iterator[SomeYears], int, EventYears], Iterator[PartCounts]]
@@ -237,6 +237,7 @@ class LossAnswer(Tabular):
             for name, values in zip((DEPENDENT, INDEPENDENT), self.bounds, strict=True)
         }
         duration = events.duration
+        names = ", ".join(row.name for row in self.portfolio.models)
         losses = self._exceedance("loss_exceedance", "loss", self.loss_exceedance)
         return {
             "events": int(events.event_id.size),
@@ -254,7 +255,8 @@ class LossAnswer(Tabular):
             "samples": self.samples or None,
             "seed": self.seed if self.samples else None,
             "level": self.level,
-            "model": ", ".join(row.name for row in self.portfolio.models),
+            "how": by_model(names),
+            "model": names,
             "term": ", ".join(dict.fromkeys(row.term for row in self.portfolio.models)),
             "kind": ", ".join(dict.fromkeys(row.kind for row in self.portfolio.models)),
             "measures": list(self.portfolio.measures),

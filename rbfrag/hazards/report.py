@@ -11,6 +11,7 @@ import numpy as np
 from rbfrag.fragility.words import percent
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.solver.kinds import by_model
 from rbfrag.solver.results import FloatArray
 
 
@@ -44,6 +45,7 @@ def as_dict(
     shared = {
         "years": answer.years,
         "level": answer.level,
+        "how": by_model(answer.model),
         "model": answer.model,
         "term": answer.term,
         "method": answer.method,

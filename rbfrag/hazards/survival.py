@@ -28,7 +28,7 @@ from rbfrag.hazards.standing_blocks import (
 )
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
-from rbfrag.solver.kinds import mode_of_kind
+from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
 
 DRAWS = 128
@@ -134,6 +134,7 @@ class SurvivalAnswer(Tabular):
             **{name: value for name, value in vars(self).items() if name != "standing"},
             "factor_5_percent_ci": list(self.factor_5_percent_ci),
             "factor_50_percent_ci": list(self.factor_50_percent_ci),
+            "how": "fragility of the caller's" if self.model is None else by_model(self.model),
             "branches": [branch.as_dict() for branch in self.branches],
             "site": self.site or None,
             "warnings": list(self.warnings),

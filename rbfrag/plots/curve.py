@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.words import at_sites
+from rbfrag.fragility.words import at_sites, row_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -141,7 +141,7 @@ def plot_curve(
     axes.set_title(
         "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
         + "\n"
-        + as_written(f"model {model.name}{counts}", 85),
+        + as_written(f"model {row_in_words(model.row)}{counts}", 85),
         fontsize=10,
     )
     legend_below(figure, 2)

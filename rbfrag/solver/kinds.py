@@ -124,3 +124,8 @@ NOT_BACKED = (
 
 BY_MECHANICS, FOLLOWED = "by mechanics", "followed in time"
 """How it is answered whether a block fails: without a run, and by one."""
+
+
+def by_model(names: str) -> str:
+    """Return how it is answered where models of these names answer."""
+    return f"model {names}"

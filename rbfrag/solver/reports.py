@@ -15,6 +15,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.kinds import FOLLOWED
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import CriticalResult, FloatArray, Part, Response, ResponseHistory
 
@@ -168,7 +169,7 @@ def critical_as_dict(
         answer = _sliding(result)
     else:
         answer = {name: getattr(result, name) for name in STRENGTH_VALUES}
-    answer |= {"polarity": result.polarity, "pga_g": result.pga_g}
+    answer |= {"polarity": result.polarity, "pga_g": result.pga_g, "how": FOLLOWED}
     answer["warnings"] = [*remarks, *result.warnings]
     if result.of_kind.get("scale") is not None:
         answer["warnings"].append(NOT_PROVEN)

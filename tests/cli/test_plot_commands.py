@@ -64,7 +64,7 @@ def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_pa
         ("--kind", "rocking", "--restitution", "0.9"), ("--restitution", "0.9"), ("--no-back",),
     ):  # fmt: skip
         done = shell("plot", "curve", *shape, *more)
-        assert "model rocking-pgv" in path.read_text(encoding="utf-8")
+        assert "model PGV, rocking" in path.read_text(encoding="utf-8")
         assert "no plane backs the block" not in done.stderr
     told = refuses("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
     assert "restitution does not go with kind toppling" in told
@@ -80,7 +80,7 @@ def test_curves_of_blocks_that_slide_and_slump(
     assert "slides too far" in path.read_text(encoding="utf-8")
     shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
           "--displacement", "0.1", "--pga", "0.5")  # fmt: skip
-    assert "model sliding-pgv_pga" in path.read_text(encoding="utf-8")
+    assert "model PGV, PGA, sliding" in path.read_text(encoding="utf-8")
     shell(*drawn, "--ks", "0.2", "--ps2", "3", "--pga", "0.5")
     assert "the block slumps" in path.read_text(encoding="utf-8")
     told = refuses(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")

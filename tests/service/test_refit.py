@@ -7,12 +7,14 @@ from fastapi import Request
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model, save_model
+from rbfrag.db.upgrade import upgrade_database
 from rbfrag.errors import DatabaseFailedError
 from rbfrag.service.problem import answer_error, in_parameters
 from rbfrag.service.settings import ServiceSettings
 
 
 def fitted_anew(database):
+    upgrade_database(database)
     with opened_database(database) as engine, engine.begin() as connection:
         row = load_model(connection, "wls-pgv")
         raised = {**row.coefficients, "c1": 1.1 * row.coefficients["c1"]}
