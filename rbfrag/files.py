@@ -10,7 +10,7 @@ import re
 import secrets
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -165,12 +165,23 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
     if _DOTTED.search(text):
         raise InputError(f"{named}not valid TOML for us: a key of more than 20 parts")
     try:
-        return tomllib.loads(text)
+        document = tomllib.loads(text)
+        _refuse_large([document])
     except RecursionError:
         raise InputError(f"{named}not valid TOML for us: tables nested too deeply") from None
     # beside its own error, the parser passes on that of an integer of thousands of digits
     except ValueError as error:
         raise InputError(f"{named}not valid TOML: {error}") from None
+    return document
+
+
+def _refuse_large(values: Iterable[object]) -> None:
+    """Refuse an integer that no float can hold, at any depth."""
+    for value in values:
+        if isinstance(value, dict | list):
+            _refuse_large(value.values() if isinstance(value, dict) else value)
+        elif isinstance(value, int) and not isinstance(value, bool) and not is_number(value):
+            raise ValueError("an integer of more than 308 digits")
 
 
 def json_document(text: str) -> Any:

@@ -175,7 +175,8 @@ def suited_curves(
     raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
 
 
-_SPECTRAL = re.compile(r"([0-9.]+) Second Spectral Acceleration", re.IGNORECASE)
+_DECIMAL = r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
+_SPECTRAL = re.compile(rf"{_DECIMAL} Second Spectral Acceleration", re.IGNORECASE)
 
 
 def nshm_curves(text: str, source: str) -> list[HazardCurve]:
@@ -342,8 +343,8 @@ _LEVELS = {
     "pgv_m_s": ("pgv_m_s", 1.0),
     "pgv_cm_s": ("pgv_m_s", 0.01),
 }
-_SPECTRAL_COLUMN = re.compile(r"sa\(([0-9.]+)\)_g")
-_POE = re.compile(r"poe_([0-9.]+)_years?")
+_SPECTRAL_COLUMN = re.compile(rf"sa\({_DECIMAL}\)_g")
+_POE = re.compile(rf"poe_{_DECIMAL}_years?")
 
 _UNIT = re.compile(r"\s*[(\[]([^()\[\]]+)[)\]]$")
 """A unit in brackets at the end of a column's name, as people write it: PGV [m/s]."""

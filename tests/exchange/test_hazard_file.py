@@ -113,6 +113,8 @@ def test_two_columns_as_people_write_them(
         ("", "is empty"),
         ("0.1,0.01\n0.2,0.001\n", "line 1: column '0.1' is not known"),
         ("pgv_m_s,probability\n0.1,0.01\n", "line 1: column 'probability' does not say"),
+        ("pgv_m_s,poe_1.._years\n0.1,0.01\n", "line 1: column 'poe_1.._years' does not say"),
+        ("sa(.)_g,annual_rate\n0.1,0.01\n", r"line 1: column 'sa\(\.\)_g' is not known"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.2\n", "line 3: 1 cells, not two"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.2,x\n", "line 3: '0.2,x' are not two numbers"),
         ("pgv_m_s,poe_50_years\n0.1,1.5\n", "line 2: 1.5 is no probability"),

@@ -105,6 +105,7 @@ def test_a_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
         ("a.toml", TOML + "s1_m = 3.0\n", ["exactly"]),
         ("a.toml", "beta_deg = 3.0\n", ["none of them"]),
         ("a.toml", TOML.replace("[1, 0]", '["1", 0]'), ["a.toml", "vertex 1", "'1'"]),
+        ("a.toml", TOML.replace("[1, 0]", f"[{10**400}, 0]"), ["a.toml", "308 digits"]),
         ("a.toml", TOML + "back_fracture = 1\n", ["back_fracture = 1"]),
         ("a.toml", "alpha1_deg = 10\nalpha3_deg = 'b'\nr3_m = 1\n", ["alpha3_deg = 'b'"]),
         ("a.txt", CSV, [".toml or .csv"]),
