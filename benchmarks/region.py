@@ -223,6 +223,7 @@ COUNTS = (1, 10)
 def of_sums() -> list[list[str]]:
     """Return standard errors of ln of sums and exceedances by shifts, and by draws."""
     events, portfolio = event_set(500, 12, 120)
+    event_losses(events, portfolio, samples=1)  # the first call loads and compiles
     start = time.process_time()
     answer = event_losses(events, portfolio, samples=100, level=0.6826894921370859)
     used = time.process_time() - start

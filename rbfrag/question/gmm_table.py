@@ -38,6 +38,8 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
     rows = [
         each for each in csv_rows(source_text(path, _WHAT), path) if any(map(str.strip, each[1]))
     ]
+    if not rows:
+        raise InputError(f"{path} is empty: name columns such as pgv_m_s and pgv_sigma")
     (_, header), *rest = rows
     wanted = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
     table = {}

@@ -154,7 +154,7 @@ def test_years_beyond_the_stated_time_are_warned_of(tmp_path: Path) -> None:
         ("realizations", "3.0000000e-01", "-0.3", r"line 4: the weight -0.3"),
         ("realizations", "1,A~A", "1e999,A~A", r"line 4: rlz_id is '1e999', not a whole number"),
         ("ruptures", "path=2", "path=0", r"line 1: .*path = .0. is not above zero"),
-        ("ruptures", "path=2", "path=2.5", r"ses_per_logic_tree_path = 2\.5 is no whole number"),
+        ("ruptures", "path=2", "path=2.5", r"rupt.*path = 2\.5 is no whole number"),
     ],
 )  # fmt: skip
 def test_refusals_name_the_line(

@@ -136,6 +136,9 @@ def test_a_table_of_another_model(tmp_path: Path) -> None:
         ask(gmm=path, rjb_km=21.0)
     with pytest.raises(InputError, match="no column pga_g"):
         ask(gmm=path, rjb_km=10.0, model="bounded-pgv_pga")
+    path.write_text(",\n")
+    with pytest.raises(InputError, match=r"gmm\.csv is empty"):
+        ask(gmm=path, rjb_km=10.0)
 
 
 @pytest.mark.parametrize(

@@ -325,7 +325,8 @@ def _duration(
         )
     sets = known["ses_per_logic_tree_path"]
     if not math.isfinite(sets) or sets != int(sets):
-        raise InputError(f"ses_per_logic_tree_path = {sets:g} is no whole number")
+        where = "" if ruptures is None or ses is not None else f"{ruptures.top}: "
+        raise InputError(f"{where}ses_per_logic_tree_path = {sets:g} is no whole number")
     return Duration(known["investigation_time"], int(sets))
 
 
