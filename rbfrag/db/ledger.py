@@ -22,7 +22,7 @@ Tallies = dict[tuple[str, int], tuple[int, int]]
 _OWNERS = ("campaign_id", "combination_id")
 """What says whose a row is: a campaign, or a combination, which is of one."""
 _KEPT = "rbfrag_ledger"
-_IDS_AT_ONCE = 500
+_IDS_AT_ONCE, _MOST_KEPT = 500, 10_000
 _WRITE = (
     "INSERT INTO ledger (of_table, campaign, row_count, digests) VALUES ({0}, {0}, {0}, {0}) "
     "ON CONFLICT (of_table, campaign) DO UPDATE SET "
@@ -60,6 +60,8 @@ def tally(
         values = [digest for _, digest in group]
         number, together = kept.get((table.name, owner, of), (0, 0))
         kept[table.name, owner, of] = number + sign * len(values), reduce(xor, values, together)
+    if len(kept) > _MOST_KEPT:  # a merge in one transaction may be of any size
+        _write(connection)
 
 
 def has_ledger(connection: Connection) -> bool:

@@ -257,7 +257,7 @@ def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:
     for name, field in _names().items():
         if field in read and (_is_near(bare, name) or (end and _is_near(end[1], name))):
             raise InputError(
-                f"{source}: the column {text[:60]} is no name of a field: did you mean {name}, "
+                f"{source}: the column {text[:60]!r} is no name of a field: did you mean {name}, "
                 f"the {declared()[field].what}? Rename it"
             )
 

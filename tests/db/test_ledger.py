@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, delete, func, insert, select
 
+import rbfrag.db.ledger
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
 from rbfrag.db.campaigns import GRID_MEETS_POINT, POINT_COLUMNS
@@ -182,3 +183,12 @@ def test_the_commands_say_when_it_was_sound(shell: Shell, sqlite_file: Path, fil
     assert "rows were deleted" in lost.stdout
     assert "rbfrag db check with accept" in lost.stdout
     assert shell.json("db", "info", *at)["last_sound"] == sound
+
+
+def test_long_transactions_write_in_portions(
+    engine: Engine, fill: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rbfrag.db.ledger, "_MOST_KEPT", 2)
+    with engine.begin() as connection:
+        fill(connection, [1, 2, 3])
+    assert _problems(engine) == []

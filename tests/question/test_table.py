@@ -56,6 +56,7 @@ def test_no_name_stands_for_two_fields() -> None:
     ("header", "words"),
     [
         (["hieght_m", "width_m"], "did you mean height_m"),
+        (["\uf07fheight_m", "width_m"], r"the column '.uf07fheight_m' is no name"),
         (["height_m", "restitutoin"], "did you mean restitution"),
         (["hieght_cm", "width_m"], "did you mean height"),
         (["dip", "beta"], "both state the dip of the base"),
