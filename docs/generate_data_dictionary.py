@@ -6,7 +6,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary
+from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary, table_meaning
+from rbfrag.db.schema import ledger
 from rbfrag.question.fields import (
     RowFields,
     column_of,
@@ -79,6 +80,9 @@ def page() -> str:
         parts.append(f"### {table.name}\n\n{table.meaning}\n")
         parts += [columns_as_markdown(own)] if own else []
         parts += [f"Also: {also}.\n"] if also else []
+    kept = table_meaning(ledger)
+    parts.append(f"### {kept.name}\n\n{kept.meaning} It is not exported.\n")
+    parts.append(columns_as_markdown(kept.columns))
     return "\n".join(parts)
 
 

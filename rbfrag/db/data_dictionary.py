@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from sqlalchemy import Boolean, Column, Double, Integer, LargeBinary
+from sqlalchemy import Boolean, Column, Double, Integer, LargeBinary, Table
 
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.schema import metadata
@@ -48,10 +48,12 @@ class TableMeaning:
 
 def data_dictionary() -> tuple[TableMeaning, ...]:
     """Return every table with every column."""
-    return tuple(
-        TableMeaning(name, table.info["meaning"], tuple(map(_column, table.columns)))
-        for name, table in metadata.tables.items()
-    )
+    return tuple(map(table_meaning, metadata.tables.values()))
+
+
+def table_meaning(table: Table) -> TableMeaning:
+    """Return what one table of the schema means."""
+    return TableMeaning(table.name, table.info["meaning"], tuple(map(_column, table.columns)))
 
 
 def dictionary_as_json() -> dict[str, Any]:
