@@ -143,6 +143,7 @@ class Shaken(NamedTuple):
         row: rows of their shaking.
         probability: P of one block of each, the mean over all scatter.
         outside: part of it from outside the ranges that the model was fitted on.
+        square: variance of Φ⁻¹ of P by the scatter of component and block, shape (m,).
         shift: by how much Φ⁻¹ of P differs by the shifted portfolios, (1 + shifted) x m; first 0.
     """
 
@@ -150,6 +151,7 @@ class Shaken(NamedTuple):
     row: Indices
     probability: FloatArray
     outside: FloatArray
+    square: FloatArray
     shift: FloatArray
 
 
@@ -266,18 +268,19 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
                 np.einsum("rkm,k->rm", other.probability(own, shaking, points)[0], weight)
                 for other in (() if shifts is not None else part.shifted)
             )
-            columns = [each[which, block] for each in (p, outside, *shifted)]
+            square = _variance_of_score(at_points, weight) if part.shifted else 0.0 * p
+            columns = [each[which, block] for each in (p, outside, square, *shifted)]
             if shifts is not None:
                 first, weights = grid.cubic(u[chunk][which])
                 columns += [*sum(w * shifts[:, block, first + i] for i, w in enumerate(weights))]
             parts.append((own[block], chunk[which], *columns))
     if not parts:
         return
-    block, row, p, outside, *more = (np.concatenate(column) for column in zip(*parts, strict=True))
+    block, row, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((block, events.event[row]))
-    block, row, outside = block[order], row[order], outside[order]
-    p = np.minimum(p[order], 1.0)
-    shift = np.stack([np.zeros(p.size), *(one[order] for one in more)])
+    block, row, p, outside, square, *more = (each[order] for each in (block, row, *columns))
+    p = np.minimum(p, 1.0)
+    shift = np.stack([np.zeros(p.size), *more])
     if not one_measure:
         with np.errstate(invalid="ignore"):
             shift[1:] = np.nan_to_num(ndtri(np.minimum(shift[1:], 1.0)) - ndtri(p), nan=0.0)
@@ -287,8 +290,17 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
         some = slice(first, last)
         yield (
             int(event[first]),
-            Shaken(block[some], row[some], p[some], outside[some], shift[:, some]),
+            Shaken(block[some], row[some], p[some], outside[some], square[some], shift[:, some]),
         )
+
+
+def _variance_of_score(p: FloatArray, weight: FloatArray) -> FloatArray:
+    """Return the variance of Φ⁻¹ of P over points of its scatter, rows x points x m."""
+    if weight.size < 2:
+        return np.zeros((p.shape[0], p.shape[2]))
+    score = np.clip(ndtri(p), -_REACH, _REACH)
+    mean, square = (np.einsum("rkm,k->rm", each, weight) for each in (score, score * score))
+    return np.asarray(np.maximum(square - mean * mean, 0.0))
 
 
 def _sampler(portfolio: Portfolio, own: Indices) -> JointSampler | LargeCounts | None:
@@ -319,6 +331,9 @@ def _sampled(
         latent = sampler.latent(draws, generator)
         many = [_of_many(part, shaken, sampler, latent, shift) for shift in shaken.shift]
         return np.stack([values for values, _ in many]), np.array([many[0][1]])
+    if len(shaken.shift) > 1:
+        # the shifts are of P over all scatter, of which each sample knows its own part
+        shaken = shaken._replace(shift=np.sqrt(1.0 + shaken.square) * shaken.shift)
     bounds = _bounds_of_z(part, shaken, generator)
     scattered = int((portfolio.count[own] > 1).sum()) if portfolio.is_uncertain else 0
     at_once = max(1, _VALUES_AT_ONCE // (own.size + SIDES * _STRENGTHS * _SIZES * scattered))

@@ -143,9 +143,11 @@ def test_shifted_models_answer_by_the_same_samples(meaning: str) -> None:
     assert (same <= more).all()
     assert less[0] < same[0] < more[0]
     # as far apart as a run of its own says, without its scatter
-    other = counted(shaking, by[1], 4000).counts.events[0, 0, 0]
-    base = counted(shaking, blocks, 4000).counts.events[0, 0, 0]
-    assert more[0] / same[0] == pytest.approx(other / base, rel=0.1)
+    ends = [counted(shaking, each, 4000).counts.events[0, 0, :2] for each in by[1:]]
+    apart = np.log(ends[0] / ends[1])
+    result = counted(shaking, blocks, 1000, shifted=by)
+    _, _, more, less = result.counts.events[0]
+    np.testing.assert_allclose(np.log(more / less)[:2], apart, rtol=0.05)
 
 
 @pytest.mark.parametrize("meaning", ["single", "rotd50"])
