@@ -37,6 +37,7 @@ from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
+from rbfrag.db.ledger import renew_ledger
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
@@ -216,6 +217,7 @@ def reduce(full: Path, made: Path) -> None:
         upper = point.c.kr_over_pga == table.c.upper
         ends = select(table.c.id).where(upper, table.c.id == point.c.combination_id)
         connection.execute(delete(point).where(beside, ends.exists()))
+        renew_ledger(connection)  # what is left is the whole of what is shipped
 
 
 def pack(made: Path) -> None:

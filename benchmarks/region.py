@@ -181,7 +181,7 @@ def by_predict(
     return total
 
 
-DRAWS = 200
+DRAWS = 500
 
 
 def drawn_models(model: FragilityModel, n: int, seed: int) -> list[FragilityModel]:
@@ -217,7 +217,7 @@ def intervals() -> list[list[str]]:
     return rows
 
 
-COUNTS = (1, 10)
+COUNTS = (1, 2, 5, 10, 20)
 
 
 def of_sums() -> list[list[str]]:
@@ -235,7 +235,7 @@ def of_sums() -> list[list[str]]:
         start = time.process_time()
         event_losses(events, portfolio, samples=100)
         alone = time.process_time() - start
-        for one in drawn_models(model, DRAWS, 5):
+        for one in drawn_models(model, DRAWS, 7):
             values = dict(zip(model.row.coefficients, one.parameters, strict=True))
             moved = replace(portfolio, models=(replace(model.row, coefficients=values),))
             found = event_losses(events, moved, samples=100)

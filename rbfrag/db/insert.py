@@ -28,6 +28,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 
 from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
 from rbfrag.db.ledger import tally
+from rbfrag.db.schema import metadata
 from rbfrag.errors import DatabaseError
 
 # psycopg forgets the count when the cursor closes, unless it is asked to keep it
@@ -153,6 +154,13 @@ def delete_rows(connection: Connection, table: Table, *where: ColumnElement[bool
     for row in connection.execute(select(table).where(*where).with_for_update()).mappings():
         _tally_one(connection, table, {**row}, sign=-1)
     connection.execute(delete(table).where(*where))
+
+
+def keep_writers_out(connection: Connection) -> None:
+    """Have no other transaction write while this one lasts, as SQLite does by itself."""
+    if connection.dialect.name == "postgresql":
+        names = ", ".join(sorted(metadata.tables))
+        connection.exec_driver_sql(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE")
 
 
 def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:

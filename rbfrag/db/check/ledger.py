@@ -10,6 +10,7 @@ from sqlalchemy import Connection
 
 from rbfrag.db.check.damage import ACCEPT, Damage
 from rbfrag.db.engine import opened_database
+from rbfrag.db.insert import keep_writers_out
 from rbfrag.db.ledger import (
     has_ledger,
     note_sound,
@@ -51,6 +52,7 @@ def accept_rows(db: str | os.PathLike[str] | None = None) -> list[Damage]:
         DatabaseError: it cannot be written.
     """
     with opened_database(db) as engine, engine.begin() as connection:
+        keep_writers_out(connection)
         differed = list(check_ledger(connection))
         renew_ledger(connection)
     return differed

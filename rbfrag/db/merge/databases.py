@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select, text
+from sqlalchemy import select
 
 from rbfrag.db.check.database import check_database
 from rbfrag.db.check.maps import ROTATION_ERROR
 from rbfrag.db.connect import database_label
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.engine import opened_database
-from rbfrag.db.insert import insert_row, update_rows
+from rbfrag.db.insert import insert_row, keep_writers_out, update_rows
 from rbfrag.db.location import locate
 from rbfrag.db.merge.results import merge_combinations
 from rbfrag.db.merge.rows import Merge, Row, Rule, stored_rows
@@ -31,7 +31,6 @@ from rbfrag.db.schema import (
     campaign,
     earthquake,
     fragility_model,
-    metadata,
     motion,
     recording,
     response,
@@ -147,10 +146,7 @@ def merge_databases(
                 f"{first.table} {first.row}: {first.problem}; rbfrag db check tells of it"
             )
         with opened_database(db, create=True) as ours, ours.begin() as target:
-            if target.dialect.name == "postgresql":
-                # keeps writers out, as SQLite's transactions do by themselves
-                names = ", ".join(sorted(metadata.tables))
-                target.execute(text(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE"))
+            keep_writers_out(target)
             merge = Merge(source, target)
             _merge_motions(merge)
             for rule in _OTHERS:
