@@ -79,9 +79,9 @@ def written_tallies(connection: Connection) -> Tallies:
 def stored_tallies(connection: Connection) -> Tallies:
     """Return what the tables hold."""
     return {
-        (name, campaign): (len(digests), reduce(xor, digests, 0))
+        (name, campaign): sums
         for name, table in sorted(metadata.tables.items())
-        for campaign, digests in _digests_by_campaign(connection, table).items()
+        for campaign, sums in _by_campaign(connection, table).items()
     }
 
 
@@ -105,18 +105,19 @@ def last_sound(connection: Connection) -> str | None:
     return time
 
 
-def _digests_by_campaign(connection: Connection, table: Table) -> dict[int, list[int]]:
+def _by_campaign(connection: Connection, table: Table) -> dict[int, tuple[int, int]]:
     query = select(table.c.digest)
     if "campaign_id" in table.c:
         query = query.add_columns(table.c.campaign_id)
     elif "combination_id" in table.c:
         query = query.add_columns(combination.c.campaign_id).join(combination)
-    by_campaign: dict[int, list[int]] = defaultdict(list)
+    tallies: dict[int, tuple[int, int]] = defaultdict(lambda: (0, 0))
     for digest, *campaign in connection.execute(query, execution_options={"yield_per": 10_000}):
-        # SQLite holds anything anywhere; what is no digest is found by the check of digests
         whose = campaign[0] if campaign else 0
-        by_campaign[whose].append(digest if isinstance(digest, int) else 0)
-    return by_campaign
+        number, together = tallies[whose]
+        # SQLite holds anything anywhere; what is no digest is found by the check of digests
+        tallies[whose] = number + 1, together ^ (digest if isinstance(digest, int) else 0)
+    return tallies
 
 
 def _forget(connection: Connection) -> None:

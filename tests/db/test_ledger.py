@@ -130,8 +130,7 @@ def test_campaigns_and_merges_keep_the_ledger(
                 add_motion(
                     connection, make_motion(seed), earthquake=EarthquakeInfo("E"), is_vertical=False
                 )
-        asked = {"p2": [3.0]} if kind == "toppling" else {"kind": kind}
-        simulate(at, jobs=1, **asked)  # type: ignore[arg-type]
+        simulate(at, jobs=1, kind=kind, p2=[3.0] if kind == "toppling" else None)
     merge_databases(other, db=place)
     merge_databases(other, db=place)
     with opened_database(place) as engine, engine.connect() as connection:
