@@ -195,7 +195,7 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
         (lambda t: rows_of(t, slice(0, 9)), "9 critical values.*simulate more"),
         (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*a table of metadata"),
         (lambda t: replace(t, pgv_m_s=np.full(t.p2.size, 0.3)), "same peak ground velocity, 0.3"),
-        (lambda t: replace(t, y_m_s=0.7 * t.pgv_m_s), "exactly on a power law"),
+        (lambda t: replace(t, y_m_s=0.7 * t.pgv_m_s), "exactly on a line"),
         (lambda t: replace(t, y_m_s=2.0 - t.y_m_s), "does not rise"),
         (lambda t: replace(t, status=np.full(t.p2.size, "below_limit", dtype=object)),
          "0 critical values"),
@@ -203,7 +203,13 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
 )  # fmt: skip
 def test_data_that_cannot_carry_a_fit_are_refused(draw, change, words):
     with pytest.raises(FitError, match=words):
-        fit(change(draw(events=5)), term="pgv")
+        fit(change(draw(events=5)), term="pgv", method="wls")
+
+
+def test_no_scatter_is_refused_by_the_method_that_is_chosen_too(draw):
+    table = draw(events=5)
+    with pytest.raises(FitError, match="exactly on a power law"):
+        fit(replace(table, y_m_s=0.7 * table.pgv_m_s), term="pgv")
 
 
 def test_no_mean_period_at_all_is_refused(draw):
