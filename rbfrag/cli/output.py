@@ -92,14 +92,22 @@ def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> Non
         print(f"warning: {text}", file=sys.stderr)
 
 
-def write_table(columns: Mapping[str, Any], out: str | PathLike[str], *, excel_text: bool) -> None:
-    """Write the table of a command, and warn of texts that spreadsheets take for formulas."""
+def write_table(
+    columns: Mapping[str, Any],
+    out: str | PathLike[str],
+    *,
+    excel_text: bool,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write the table of a command with its warnings, and warn of texts that are formulas."""
     from rbfrag.exchange.excel_text import formula_warnings
     from rbfrag.exchange.tables.files import write_block_table
 
-    write_block_table(columns, out, excel_text=excel_text)
+    formulas: tuple[str, ...] = ()
     if not excel_text and str(out).lower().endswith(".csv"):
-        print_warnings(formula_warnings(columns))
+        formulas = tuple(formula_warnings(columns))
+    write_block_table(columns, out, excel_text=excel_text, notes=(*notes, *formulas))
+    print_warnings(formulas)
 
 
 @cache
@@ -253,11 +261,11 @@ def show_prediction(
         return
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
-    warnings = document.pop("warnings")
     sentences = (
         *words.prediction_in_words(document),
         *words.block_in_words(document["method"], given),
     )
+    warnings = [text for text in document.pop("warnings") if text not in sentences]
     print_sentences(sentences)
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}

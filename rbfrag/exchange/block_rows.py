@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NoReturn
@@ -12,15 +12,16 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
 from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import BlockFields, column_of, names_of
-from rbfrag.question.many import OF_ALL, many_blocks
+from rbfrag.question.fields import BY_ROW, BlockFields, column_of, names_of
+from rbfrag.question.many import many_blocks
 from rbfrag.question.shapes import OF_A_SHAPE, SPACE
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.kinds import KINDS, facts_of
 
 Columns = Mapping[str, NDArray[Any]]
@@ -170,8 +171,11 @@ def read_blocks(
     *,
     reads: Collection[str] = (*PLACE, *PORTFOLIO),
     one_kind: bool = False,
-    for_all: Mapping[str, float] | None = None,
+    need_kind: str = "",
+    for_all: Mapping[str, Any] | None = None,
     sheet: str | None = None,
+    ignored: Sequence[str] = (),
+    crs: str | None = None,
 ) -> BlockRows:
     """Return the blocks of a table, and its rows that cannot be used, each with its reason.
 
@@ -185,8 +189,11 @@ def read_blocks(
             what is wrong with others is no concern.
         one_kind: all are answered as of one kind, that which is named, or else that of most rows:
             others cannot be used.
-        for_all: fields that are stated of all blocks; a cell goes before.
+        need_kind: why a row without a kind cannot be used; empty where it can.
+        for_all: fields that are given for all blocks; a cell goes before.
         sheet: of a workbook, the name of the sheet; None for the first.
+        ignored: columns to ignore, whatever they are called.
+        crs: coordinate reference system of x and y of rows that name none, such as EPSG:2056.
 
     Returns:
         The blocks, by the columns of the numbers that their kinds read, NaN where a kind does not,
@@ -202,25 +209,26 @@ def read_blocks(
         facts_of(kind)  # refuses a kind that there is not
     if not hasattr(source, "items"):
         source = as_path(source, "blocks", "a table of blocks")
-    stated = for_all or {}
-    fields = names_of(BlockFields)
-    with opened_table(source, (*fields, *reads), TEXTS, sheet=sheet) as table:
-        table.check(stated, kind)
+    for_all = for_all or {}
+    fields = (*names_of(BlockFields), *BY_ROW)
+    of_place = ("x", "y") if {*PLACE} <= {*reads} else ()
+    with opened_table(
+        source, (*fields, *reads, *of_place), TEXTS, sheet=sheet, ignored=ignored
+    ) as table:
+        table.check(for_all, kind)
         columns, faults, lines = table.whole()
     name, size = table.name, len(lines)
     values: dict[str, Any] = {field: columns.pop(field) for field in fields if field in columns}
     for field in SPACE:
-        if field in columns or field in stated:
-            own = columns.pop(field, np.full(size, "", dtype=object))
-            values[field] = np.where(own == "", stated.get(field, ""), own)
-    for field, value in stated.items():
-        if field in SPACE:
-            continue
-        own = (columns if field in OF_ALL else values).get(field, np.full(size, np.nan))
-        filled = np.where(np.isnan(own), value, own)
-        values[field] = value if field in OF_ALL else filled
-        if field in OF_ALL and field in reads:
-            columns[field] = filled
+        if field in columns or field in for_all:
+            cells = columns.pop(field, np.full(size, "", dtype=object))
+            values[field] = np.where(cells == "", for_all.get(field, ""), cells)
+    for field, value in for_all.items():
+        if field not in SPACE:
+            cells = values.get(field, np.full(size, np.nan))
+            values[field] = np.where(np.isnan(cells), value, cells)
+    if of_place and "x" in table.stated.columns:
+        _place_on_map(columns, crs, name)
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{name}: lon and lat go together: give both columns, or neither")
     named = "block_id" in columns
@@ -230,8 +238,10 @@ def read_blocks(
     modes = columns["mode"].tolist() if "mode" in columns else None
     with table.named():
         blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
-    table.check_read(stated, blocks.read)
+    table.check_read(for_all, blocks.read)
     reasons = block_reasons_of(blocks, size)
+    if need_kind:
+        reasons[np.array([not text for text in kinds], dtype=np.bool_)] = need_kind
     columns |= {
         column_of(field): each.copy()
         for field, each in values.items()
@@ -253,9 +263,48 @@ def read_blocks(
     _refuse_columns(columns, reasons)
     for i, fault in faults.items():
         reasons[i] = fault
-    remarks = (*blocks.remarks, *table.remarks({*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads}))
+    used = {*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads, *of_place}
+    remarks = diagnostics(blocks.remarks, table.warnings(used))
     columns |= {"row": np.arange(size), "line": np.array(lines, dtype=np.int64)}
     return BlockRows(columns, reasons, name, table.file.word, named, remarks).checked()
+
+
+def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str) -> None:
+    """Enter ``lon`` and ``lat`` [deg] of rows that have x and y in a coordinate reference system.
+
+    Raises:
+        InputError: no system, or one that is not known.
+        MissingExtraError: pyproj is not installed.
+    """
+    if "y" not in columns:
+        raise InputError(f"{source}: x and y go together: give both columns, or neither")
+    x, y = columns["x"], columns["y"]
+    systems = np.array(columns.get("crs", np.full(x.size, "", dtype=object)), dtype=object)
+    systems[systems == ""] = crs or ""
+    placed = ~np.isnan(x) & ~np.isnan(y)
+    if (placed & (systems == "")).any():
+        raise InputError(
+            f"{source}: x and y need a coordinate reference system: add a column crs, or pass "
+            "--crs EPSG:2056, for example",
+            fields=("crs",),
+        )
+    try:
+        from pyproj import Transformer
+        from pyproj.exceptions import CRSError, ProjError
+    except ImportError:
+        raise MissingExtraError("Coordinates in a projection need pyproj", "gis") from None
+    lon, lat = (columns.setdefault(name, np.full(x.size, np.nan)) for name in PLACE)
+    for system in dict.fromkeys(systems[placed].tolist()):
+        rows = np.flatnonzero(placed & (systems == system) & np.isnan(lon))
+        try:
+            to_map = Transformer.from_crs(system, "EPSG:4326", always_xy=True)
+            lon[rows], lat[rows] = to_map.transform(x[rows], y[rows], errcheck=True)
+        except (CRSError, ProjError):
+            raise InputError(
+                f"{source}: crs {system[:40]!r} is not known or does not hold these coordinates: "
+                "give a code such as EPSG:2056",
+                fields=("crs",),
+            ) from None
 
 
 def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:

@@ -1,9 +1,9 @@
-"""A table of blocks: what its columns state, and of which rows something is wrong."""
+"""A table of blocks: what its columns are, and what is wrong with which rows."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,16 +17,30 @@ from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
-from rbfrag.question.fields import BlockFields, MeasureFields, column_of, names_of
+from rbfrag.question.fields import BlockFields, column_of, declared, names_of
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import OF_A_SHAPE, SHAPES, SPACE
-from rbfrag.question.table import Header, columns_in
+from rbfrag.question.shapes import RECTANGLE, SHAPES, SPACE
+from rbfrag.question.table import (
+    Column,
+    Header,
+    columns_in,
+    kinds_in,
+    sounds_like,
+    yes_or_no,
+)
+from rbfrag.results.diagnostic import Diagnostic
 
 TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *SPACE)
 """Columns of texts."""
 
 IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
+
+ASSUMED = {"water_m": "assumed dry", "cohesion_pa": "assumed without cohesion"}
+"""What an empty cell of a field means beside filled ones."""
+
+EXAMPLE_NAME = "example"
+"""Name of the row of the template that shows how to fill it in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +50,12 @@ class BlockTable:
     Args:
         name: what messages call it.
         file: what is open.
-        stated: which columns state which fields.
+        stated: which columns are which fields.
         texts: fields that are texts.
         filled: fields of numbers that a cell has been read of.
+        unused: columns that turned out to hold no kind of failure, with their words.
+        gaps: rows without water or cohesion where the table has a column of it, by field.
+        read: numbers of rows that have been read.
     """
 
     name: str
@@ -46,73 +63,176 @@ class BlockTable:
     stated: Header
     texts: Collection[str]
     filled: set[str] = field(default_factory=set)
+    unused: dict[str, list[str]] = field(default_factory=dict)
+    gaps: dict[str, list[int]] = field(default_factory=dict)
+    read: list[int] = field(default_factory=list)
 
     @property
     def numeric(self) -> frozenset[str]:
         """The columns that hold numbers, as it calls them."""
         return frozenset(
-            column.header for name, column in self.stated.columns.items() if name not in self.texts
+            column.header
+            for name, column in self.stated.columns.items()
+            if name not in (*self.texts, "free_standing", "back_fracture")
         )
 
     @property
     def parts(self) -> Parts:
-        """Its rows, some thousand at a time."""
-        return self.file.parts(self.numeric)
+        """Its rows, some thousand at a time, without the example of the template."""
+        column = self.stated.columns.get("block_id")
+        for part in self.file.parts(self.numeric):
+            if column is not None:
+                names = cells_of(part.cells[column.header])
+                part = part.without([i for i, n in enumerate(names) if str(n) == EXAMPLE_NAME])
+                if len(part.lines) < len(names):
+                    text = f"the row {EXAMPLE_NAME!r} of the template is skipped"
+                    self.file.remarks.append(Diagnostic(text, "example_skipped"))
+            yield part
 
     def numbers(self, part: TablePart) -> tuple[dict[str, NDArray[np.float64]], dict[int, str]]:
         """Return the numbers of some rows by field, and what is wrong with rows by their index."""
         numbers, faults = {}, dict(part.faults)
-        for name, (header, factor) in self.stated.columns.items():
-            if name in self.texts:
+        for name, column in self.stated.columns.items():
+            if name in (*self.texts, "free_standing"):
                 continue
-            values, others = part.numbers(header)
+            if name == "back_fracture":
+                values, others = self._yes_or_no(part, column)
+            else:
+                unit = declared()[name].unit if name in declared() else ""
+                values, others = part.numbers(column.header, unit, column.factor)
             faults = others | faults
-            values = values if factor == 1.0 else values * factor
             empty = np.isnan(values)
             if others or not empty.all():
                 self.filled.add(name)
+            if name in ASSUMED:
+                start = sum(self.read)
+                rows = self.gaps.setdefault(name, [])
+                rows.extend((np.flatnonzero(empty) + start).tolist())
             stands_for = 0.0 if name.endswith("_sigma") else IF_EMPTY.get(name)
             numbers[name] = values if stands_for is None else np.where(empty, stands_for, values)
+        self.read.append(len(part.lines))
         return numbers, faults
+
+    def _cells(self, part: TablePart, column: Column) -> list[str]:
+        return [str(cell).strip() for cell in cells_of(part.cells[column.header])]
+
+    def _yes_or_no(
+        self, part: TablePart, column: Column
+    ) -> tuple[NDArray[np.float64], dict[int, str]]:
+        """Return 1 for yes, 0 for no and NaN for an empty cell."""
+        values, faults = np.full(len(part.lines), np.nan), {}
+        for i, cell in enumerate(self._cells(part, column)):
+            if not cell:
+                continue
+            answer = yes_or_no(cell)
+            if answer is None:
+                faults[i] = f"{column.header} = {cell[:40]!r} is neither yes nor no"
+            else:
+                values[i] = answer != column.inverse
+        return values, faults
 
     def text(self, part: TablePart, name: str) -> list[str] | None:
         """Return the texts of some rows; None where the table has no column of that field."""
+        if name == "kind":
+            return self._kinds(part)
         column = self.stated.columns.get(name)
         if column is None:
             return None
         what = f"{self.name}: a cell of {name}"
-        return [
-            checked_name(as_written(str(cell).strip()), what)
-            for cell in cells_of(part.cells[column.header])
-        ]
+        return [checked_name(as_written(cell), what) for cell in self._cells(part, column)]
 
-    def remarks(self, read: Collection[str]) -> tuple[str, ...]:
-        """Return what is to be said of its columns.
+    def _kinds(self, part: TablePart) -> list[str] | None:
+        """Return the kinds that rows give, by a word or as free-standing."""
+        column, free = (self.stated.columns.get(name) for name in ("kind", "free_standing"))
+        kinds = None
+        if column is not None:
+            cells = self._cells(part, column)
+            kinds = kinds_in(cells, column.header, self.name)
+            words = dict.fromkeys(filter(None, cells))
+            if kinds is None and words:
+                self.unused.setdefault(column.header, []).extend(words)
+                if "kind" in self.filled:
+                    wrong = f"column {column.header!r}: {next(iter(words))!r:.42}"
+                    raise InputError(f"{self.name}: {wrong} is not a kind of failure")
+            elif kinds is not None and words:
+                self.filled.add("kind")
+                if column.header in self.unused:
+                    wrong = f"column {column.header!r}: {self.unused[column.header][0]!r:.42}"
+                    raise InputError(f"{self.name}: {wrong} is not a kind of failure")
+        if free is None:
+            return kinds
+        values, faults = self._yes_or_no(part, free)
+        if faults:
+            raise InputError(f"{self.name}: {next(iter(faults.values()))}")
+        self.filled.add("free_standing")
+        kinds = kinds or [""] * len(part.lines)
+        return ["rocking" if v == 1.0 else k for k, v in zip(kinds, values.tolist(), strict=True)]
+
+    def warnings(self, used: Collection[str]) -> tuple[Diagnostic, ...]:
+        """Return what to know about its columns.
 
         Args:
-            read: the fields that the answer depends on, or hands on.
+            used: the fields that the answer depends on, or hands on.
         """
-        empty = {c.header for name, c in self.stated.columns.items() if name not in self.filled}
-        named = [name for name in self.file.header if name not in empty]
-        return (*self.file.remarks, *self.stated.remarks, *self.stated.unread(named, read))
+        empty = {
+            column.header
+            for name, column in self.stated.columns.items()
+            if name not in self.filled and name not in self.texts
+        }
+        used = {*used, "free_standing"} if "kind" in used else used
+        if self.unused:
+            used = {name for name in used if name != "kind"}
+        named = [name for name in self.file.header if name not in (*empty, *self.unused)]
+        kinds = (
+            f"column ignored: {header} ({', '.join(dict.fromkeys(words))}): no word names a kind "
+            "of failure"
+            for header, words in self.unused.items()
+        )
+        total = sum(self.read)
+        assumed = (
+            Diagnostic(
+                f"{name.partition('_')[0]} not given in {len(rows):,} of {total:,} rows: "
+                f"{ASSUMED[name]}",
+                f"{name.partition('_')[0]}_not_given",
+                rows=rows,
+            )
+            for name, rows in self.gaps.items()
+            if rows and name in self.filled and name in used
+        )
+        return (
+            *self.file.remarks,
+            *assumed,
+            *self.stated.warnings,
+            *self.stated.ignored(named, used),
+            *(Diagnostic(text, "ignored_columns") for text in kinds),
+        )
 
     def check(self, given: Collection[str] = (), kind: str | None = None) -> None:
-        """Refuse a table that describes no blocks.
+        """Reject a table that describes no blocks, or has a column that may matter unused.
 
         Args:
-            given: fields that are stated of all blocks.
+            given: fields that are given for all blocks.
             kind: how the blocks fail; None for what they are given by.
         """
-        known = {*self.stated.columns, *given}
-        known |= {angle for plane, angle in ANGLES.items() if plane in known}
-        if not kinds_by_numbers(known) and not any(known.issuperset(shape) for shape in SHAPES):
-            block = block_of(known, kind)
-            missing = next(name for name in block.names if name not in known)
-            sides = ", nor height_m and width_m" if "kr" in block.names else ""
-            self._refuse(f"{column_of(missing)}{sides}")
+        present = {*self.stated.columns, *given}
+        present |= {angle for plane, angle in ANGLES.items() if plane in present}
+        self.stated.check_unused(self.name, present if kind is None else {*present, "kind"})
+        if kinds_by_numbers(present) or any(present.issuperset(shape) for shape in SHAPES):
+            return
+        sides = [name for name in RECTANGLE if name in present]
+        if len(sides) == 1:
+            missing = next(name for name in RECTANGLE if name not in present)
+            word = missing.partition("_")[0]
+            near = next((h for h in self.stated.unknown if sounds_like(h) == missing), None)
+            hint = f" (did you mean the column {near!r}?)" if near else ""
+            raise InputError(f"{self.name}: {word} is missing{hint}; the columns are {self._have}")
+        block = block_of(present, kind)
+        missing = next(name for name in block.names if name not in present)
+        sides_too = ", nor height_m and width_m" if "kr" in block.names else ""
+        self._reject(f"{column_of(missing)}{sides_too}")
 
     def check_read(self, given: Collection[str], read: Collection[str]) -> None:
-        """Refuse what is stated of all blocks, and no answer depends on."""
+        """Reject what is given for all blocks, and no answer depends on."""
         for name in given:
             if name in names_of(BlockFields) and name not in read:
                 text = f"{name} does not go with the blocks of {self.name}: leave it out"
@@ -120,43 +240,55 @@ class BlockTable:
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Name the table where something is refused of all of its blocks."""
+        """Name the table where something is rejected of all of its blocks."""
         try:
             yield
         except InputError as error:
             raise InputError(f"{self.name}: {error}", fields=error.fields) from None
 
     def need(self, names: Collection[str]) -> None:
-        """Refuse a table without some columns."""
+        """Reject a table without some columns."""
         for name in names:
             if name not in self.stated.columns:
-                self._refuse(name)
+                self._reject(name)
 
-    def _refuse(self, missing: str) -> None:
+    @property
+    def _have(self) -> str:
         have = ", ".join(self.file.header) or "none"
         if len(self.file.sheets) > 1:
             have += f" (of the first sheet; the sheets are {', '.join(self.file.sheets)})"
-        raise InputError(f"{self.name}: there is no column {missing}; the columns are {have}")
+        return have
+
+    def _reject(self, missing: str) -> None:
+        raise InputError(f"{self.name}: there is no column {missing}; the columns are {self._have}")
 
     def whole(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:
         """Return its columns by field, what is wrong with rows, and the numbers of all rows."""
         collected: dict[str, list[NDArray[Any]]] = {
             name: [np.empty(0, dtype=object if name in self.texts else np.float64)]
             for name in self.stated.columns
+            if name != "free_standing"
         }
         faults: dict[int, str] = {}
         lines: list[int] = []
+        texts = [name for name in self.texts if self._has(name)]
         for part in self.parts:
             numbers, wrong = self.numbers(part)
-            for name, arrays in collected.items():
-                arrays.append(
-                    numbers[name]
-                    if name in numbers
-                    else np.array(self.text(part, name), dtype=object)
-                )
+            columns: dict[str, NDArray[Any]] = {**numbers}
+            for name in texts:
+                if (cells := self.text(part, name)) is not None:
+                    columns[name] = np.array(cells, dtype=object)
+            for name, column in columns.items():
+                collected.setdefault(name, []).append(column)
             faults |= {len(lines) + i: fault for i, fault in wrong.items()}
             lines.extend(part.lines)
-        return {n: np.concatenate(arrays) for n, arrays in collected.items()}, faults, lines
+        whole = {n: np.concatenate(arrays) for n, arrays in collected.items()}
+        return {n: c for n, c in whole.items() if c.size == len(lines)}, faults, lines
+
+    def _has(self, name: str) -> bool:
+        return name in self.stated.columns or (
+            name == "kind" and "free_standing" in self.stated.columns
+        )
 
 
 @contextmanager
@@ -166,15 +298,17 @@ def opened_table(
     texts: Collection[str] = TEXTS,
     *,
     sheet: str | None = None,
+    ignored: Sequence[str] = (),
 ) -> Iterator[BlockTable]:
     """Open a table of blocks.
 
     Args:
         source: a table's file, a file of GeoJSON points, or columns by name, such as a pandas
             table.
-        read: fields of numbers, and other columns by their own names, that may be read.
+        read: fields of numbers, and other columns by their own names, that may be used.
         texts: the same of texts.
         sheet: of a workbook, the name of the sheet; None for the first.
+        ignored: columns to ignore, whatever they are called.
 
     Raises:
         InputError: the file cannot be read, or a column cannot be meant as it is called.
@@ -183,21 +317,5 @@ def opened_table(
     with ExitStack() as stack:
         file = open_table(source, stack, sheet=sheet)
         name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
-        yield BlockTable(name, file, columns_in(file.header, name, (*read, *texts)), texts)
-
-
-def stated_rows(
-    source: str | os.PathLike[str], given: Mapping[str, Any], *, sheet: str | None = None
-) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Return what each row of a table states, beside ``given``, and the remarks of the table."""
-    read = names_of(BlockFields, MeasureFields)
-    with opened_table(source, read, sheet=sheet) as table:
-        table.check(given, given.get("kind"))
-        columns, faults, _ = table.whole()
-    rows = []
-    for i, cells in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
-        row = {n: v for n, v in zip(columns, cells, strict=True) if v == v and v != ""}
-        if kinds_by_numbers(row):  # which go before a shape
-            row = {name: row[name] for name in row if name not in OF_A_SHAPE}
-        rows.append({**given, **row, **({"reason": faults[i]} if i in faults else {})})
-    return rows, table.remarks((*read, *TEXTS))
+        header = columns_in(file.header, name, (*read, *texts), ignored)
+        yield BlockTable(name, file, header, texts)

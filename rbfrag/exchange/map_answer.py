@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Unpack
 
@@ -25,6 +25,7 @@ from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.question.words import numbers_in_words
+from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.solver.kinds import by_model
 
 NOTABLE = 1e-4
@@ -118,7 +119,7 @@ def shakemap(
         DatabaseError: the database cannot be read.
     """
     given, answering = parts_of(numbers, question, BlockKeywords, AnsweringFields)
-    rows = given_blocks(given, blocks, reads=(*PLACE, "weight"))
+    rows = given_blocks(given, blocks, reads=(*PLACE, "weight", "count"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
     own = "lon" in rows.blocks
@@ -153,7 +154,9 @@ def shakemap(
     )
     kind, read, medians = read_by_models(rows)
     warnings = [*medians, *warnings]
-    weight = table.get("weight")
+    weight, count = table.get("weight"), table.get("count")
+    if count is not None and not own:  # a mean over all blocks
+        weight = count if weight is None else weight * count
     answer = site_probability(
         measures, component=meaning, weight=None if own else weight, own_block=own, std_ln=std_ln,
         kind=kind, **read, **answering,
@@ -171,6 +174,11 @@ def shakemap(
             "are taken as certain; uncertainty.xml has it"
         )
     places = Places.of(lon, lat, table.get("site_id") if own else None)
+    if count is not None and own:  # identical blocks of a row have azimuths of their own
+        pairs = np.repeat(np.arange(answer.block.size), count[answer.block].astype(np.intp))
+        answer = replace(
+            answer, site=answer.site[pairs], block=answer.block[pairs], each=answer.each[pairs]
+        )
     failures = map_failures(answer, read, places, weight=weight, draws=draws, seed=seed)
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
@@ -196,6 +204,9 @@ def shakemap(
         "in_domain": answer.in_domain,
     }
     if own:
+        if count is not None:
+            columns["count"] = count
+        columns["warnings"] = codes_by_row(rows.remarks, rows.reasons.size)[table["row"]]
         columns["reason"] = np.full(lon.size, "", dtype=object)
         columns = rows.with_refused(columns)
     event = shaken.event

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.tables.parts import TablePart
 from rbfrag.files import is_number, json_document, source_text, written_whole
+from rbfrag.results.diagnostic import as_documents
 
 SUFFIXES = (".geojson", ".json")
 """File types of GeoJSON."""
@@ -116,13 +117,16 @@ def pyogrio() -> Any:
     return raw
 
 
-def write_geopackage(columns: Mapping[str, NDArray[Any]], layer: str, target: Path) -> None:
-    """Write rows with lon and lat as points of one layer in WGS 84.
+def write_geopackage(
+    columns: Mapping[str, NDArray[Any]], layer: str, target: Path, notes: Sequence[str] = ()
+) -> None:
+    """Write rows with lon and lat as points of one layer in WGS 84, and notes as a table.
 
     Args:
         columns: arrays of one length by name, ``lon`` and ``lat`` [deg] among them.
         layer: name of the layer.
         target: file to write; an existing file is replaced at the end, not before.
+        notes: warnings: the table ``notes``.
     """
     raw = pyogrio()
     names = [name for name in columns if name not in ("lon", "lat")]
@@ -146,5 +150,15 @@ def write_geopackage(columns: Mapping[str, NDArray[Any]], layer: str, target: Pa
                 str(partial), points, data, fields=names, layer=layer, driver="GPKG",
                 geometry_type="Point", crs="EPSG:4326",
             )  # fmt: skip
+            if notes:
+                documents = as_documents(notes)
+                texts = [
+                    np.array([each[name] for each in documents], dtype=object)
+                    for name in ("code", "text")
+                ]
+                raw.write(
+                    str(partial), None, texts, fields=["code", "note"], layer="notes",
+                    driver="GPKG", geometry_type=None, crs=None, append=True,
+                )  # fmt: skip
         except RuntimeError as error:
             raise OSError(str(error)) from None

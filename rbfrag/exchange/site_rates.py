@@ -19,6 +19,7 @@ from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.report import rate_columns as rates_in_columns
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.fields import column_of
+from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.solver.kinds import KINDS
 
 
@@ -154,6 +155,11 @@ def rate_columns(
     }
     for name, values in own.items():
         result[name] = np.broadcast_to(np.asarray(values, dtype=np.float64), (size,))
+    if rows is not None:
+        if "count" in columns:
+            result["count"] = np.asarray(columns["count"])
+        codes = codes_by_row(rows.remarks, rows.reasons.size)
+        result["warnings"] = codes[np.asarray(columns["row"])]
     result["reason"] = np.full(size, "", dtype=object)
     if rows is None:
         return result

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE, PORTFOLIO
+from rbfrag.exchange.block_rows import PLACE
 from rbfrag.exchange.block_table import TEXTS, BlockTable, opened_table
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
-from rbfrag.exchange.tables.files import table_path, table_writer
+from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
 from rbfrag.exchange.tables.parts import TablePart, Write
 from rbfrag.files import as_path, written_whole
 from rbfrag.fragility.joint import UNKNOWN, Placement, count_moments, count_quantiles
@@ -25,18 +25,30 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
-from rbfrag.question.fields import BlockFields, ScatterFields, ShakingFields, column_of, names_of
+from rbfrag.question.fields import (
+    BY_ROW,
+    BlockFields,
+    RowFields,
+    ScatterFields,
+    ShakingFields,
+    column_of,
+    names_of,
+)
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import ask
 from rbfrag.question.shapes import SPACE
+from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
 from rbfrag.solver.results import FloatArray
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
-ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "how", "reason")
+ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "how", "warnings", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
 _SHAKING, _SCATTER = names_of(ShakingFields), frozenset(names_of(ScatterFields))
+
+_SHAKING_TEXTS = ("component", "mechanism")
+"""Columns of texts about the shaking."""
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
@@ -55,7 +67,9 @@ def predict_table(
     given: Mapping[str, float],
     kind: str | None = None,
     sheet: str | None = None,
+    ignored: Sequence[str] = (),
     excel_text: bool = False,
+    remarks: Sequence[str] = (),
     **question: Any,
 ) -> dict[str, Any]:
     """Answer every block of a table, and write the table with the answers or list these.
@@ -71,7 +85,9 @@ def predict_table(
         given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
         kind: how the blocks fail; None for what they are given by.
         sheet: of a workbook, the name of the sheet; None for the first.
+        ignored: columns to ignore, whatever they are called.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
+        remarks: warnings about the options, which go before those of the answer.
         question: ``rotation_deg``, ``model``, ``level`` and ``db`` of :func:`rbfrag.predict`.
 
     Returns:
@@ -92,16 +108,22 @@ def predict_table(
     goal = None if target is None else table_path(target)
     if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"out {goal} is the table itself: name another file", fields=("out",))
-    read = names_of(BlockFields, ShakingFields)
+    read = (*names_of(BlockFields, ShakingFields, *BY_ROW), "count")
     counts = np.zeros(3, dtype=np.int64)
-    together: list[tuple[FloatArray, FloatArray, NDArray[np.object_]]] = []
+    together: list[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]] = []
     refused: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
     formulas: list[str] = []
     empty: set[str] = set()
     chosen: dict[str, dict[str, None]]
-    chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
-    with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
+    chosen = {name: {} for name in ("kind", "model", "term", "method", "read")}
+    notes: list[str] = []
+    by_row: dict[str, Diagnostic] = {}
+    texts = (*TEXTS, *_SHAKING_TEXTS)
+    with (
+        opened_table(origin, read, texts, sheet=sheet, ignored=ignored) as table,
+        ExitStack() as stack,
+    ):
         table.check(given, kind)
         uncertain = not _SCATTER.isdisjoint((*table.stated.columns, *given))
         columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
@@ -109,9 +131,10 @@ def predict_table(
             write = _listed(table, columns, rows)
         else:
             partial = stack.enter_context(written_whole(goal))
-            write = _written(table, columns, partial, stack, formulas, excel_text=excel_text)
+            write = _written(table, columns, partial, stack, formulas, notes, excel_text=excel_text)
         for part in table.parts:
-            predicted, answer = _answer(table, part, given, kind, question, empty)
+            predicted, answer, count = _answer(table, part, given, kind, question, empty)
+            _gather(by_row, predicted.notes, int(counts[0]))
             write(part, answer)
             for name, words in chosen.items():
                 own = getattr(predicted, name)
@@ -119,7 +142,10 @@ def predict_table(
                 words.update(dict.fromkeys(filter(None, own)))
             finite = np.isfinite(answer["probability"])
             site = np.array(table.text(part, "site_id") or [""] * finite.size, dtype=object)
-            together.append((answer["probability"][finite], predicted.y_m_s[finite], site[finite]))
+            together.append(
+                (answer["probability"][finite], predicted.y_m_s[finite], site[finite],
+                 count[finite])
+            )  # fmt: skip
             for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
                 refused[f"{table.file.word} {part.lines[i]}"] = answer["reason"][i]
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
@@ -129,9 +155,14 @@ def predict_table(
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])
-    known = (*chosen.pop("read"), *_SHAKING, *TEXTS, *PLACE, *PORTFOLIO)
-    notes = chosen.pop("notes")
-    missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
+        used = (*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *RowFields.__optional_keys__)
+        missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
+        notes += diagnostics(
+            remarks, by_row.values(), table.warnings({*used} - {"weight", "loss", "loss_sigma"}), missing,
+            formulas,
+        )  # fmt: skip
+    if goal is not None:
+        write_csv_notes(goal, notes)
     return {
         "rows": total,
         "answered": answered,
@@ -140,12 +171,20 @@ def predict_table(
         **_total_failures(together, [*chosen["model"]], question),
         **{name: ", ".join(each) for name, each in chosen.items()},
         **({"blocks": rows} if goal is None else {}),
-        "warnings": [*table.remarks(known), *notes, *missing, *formulas],
+        "warnings": notes,
     }
 
 
+def _gather(by_row: dict[str, Diagnostic], warnings: Sequence[str], start: int) -> None:
+    """Enter the warnings of a part of a table, whose first row is `start`."""
+    for warning in diagnostics(warnings):
+        rows = [int(row) + start for row in warning.rows]
+        before = by_row.get(warning)
+        by_row[str(warning)] = warning.replaced(rows=[*(before.rows if before else ()), *rows])
+
+
 def _total_failures(
-    together: Sequence[tuple[FloatArray, FloatArray, NDArray[np.object_]]],
+    together: Sequence[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]],
     models: Sequence[str],
     question: Mapping[str, Any],
 ) -> dict[str, float | None]:
@@ -155,31 +194,35 @@ def _total_failures(
     as of one size, by which more fall together than of unlike ones.
 
     Args:
-        together: P, velocity y [m/s] and site of rows.
+        together: P, velocity y [m/s], site and number of blocks of rows.
         models: names of the models that answer; the range of several is not known.
         question: as :func:`predict_table` has it.
     """
-    p, y, names = (np.concatenate(column) for column in zip(*together, strict=True))
+    p, y, names, count = (np.concatenate(column) for column in zip(*together, strict=True))
     ends: dict[str, float | None] = dict.fromkeys(("failures_low", "failures_high"))
     law = None
     if len(models) == 1:
         model, rotation = question.get("model") or models[0], question.get("rotation_deg")
         law = find_model(model, MEASURES, question.get("db"), rotation_deg=rotation).dependence
+    expected = float(count @ p)
     if law is not None:
         ln_y = np.log(np.where(np.isfinite(y) & (y > 0.0), y, 1.0))
         blocks = Placement.of(
             0.0, ln_y, site=np.unique(names.astype(str), return_inverse=True)[1], polarity=UNKNOWN
         )
-        alone = float((p * (1.0 - p)).sum())
-        some = np.random.default_rng(0).permutation(p.size)[:MOST_PAIRED]
+        total = int(count.sum())
+        alone = float(count @ (p * (1.0 - p)))
+        # some blocks drawn without replacement, of which a row with a count holds several
+        drawn = np.random.default_rng(0).choice(total, min(total, MOST_PAIRED), replace=False)
+        some = np.searchsorted(np.cumsum(count), drawn, side="right")
         shared = count_moments(p[some], blocks.only(some), law)[1]
         shared -= float((p[some] * (1.0 - p[some])).sum())
-        shared *= p.size * (p.size - 1.0) / max(some.size * (some.size - 1.0), 1.0)
+        shared *= total * (total - 1.0) / max(some.size * (some.size - 1.0), 1.0)
         tail = 0.5 - 0.5 * question.get("level", LEVEL)
         levels = tail, 1.0 - tail
-        counts = count_quantiles(p.size, float(p.sum()), alone + shared, levels)
+        counts = count_quantiles(total, expected, alone + shared, levels)
         ends = dict(zip(ends, map(float, counts), strict=True))
-    return {"expected_failures": float(p.sum()), **ends}
+    return {"expected_failures": expected, **ends}
 
 
 def _answer(
@@ -189,25 +232,38 @@ def _answer(
     kind: str | None,
     question: Mapping[str, Any],
     empty: set[str],
-) -> tuple[PredictionArray, dict[str, NDArray[Any]]]:
-    """Return the answers for some rows, and their columns."""
+) -> tuple[PredictionArray, dict[str, NDArray[Any]], FloatArray]:
+    """Return the answers for some rows, their columns, and how many blocks each row is."""
     values, faults = table.numbers(part)
-    for name in [name for name in values if name in given or name in _SHAKING]:
-        if name not in table.filled:  # an empty column says nothing
-            empty.add(name)
-            del values[name]
-        elif name in given or name in empty:
-            what = "an option and a column of" if name in given else "empty in the first rows of"
-            raise InputError(f"{column_of(name)} is {what} {table.name}: give it once, or of all")
-    for name in SPACE:
-        if (planes := table.text(part, name)) is not None:
-            if name in given:
-                raise InputError(f"{name} is an option and a column of {table.name}: give it once")
-            values[name] = np.array(planes, dtype=object)
+    count = values.pop("count", np.ones(len(part.lines)))
+    whole = (count >= 1.0) & (count == np.rint(count))
+    for i in np.flatnonzero(~whole).tolist():
+        faults.setdefault(i, f"count = {count[i]:g}: enter a whole number of blocks from 1 on")
+    inputs: dict[str, Any] = dict(given)
+    for name, column in values.items():
+        if name not in table.filled and (name in given or name in _SHAKING):
+            empty.add(name)  # an empty column gives nothing
+        elif name in empty:
+            raise InputError(
+                f"{table.name}: column {column_of(name)} is empty in the first rows and filled "
+                "below: fill it, or split the table"
+            )
+        else:
+            # an option holds for the rows whose cell is empty
+            inputs[name] = np.where(np.isnan(column), given.get(name, np.nan), column)
+    for name in (*SPACE, *_SHAKING_TEXTS):
+        if (cells := table.text(part, name)) is not None:
+            default = given.get(name) or ""
+            texts = np.array([cell or default for cell in cells], dtype=object)
+            if name in SPACE or (texts != "").any():
+                inputs[name] = texts
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
+    options = {name: inputs.pop(name) for name in _SHAKING_TEXTS if name in inputs}
     with table.named():
-        predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)
+        predicted = ask(
+            inputs, kind=requested, mode=modes, rows=True, **{**question, **options}
+        )
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")
@@ -226,7 +282,8 @@ def _answer(
     answer["in_domain"][bad] = False
     answer["how"][bad] = ""
     answer["reason"][bad] = [*faults.values()]
-    return predicted, answer
+    answer["warnings"] = codes_by_row(predicted.notes, count.size)
+    return predicted, answer, np.where(whole, count, 1.0)
 
 
 def _written(
@@ -235,6 +292,7 @@ def _written(
     partial: Path,
     stack: ExitStack,
     formulas: list[str],
+    notes: Sequence[str],
     *,
     excel_text: bool,
 ) -> Write:
@@ -245,7 +303,7 @@ def _written(
     kept = [name for name in table.file.header if name not in (*ANSWERS, OF_UNCERTAIN)]
     write = table_writer(
         partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
-        fast=True,
+        fast=True, notes=notes,
     )  # fmt: skip
     is_csv = partial.suffix.lower() == ".csv"
 

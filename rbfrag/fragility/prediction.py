@@ -16,7 +16,8 @@ from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
-from rbfrag.solver.kinds import by_model, mode_of_kind
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -395,8 +396,21 @@ def _answer_with_diagnostics(
         if holds:
             raise InputError(finding.about(finding.value), fields=(finding.name,))
 
+    def unstable(holds: bool, finding: Remark) -> None:
+        if holds:
+            text = f"{finding.name} = {finding.value:.4g}: {AT_REST}"
+            sentences.append(Diagnostic(text, "unstable_at_rest", severity="warning"))
+            ruled.append(BY_MECHANICS)
+
     judgement = answer_with_findings(
         model, given, tuple(given), quantiles, SINGLE,
-        say=say, refuse=refuse, unstable=refuse, nothing=False,
+        say=say, refuse=refuse, unstable=unstable, nothing=False,
     )  # fmt: skip
+    if any(isinstance(text, Diagnostic) for text in sentences):
+        certain = judgement.answer._replace(probability=1.0, low=1.0, high=1.0)
+        judgement = judgement._replace(answer=certain)
     return judgement, sentences, "".join(ruled)
+
+
+AT_REST = "unstable without shaking: check dip and friction"
+"""What is said of a block that fails without an earthquake."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
+
+from rbfrag.solver.kinds import BY_MECHANICS
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
@@ -40,9 +42,12 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     p, level = document["probability"], f"{100.0 * document['level']:g} %"
     low, high = document["ci_low"], document["ci_high"]
     event_low, sites = document["event_low"], document.get("sites")
+    questions = units_to_check(document["warnings"])
+    if p == 1.0 and document["how"] == BY_MECHANICS:
+        return (*questions, "P(failure) = 1   the block is unstable without shaking (by mechanics)")
     of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
     if high == 0.0:
-        return ("No such block fails.",)
+        return (*questions, "No such block fails.")
     of_block = document.get("block_sd")
     # what slides too far or slumps past a limit does not fall
     fall = "fall" if document["mode"] == "topple" else "fail"
@@ -50,6 +55,7 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     one = "s" if count in ("1", "fewer than 1") else ""
     known = f"{'' if ends == count else f'{ends} '}as far as the data tell it"
     sentences = [
+        *questions,
         f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, "
         f"{level})."
     ]
@@ -75,6 +81,11 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
             f"{high:.2g} in two of three cases."
         )
     return tuple(sentences)
+
+
+def units_to_check(warnings: Iterable[str]) -> list[str]:
+    """Return the questions about units, which stand above an answer."""
+    return [text for text in warnings if text.startswith("Check the unit")]
 
 
 def at_sites(number: float) -> str:

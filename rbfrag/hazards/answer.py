@@ -69,17 +69,18 @@ class BranchRate:
         name: the branch or statistic that the curve is of, or where it comes from.
         weight: its weight; None for a curve that is no branch.
         annual_rate: rates of the blocks [1/a], shape (m,).
+        expected: mean number of failures a year of all blocks [1/a].
     """
 
     name: str
     weight: float | None
     annual_rate: FloatArray
+    expected: float
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""
-        expected = float(np.nansum(self.annual_rate))
         return {
-            "name": self.name, "weight": self.weight, "expected_failures_per_year": expected,
+            "name": self.name, "weight": self.weight, "expected_failures_per_year": self.expected,
         }  # fmt: skip
 
 
@@ -123,6 +124,7 @@ class HazardAnswer(Tabular):
         warnings: what to know about the answer.
         reason: why a block cannot be used, shape (m,); empty text elsewhere.
         kinds: how each block fails, shape (m,); empty text where it cannot be used.
+        count: number of identical blocks of each row, shape (m,).
         tau: standard deviation of ln rate between measures, beside all intervals; None where it is
             not known.
     """
@@ -155,6 +157,7 @@ class HazardAnswer(Tabular):
     warnings: tuple[str, ...]
     reason: NDArray[np.object_]
     kinds: NDArray[np.object_]
+    count: FloatArray
     tau: float | None = None
 
     @property
@@ -179,12 +182,13 @@ class HazardAnswer(Tabular):
         if self.joint is not None:
             return self.joint.annual_rate_any
         known = np.flatnonzero(~np.isnan(self.annual_rate))
-        return float(self.annual_rate[known[0]]) if known.size == 1 else None
+        alone = known.size == 1 and self.count[known[0]] == 1.0
+        return float(self.annual_rate[known[0]]) if alone else None
 
     @property
     def expected_failures_per_year(self) -> float:
-        """Mean number of failures a year of all blocks [1/a], the sum of the rates known."""
-        return float(np.nansum(self.annual_rate))
+        """Mean number of failures a year of all blocks [1/a]: Σ count · rate of the rates known."""
+        return float(np.nansum(self.count * self.annual_rate))
 
 
 def hazard(
@@ -195,6 +199,7 @@ def hazard(
     at_least: Sequence[int] | None = None,
     years: float = 50.0,
     one_class: bool = False,
+    count: ArrayLike | None = None,
     run: Run | None = None,
     **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> HazardAnswer:
@@ -245,6 +250,7 @@ def hazard(
         years: period for the probability [a].
         one_class: the blocks stand for one class, and the answer is the rate of a block drawn
             from it: one rate, by the mean of their fragilities.
+        count: number of identical blocks of each, shape (m,); None for one each.
         run: does the parts of the work, as worker processes may; None for here.
         question: the keywords above.
 
@@ -261,7 +267,7 @@ def hazard(
     curves, weight = branch_curves(curve, weights, meaning)
     return hazard_at_sites(
         [curves], None, given, meaning, answering, weight=weight, joint=joint, at_least=at_least,
-        years=years, one_class=one_class, run=run,
+        years=years, one_class=one_class, count=count, run=run,
     )  # fmt: skip
 
 
@@ -277,6 +283,7 @@ def hazard_at_sites(
     at_least: Sequence[int] | None = None,
     years: float = 50.0,
     one_class: bool = False,
+    count: ArrayLike | None = None,
     run: Run | None = None,
 ) -> HazardAnswer:
     """Return how often per year blocks of some sites fail; see :func:`hazard`.
@@ -288,6 +295,7 @@ def hazard_at_sites(
         meaning: what the levels of the curves are.
         answering: model, level and database.
         weight: weights of the curves of a site, NaN for one that is no branch; None where none is.
+        count: number of identical blocks of each row, shape (m,); None for one each.
     """
     level, first = answering.get("level", LEVEL), [curves[0] for curves in sites]
     checked_years(years)
@@ -316,13 +324,15 @@ def hazard_at_sites(
         for own, some in KernelBlocks.of(part.model, reading.median, part.numbers, places):
             blocks.append((part.places[own], some))
     each = [(places, some, rates(some, mass, level, run)) for places, some in blocks]
-    result, total = _whole(each, sound.size, len(mass.branches)), _total_half(each, level)
+    number = np.ones(sound.size) if count is None else np.asarray(count, dtype=np.float64)
+    result, total = _whole(each, sound.size, len(mass.branches)), _total_half(each, number, level)
     if one_class:
         result, where = _of_class(result, total), np.zeros(1, dtype=np.intp)
+        number = np.ones(1)
     joints: tuple[JointRate | None, ...] = (None,) * len(sites)
     of_joints: tuple[str, ...] = ()
     if (joint or at_least is not None) and not one_class:
-        joints, of_joints = joint_at_sites(each, mass, at_least, years, level)
+        joints, of_joints = joint_at_sites(each, mass, at_least, years, level, number)
     ends = _beyond(result, mass, where)
     texts = [
         *remarks,
@@ -338,7 +348,7 @@ def hazard_at_sites(
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
         edges, contribution = curve_contributions(first[0], reading, [some for _, some in blocks])
-    whole = float(np.nansum(result.rate))
+    whole = float(np.nansum(number * result.rate))
     nothing = np.full(result.rate.shape, np.nan)
     low, high = nothing, nothing
     quantiles: dict[float, FloatArray] = {}
@@ -370,13 +380,14 @@ def hazard_at_sites(
         measure=first[0].measure,
         joints=joints,
         curve_kind="weighted branches" if weight is not None else first[0].statistic or None,
-        branches=_branches(sites[0], result, weight),
+        branches=_branches(sites[0], result, weight, number),
         quantiles=quantiles,
         total_low=float(interval_end(np.array(whole), total, -1.0)),
         total_high=float(interval_end(np.array(whole), total, 1.0)),
         warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
+        count=number,
         tau=LAW_TAU if by_law else None if meaning.get("convert") else TAU.get(reading.name),
     )
 
@@ -413,16 +424,18 @@ def _of_class(result: Rates, half: float) -> Rates:
     )
 
 
-def _total_half(each: Sequence[tuple[Indices, KernelBlocks, Rates]], level: float) -> float:
+def _total_half(
+    each: Sequence[tuple[Indices, KernelBlocks, Rates]], count: FloatArray, level: float
+) -> float:
     """Return what the interval of the sum of all rates reaches to on either side.
 
     Blocks of one model have its parameters in common; those of several are independent.
     """
     gradients: dict[str, tuple[Any, FloatArray]] = {}
-    for _, blocks, one in each:
+    for places, blocks, one in each:
         model = blocks.model
         before = gradients.get(model.name, (model.errors, np.zeros(one.gradient.shape[0])))[1]
-        gradients[model.name] = model.errors, before + one.gradient.sum(axis=1)
+        gradients[model.name] = model.errors, before + one.gradient @ count[places]
     halves = [
         float(half_width(errors, gradient[:, None], level)[0])
         for errors, gradient in gradients.values()
@@ -462,7 +475,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _branches(
-    curves: Sequence[HazardCurve], result: Rates, weight: FloatArray | None
+    curves: Sequence[HazardCurve], result: Rates, weight: FloatArray | None, count: FloatArray
 ) -> tuple[BranchRate, ...]:
     if len(curves) == 1:
         return ()
@@ -471,6 +484,7 @@ def _branches(
             curve_name(curve),
             None if weight is None or np.isnan(weight[i]) else float(weight[i]),
             result.branches[i],
+            float(np.nansum(count * result.branches[i])),
         )
         for i, curve in enumerate(curves)
     )

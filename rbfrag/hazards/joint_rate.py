@@ -27,6 +27,9 @@ NO_LAW = "bounds"
 MOST_JOINT = 4096
 """Most blocks that the dependence is taken for."""
 
+MOST_REPEATED = 100_000
+"""Most blocks of a site of which each is counted by itself for the bounds."""
+
 USUAL_COUNTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 """Numbers of failures whose rates are given where none are asked for."""
 
@@ -167,6 +170,7 @@ def joint_at_sites(
     at_least: Sequence[int] | None,
     years: float,
     level: float,
+    count: FloatArray,
 ) -> tuple[tuple[JointRate | None, ...], tuple[str, ...]]:
     """Return how often earthquakes fail several blocks of each site, and what is to be said.
 
@@ -176,29 +180,33 @@ def joint_at_sites(
             of a site do not reach is left out, unless those of no site do.
         years: period of the probabilities [a].
         level: confidence level of the interval.
+        count: number of identical blocks of each row, shape (m,).
 
     Raises:
         InputError: a number of failures that the blocks of no site reach.
     """
     sites = mass.mass.shape[0]
     number = np.zeros(sites, dtype=np.intp)
-    for _, blocks, _ in each:
-        number += np.bincount(blocks.site, minlength=sites)
+    for places, blocks, _ in each:
+        number += np.bincount(blocks.site, count[places], sites).astype(np.intp)
     most = int(np.max(number))
-    for count in at_least or ():
-        if isinstance(count, bool) or not 1 <= count <= most:
-            text = f"at least {count} failures of {most} blocks: give numbers from 1 to {most}"
+    for least in at_least or ():
+        if isinstance(least, bool) or not 1 <= least <= most:
+            text = f"at least {least} failures of {most} blocks: give numbers from 1 to {most}"
             raise InputError(text)
     result: list[JointRate | None] = [None] * sites
     why: dict[str, None] = {}
     for site in np.flatnonzero(number > 1).tolist():
-        here = [
-            (blocks.only(own), rates.gradient[:, own].sum(axis=1))
-            for _, blocks, rates in each
-            if (own := np.flatnonzero(blocks.site == site)).size
-        ]
+        here = []
+        for places, blocks, rates in each:
+            rows = np.flatnonzero(blocks.site == site)
+            if rows.size:  # identical blocks of a row have azimuths of their own
+                repeats = count[places[rows]].astype(np.intp)
+                if number[site] <= MOST_REPEATED:
+                    rows = np.repeat(rows, repeats)
+                here.append((blocks.only(rows), rates.gradient[:, rows].sum(axis=1)))
         counts = [k for k in ((1, *at_least) if at_least else USUAL_COUNTS) if k <= number[site]]
-        unknown = _unknown([blocks for blocks, _ in here])
+        unknown = _unknown([blocks for blocks, _ in here], int(number[site]))
         result[site] = _of_site(here, mass, site, counts, years, level, known=not unknown)
         if unknown:
             why[unknown] = None
@@ -216,15 +224,15 @@ def joint_at_sites(
     )
 
 
-def _unknown(here: Sequence[KernelBlocks]) -> str:
-    """Return why it is not known what the blocks of a site share; empty text where it is."""
+def _unknown(here: Sequence[KernelBlocks], number: int) -> str:
+    """Return why it is not known what so many blocks of a site share; empty where it is."""
     models = {blocks.model.name: blocks.model for blocks in here}
     if any(model.dependence is None or model.method.block.size is None
            for model in models.values()):  # fmt: skip
         return "what the blocks share in one earthquake is not known to this model"
     if len(models) > 1:
         return "what blocks of several models share in one earthquake is not known"
-    if sum(blocks.size for blocks in here) > MOST_JOINT:
+    if number > MOST_JOINT:
         return f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
     return ""
 

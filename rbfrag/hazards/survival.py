@@ -177,7 +177,8 @@ def survival(
             by quadrature.
         seed: seed of these draws.
         question: the keywords of :func:`rbfrag.hazard`, with the standard deviations of blocks,
-            which are independent from block to block; the blocks are of one kind.
+            which are independent from block to block; the blocks are of one kind, and ``kind`` is
+            required.
 
     Raises:
         InputError: curves of several measures or sites, weights that do not add up to 1, blocks of
@@ -194,6 +195,7 @@ def survival(
     known: ModelBlocks | None = None
     blocks: StandingBlocks
     if fragility is None:
+        require_kind(given)
         shaking = LevelShaking.of(each[0], **meaning)
         known = blocks = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
     elif not given:
@@ -233,6 +235,25 @@ def survival(
         warnings=tuple(dict.fromkeys(_warnings(each, rates, blocks))),
         standing=middle,
     )
+
+
+def require_kind(given: Mapping[str, Any]) -> None:
+    """Reject standing blocks of which it is not given whether they are free-standing.
+
+    Most blocks that are studied are, and a backed block fails far more rarely.
+
+    Args:
+        given: fields of the blocks, with ``kind``.
+    """
+    kinds = given.get("kind")
+    stated = all(kinds) if isinstance(kinds, Sequence) else kinds is not None
+    if not stated and {"restitution", "ky", "ks", "kct"}.isdisjoint(given):
+        raise InputError(KIND_MISSING, fields=("kind",))
+
+
+KIND_MISSING = (
+    "kind is missing: give rocking (free-standing, overturns) or toppling (backed by rock)"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
-from rbfrag.question.many import OF_ALL, many_blocks
+from rbfrag.question.many import many_blocks
 from rbfrag.question.shapes import SPACE
 from rbfrag.solver.kinds import BY_MECHANICS
 
@@ -57,8 +57,7 @@ def ask_many(
     Raises:
         InputError: nothing of it can be answered for, or, if asked, an element.
     """
-    backed = {name: given[name] for name in OF_ALL if name in given}
-    numbers = {name: value for name, value in given.items() if name not in backed}
+    numbers = dict(given)
     each = {"kind": kind, "mode": mode}
     texts = {
         n: np.zeros(len(v)) for n, v in each.items() if v is not None and not isinstance(v, str)
@@ -67,10 +66,10 @@ def ask_many(
     texts |= {name: np.zeros(text.shape) for name, text in planes.items()}
     values, shape = flat({**numbers, **texts})
     size = int(np.prod(shape))
-    backed |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
+    written = {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
-    blocks = many_blocks({**block, **backed}, size, kinds=kind, modes=mode, rows=rows)
+    blocks = many_blocks({**block, **written}, size, kinds=kind, modes=mode, rows=rows)
     if not rows:
         _refuse_unread(blocks, block)
     if weights is not None:
@@ -111,15 +110,14 @@ def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
     kind = known.pop("kind", None)
     if "block" in known:
         return one_block(known, kind), 1
-    backed = {name: known.pop(name) for name in OF_ALL if name in known}
     each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
     planes = {name: np.array(known.pop(name), dtype=object) for name in SPACE if name in known}
     each_text = {name: np.zeros(text.shape) for name, text in planes.items()}
     values, shape = flat({**known, **each, **each_text})
     size = int(np.prod(shape))
     numbers: dict[str, Any] = {name: values[name] for name in known}
-    backed |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
-    blocks = many_blocks({**numbers, **backed}, size, kinds=kind)
+    numbers |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
+    blocks = many_blocks(numbers, size, kinds=kind)
     if not each:  # of a table that states the kinds, others may read what these do not
         _refuse_unread(blocks, known)
     return blocks, size

@@ -27,12 +27,13 @@ from rbfrag.question.fields import (
 )
 from rbfrag.question.shapes import (
     BOND,
+    DENSITY_ASSUMED,
+    DENSITY_KG_M3,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
     JOINT,
     LEAST_M,
-    MOST_M,
     NO_MODEL,
     OF_A_SHAPE,
     PLANES,
@@ -41,10 +42,13 @@ from rbfrag.question.shapes import (
     SPACE,
     WAYS,
     ModeShapes,
+    check_lengths,
     check_ranges,
+    check_size,
     numbers_of_shape,
     shape_among,
 )
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
@@ -112,6 +116,7 @@ class Blocks(NamedTuple):
         kinds: kind of each, a place in ``KINDS``, -1 for none; None where all are of one group.
         modes: failure mode of each, a place in :data:`MODES`, -1 where that is not known.
         read: the fields that were read.
+        at_rest: why a single block fails without an earthquake; empty where it stands.
     """
 
     groups: tuple[Group, ...]
@@ -121,6 +126,7 @@ class Blocks(NamedTuple):
     kinds: NDArray[np.int8] | None = None
     modes: NDArray[np.int8] | None = None
     read: frozenset[str] = frozenset()
+    at_rest: str = ""
 
 
 def has_shape(given: Collection[str]) -> bool:
@@ -224,6 +230,7 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     stated = {name: number(planes[name], name, "a number") for name in PLANES if name in planes}
     listener = _One()
     check_ranges({**sides, **stated}, listener)
+    check_lengths(sides, listener)
     block = getattr(Block, SHAPES[names])(*sides.values()) if names else given["block"]
     if not isinstance(block, Block):
         raise InputError(f"block = {block!r:.60}: make one with Block.rectangle or its siblings")
@@ -233,12 +240,13 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     for name in ("beta_deg", "phi_deg"):
         if name not in planes and not is_rectangle:
             raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
-    return Shape(
-        block,
-        {**planes, **stated, **bond_of(planes)},
-        is_rectangle,
-        (*off_section, *listener.remarks),
-    )
+    bond = bond_of(planes)
+    needed = any(bond.get(name) for name in ("cohesion_pa", "water_m", "jrc"))
+    if needed and "density_kg_m3" not in bond:
+        bond["density_kg_m3"] = DENSITY_KG_M3
+        listener.remarks.append(DENSITY_ASSUMED)
+    remarks = (*off_section, *listener.remarks)
+    return Shape(block, {**planes, **stated, **bond}, is_rectangle, remarks)
 
 
 def sectioned(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
@@ -285,6 +293,10 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name != "kv"}
 
 
+class _FailsAtRest(Exception):  # noqa: N818
+    """A single block fails without an earthquake; the text is the reason."""
+
+
 class _One:
     """Raises the first reason against a single block, with what is suspicious about its angles."""
 
@@ -298,9 +310,13 @@ class _One:
             raise InputError(text, fields=(*fields, *PLANES))
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        self.refuse(holds, text, **values)
+        if holds:
+            raise _FailsAtRest(text.format(**values))
 
-    def remark(self, holds: Any, text: str) -> None:
+    def remark(self, holds: Any, text: str, **values: Any) -> None:
+        if holds and values:
+            assert isinstance(text, Diagnostic)
+            text = text.replaced(text=text.format(**values))
         if holds:
             self.remarks.append(text)
 
@@ -333,7 +349,11 @@ def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str
 
 
 def one_block(
-    given: Mapping[str, Any], kind: str | None = None, pga_g: float | None = None
+    given: Mapping[str, Any],
+    kind: str | None = None,
+    pga_g: float | None = None,
+    *,
+    at_rest: bool = False,
 ) -> Blocks:
     """Return a single block as answers read it.
 
@@ -341,6 +361,7 @@ def one_block(
         given: fields of it that are stated; ``block`` may be a :class:`Block`.
         kind: how it is asked to fail; None for what its shape or its numbers say.
         pga_g: PGA at which it is said whether the toe of a block that topples holds [g].
+        at_rest: accept a block that fails without an earthquake; ``at_rest`` has the reason.
 
     Raises:
         InputError: it is described twice or in part, is of another kind than is requested, slides
@@ -353,7 +374,10 @@ def one_block(
         block = block_of(given, kind)
         if kind in (None, block.kind):  # what another kind reads the choice of its model says
             check_numbers(block.kind, block, given)
-        return Blocks((Group(kind, given),), unread)
+        listener = _One()
+        if isinstance(given.get("p2"), int | float):
+            check_size(given["p2"], listener)
+        return Blocks((Group(kind, given),), (*unread, *listener.remarks))
     from rbfrag.solver.stability.first_slip import after_first_slip
     from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged
@@ -374,21 +398,30 @@ def one_block(
     planes = shape.rough()
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
-    planes, after = after_first_slip(shape.block, planes)
-    finding, *_ = judged(shape.block, **planes)
+    before_slip = {name: planes[name] for name in planes if name != "phi_residual_deg"}
+    finding, *_ = judged(shape.block, **before_slip)
+    after: tuple[str, ...] = ()
+    if finding.k > 0.0:
+        planes, after = after_first_slip(shape.block, planes)
+        if after:
+            finding, *_ = judged(shape.block, **planes)
     listener = _One(shape.remarks)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
-    numbers_read = numbers_of_shape(
-        facts,
-        ModeShapes(
-            shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
-            finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
-            bool(planes.get("jrc")), bool(planes.get("water_m")),
-        ),
-        math.nan if displacement_m is None else displacement_m,
-        others,
-        listener,
+    judged_shape = ModeShapes(
+        shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
+        finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
+        bool(planes.get("jrc")), bool(planes.get("water_m")),
     )  # fmt: skip
+    limit_m = math.nan if displacement_m is None else displacement_m
+    try:
+        numbers_read = numbers_of_shape(facts, judged_shape, limit_m, others, listener)
+    except _FailsAtRest as reason:
+        if not at_rest:
+            raise InputError("; ".join((str(reason), *shape.remarks)), fields=PLANES) from None
+        return Blocks(
+            (Group(facts.kind, {}),), (*off_section, *shape.remarks, *unread),
+            at_rest=str(reason),
+        )  # fmt: skip
     remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
     remarks += [*after, *listener.remarks]
     remarks += [*shape.remarks, *unread]
@@ -402,9 +435,14 @@ def one_block(
         from rbfrag.solver.stability.toe import about_toe
 
         remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))
-    across_m = 2.0 * shape.block.r3_m
-    if not LEAST_M <= across_m <= MOST_M:
-        remarks.append(f"the block measures some {across_m:.2g} m: lengths are in m")
+    across_m, size = 2.0 * shape.block.r3_m, _One()
+    check_size(shape.block.p2, size)
+    if across_m < LEAST_M:
+        size.remarks.append(
+            Diagnostic(f"Check the unit: the block measures {across_m:.2g} m", "check_unit")
+        )
+    if not any(isinstance(r, Diagnostic) and r.code == "check_unit" for r in shape.remarks):
+        remarks += size.remarks
     if displacement_m is not None and "ky" not in numbers_read:
         remarks.append(f"displacement_m is not read: the block is of kind {facts.kind}")
     return Blocks((Group(facts.kind, numbers_read),), tuple(remarks))

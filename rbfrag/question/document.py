@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import STATED
-from rbfrag.fragility.prediction import Prediction, answer_given
+from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.question.fields import SCENE
+from rbfrag.question.question import OF_SHAKING, ask_at_rest, described
+from rbfrag.results.diagnostic import diagnostics
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -29,6 +31,39 @@ BESIDE_A_MOTION = (
     "the motion is the shaking at its site: leave rjb_km, vs30_m_s, amplification, mechanism and "
     "gmm out"
 )
+
+
+def answer_block(
+    inputs: Mapping[str, Any], *, kind: str | None = None, **how: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the answer for one block, given by its shape or its numbers.
+
+    Args:
+        inputs: fields of block and shaking.
+        kind: how the block fails; None for what it is given by.
+        how: as for :func:`prediction_document`.
+
+    Returns:
+        The document, and the numbers of the block and the measures that it is the answer for.
+
+    Raises:
+        InputError: as of :func:`prediction_document`, and a block that is described in part.
+    """
+    blocks = described(inputs, kind)
+    (group,) = blocks.groups
+    measures = {name: value for name, value in inputs.items() if name in OF_SHAKING}
+    numbers = {**group.numbers, **measures}
+    remarks = (*how.pop("remarks", ()), *blocks.remarks)
+    if not blocks.at_rest:
+        how["remarks"] = remarks
+        return prediction_document(numbers, kind=group.kind, **how), numbers
+    # what is wrong with the shaking is found as for a block that stands
+    motion = how.pop("motion", None)
+    asked = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
+    names = ("kind", "model", "level", "db", "mechanism", "gmm", "rotation_deg", "sites")
+    options = {name: how[name] for name in names if how.get(name) is not None}
+    answer = with_remarks(ask_at_rest(asked, blocks, **options), remarks)
+    return _document([answer], [], how.get("sites")), numbers
 
 
 def prediction_document(
@@ -106,13 +141,21 @@ def prediction_document(
             assert isinstance(answer, Prediction)
             others.append(answer)
         unused = unused_measures(models[0], given)
-    recommended = others[0]
+    return _document(others, (*remarks, *unused), sites)
+
+
+def _document(
+    answers: Sequence[Prediction], warnings: Sequence[str], sites: float | None
+) -> dict[str, Any]:
+    """Return the answers of some models, the recommended first, under the keys of the contract."""
+    recommended = answers[0]
     document = recommended.as_dict()
-    document["warnings"] = [*remarks, *unused, *recommended.warnings]
+    document["warnings"] = [*diagnostics(warnings, recommended.warnings)]
     if sites is not None:
         document["sites"] = int(sites)
     document["answers"] = [
-        {name: getattr(each, name) for name in OF_EACH_MODEL} | {"recommended": each is recommended}
-        for each in others
+        {name: getattr(answer, name) for name in OF_EACH_MODEL}
+        | {"recommended": answer is recommended}
+        for answer in answers
     ]
     return document

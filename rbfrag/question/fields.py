@@ -482,7 +482,10 @@ class WholeFields(SpaceFields, total=False):
     cohesion_pa: Annotated[
         float | None, Field("Cohesion of the base, with {density_kg_m3}", "Pa", least=0.0)
     ]
-    density_kg_m3: Annotated[float | None, Field("Density of the rock", "kg/m³", above=0.0)]
+    density_kg_m3: Annotated[
+        float | None,
+        Field("Density of the rock; default: 2650", "kg/m³", ("density",), above=0.0),
+    ]
     kind: Annotated[str | None, _KIND]
 
 
@@ -688,9 +691,13 @@ def keywords_in_words(fields: Any) -> str:
     return "\n".join(lines)
 
 
+BY_ROW = ("back_fracture", "cohesion_pa", "density_kg_m3")
+"""Fields of :class:`WholeFields` that a table may give row by row."""
+
+
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
-    return (*names_of(BlockFields, ShakingFields, RowFields, SpaceFields), "density_kg_m3")
+    return names_of(BlockFields, ShakingFields, RowFields, SpaceFields, *BY_ROW, "mechanism")
 
 
 def column_of(name: str) -> str:
@@ -729,16 +736,16 @@ def by_field(words: Mapping[str, Any]) -> dict[str, Any]:
     given: dict[str, Any] = {}
     words_of: dict[str, str] = {}
     for word, value in words.items():
-        if value is None or value is False:
-            continue
         name = name_of(word)
+        if value is None or (value is False and word != name):
+            continue
         if name in given:
             raise InputError(
                 f"{word} does not go with {words_of[name]}: both say the same",
                 fields=(word, words_of[name]),
             )
         words_of[name] = word
-        given[name] = False if declared()[name].is_flag else value
+        given[name] = False if declared()[name].is_flag and word != name else value
     return given
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.question.fields import AnsweringFields, BlockFields, V, WholeFields
-from rbfrag.question.question import unknown_field
+from rbfrag.question.question import by_field_name
 
 if TYPE_CHECKING:
     from rbfrag.fragility.model import FragilityModel
@@ -35,13 +35,13 @@ def parts_of(numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Any) -
         InputError: p2 or kr is given twice, or there are more numbers than these.
         UnknownFieldError: a keyword that no class declares.
     """
+    known = {name for part in parts for name in part.__optional_keys__}
+    if not keywords.keys() <= known:
+        keywords = by_field_name(keywords, known)
     first = dict(zip(("p2", "kr"), numbers, strict=False))
     if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
         raise InputError("p2 and kr come first, or by their names: give each once")
     whole = {name: value for name, value in {**first, **keywords}.items() if value is not None}
-    known = {name for part in parts for name in part.__optional_keys__}
-    if not keywords.keys() <= known:
-        raise unknown_field(keywords, known)
     return [{n: v for n, v in whole.items() if n in part.__optional_keys__} for part in parts]
 
 

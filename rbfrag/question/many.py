@@ -19,16 +19,18 @@ from rbfrag.question.blocks import (
     Blocks,
     Group,
     Refused,
-    bond_of,
     kinds_by_numbers,
     read_by_some,
     requested_kind,
 )
 from rbfrag.question.shapes import (
     BOND,
+    DENSITY_ASSUMED,
+    DENSITY_KG_M3,
     FRICTION_MISSING,
     JOINT,
     LEAST_M,
+    LENGTHS,
     MOST_M,
     NO_MODEL,
     PLANES,
@@ -37,21 +39,22 @@ from rbfrag.question.shapes import (
     SPACE,
     UNSTABLE_AT_REST,
     ModeShapes,
+    check_lengths,
     check_ranges,
+    check_size,
     numbers_of_shape,
     shape_among,
 )
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.arrays import REASONS, BlockArray
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
 from rbfrag.solver.stability.first_slip import AFTER_SLIP, SLIPS_ON
+from rbfrag.solver.stability.joint import NO_FRACTURE
 from rbfrag.solver.stability.modes import MODES, words_of_mode
 
 _IF_EMPTY = {"beta_deg": 0.0}
-"""What an option stands for that is not stated: a level base, and a back plane never left."""
-
-OF_ALL = ("back_fracture", *BOND)
-"""Fields that hold one value for all blocks."""
+"""What an empty cell stands for beside the numbers of a block: a level base."""
 
 _FACTS = tuple(KINDS.values())
 
@@ -70,7 +73,7 @@ def many_blocks(
 
     Args:
         given: fields that are stated, flat arrays of the number of blocks, or of one element for
-            all; ``back_fracture``, a truth value, is said of all.
+            all; ``back_fracture`` is 0 where there is none.
         size: number of blocks.
         kinds: how they are asked to fail, one kind for all or one each; None or an empty text for
             what shape, mode or numbers say.
@@ -113,9 +116,22 @@ class _Some:
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         self._keep(self.whole.unstable, holds, text, values)
 
-    def remark(self, holds: Any, text: str) -> None:
-        if np.any(holds & self.whole.free[self.places]):
-            self.whole.remarks[text] = None
+    def remark(self, holds: Any, text: str, **values: Any) -> None:
+        rows = np.flatnonzero(np.broadcast_to(holds, self.places.shape) & self._free())
+        if not rows.size:
+            return
+        # of several values the first is the example
+        first = {n: np.broadcast_to(v, self.places.shape)[rows[0]] for n, v in values.items()}
+        about = text if isinstance(text, Diagnostic) else Diagnostic(text)
+        shown = about.format(**first) if values else str(about)
+        more = f" (and {rows.size - 1:,} more rows)" if values and rows.size > 1 else ""
+        places = self.places[rows]
+        if (before := self.whole.remarks.get(str(about))) is not None:
+            shown, more, places = str(before), "", np.concatenate([before.rows, places])
+        self.whole.remarks[str(about)] = about.replaced(text=shown + more, rows=places)
+
+    def _free(self) -> NDArray[np.bool_]:
+        return self.whole.free[self.places]
 
     def _keep(self, reasons: list[Refused], holds: Any, text: str, values: dict[str, Any]) -> None:
         here = np.flatnonzero(holds & self.whole.free[self.places])
@@ -130,10 +146,10 @@ class _Sorted:
 
     def __init__(self, given: Mapping[str, Any], size: int, rows: bool) -> None:
         self.size, self.rows = size, rows
-        self.of_all = {name: given[name] for name in OF_ALL if name in given}
-        self.backed = bool(self.of_all.get("back_fracture", True))
-        self.bond = bond_of(self.of_all)
-        self.given = {name: value for name, value in given.items() if name not in OF_ALL}
+        backed = np.asarray(given.get("back_fracture", 1.0), dtype=np.float64)
+        self.backed = np.broadcast_to(backed != 0.0, (size,))
+        """Behind which blocks a plane is; where that is not given, one is."""
+        self.given = {name: value for name, value in given.items() if name != "back_fracture"}
         self.groups: list[Group] = []
         self.refused: list[Refused] = []
         self.unstable: list[Refused] = []
@@ -143,7 +159,7 @@ class _Sorted:
         """Which blocks are sorted."""
         self.kinds = np.full(size, -1, dtype=np.int8)
         self.modes = np.full(size, -1, dtype=np.int8)
-        self.remarks: dict[str, None] = {}
+        self.remarks: dict[str, Diagnostic] = {}
         self.read: set[str] = set()
 
     def blocks(
@@ -167,7 +183,7 @@ class _Sorted:
         if not self.done.all():
             self._sort_numbers(np.flatnonzero(~self.done))
         return Blocks(
-            tuple(self.groups), tuple(self.remarks), tuple(self.refused),
+            tuple(self.groups), tuple(self.remarks.values()), tuple(self.refused),
             tuple(self.unstable), self.kinds, self.modes,
             frozenset(self.read),
         )  # fmt: skip
@@ -182,12 +198,15 @@ class _Sorted:
         if kinds is None and modes is None:
             return
         nothing = [""] * self.size
-        whys: dict[tuple[str, str, int], list[int]] = {}
-        pairs = zip(kinds or nothing, modes or nothing, self.kinds.tolist(), strict=True)
-        for i, (kind, mode, code) in enumerate(pairs):
-            pair = (str(kind or "").strip(), str(mode or "").strip(), code)
-            whys.setdefault(pair, []).append(i)
-        for (kind, mode, code), places in whys.items():
+        whys: dict[tuple[str, str, int, bool], list[int]] = {}
+        rows = zip(
+            kinds or nothing, modes or nothing, self.kinds.tolist(), self.backed.tolist(),
+            strict=True,
+        )  # fmt: skip
+        for i, (kind, mode, code, backed) in enumerate(rows):
+            row = (str(kind or "").strip(), str(mode or "").strip(), code, backed)
+            whys.setdefault(row, []).append(i)
+        for (kind, mode, code, backed), places in whys.items():
             here = np.array(places)
             if kind and kind not in KINDS:
                 text = f"kind = {kind[:40]!r} is none of {', '.join(KINDS)}"
@@ -196,7 +215,7 @@ class _Sorted:
             if kind:
                 code = _codes()[kind]
             elif code < 0 and mode in MODES:
-                code = _codes()[kind_of_mode(mode, back_fracture=self.backed).kind]
+                code = _codes()[kind_of_mode(mode, back_fracture=backed).kind]
             self.kinds[here] = code
             if mode in MODES:
                 self.modes[here] = MODES.index(mode)
@@ -227,8 +246,8 @@ class _Sorted:
             if begun and not whole and not kinds_by_numbers(self.given):
                 shape_among(self.given)
             return whole
-        of_all = [name for name in self.of_all if name != "back_fracture" or not self.backed]
-        shape = shape_among({*self.given, *of_all})
+        without_back = () if self.backed.all() else ("back_fracture",)
+        shape = shape_among({*self.given, *without_back})
         if shape is not None and (numbers := [name for name in NUMBERS if name in self.given]):
             raise InputError(
                 f"{numbers[0]} does not go with {shape[0]}: a block is described once",
@@ -294,32 +313,34 @@ class _Sorted:
                 name: self._stated(name) for name in _numbers_of(facts) if name in self.given
             }
             self.read |= numbers.keys()
+            if "p2" in numbers:
+                check_size(_at(numbers["p2"], here), _Some(self, here))
             self.group(facts, here, {name: _at(value, here) for name, value in numbers.items()})
 
     def _sort_shapes(self, shape: tuple[str, ...], places: Places) -> None:
         """Sort blocks that are given by their shape."""
-        planes = [name for name in (*PLANES, *JOINT) if name in self.given]
-        self.read |= {*shape, *planes, *self.of_all}
+        planes = [name for name in (*PLANES, *JOINT, *BOND) if name in self.given]
+        self.read |= {*shape, *planes, "back_fracture"}
         stated = {name: _at(self.given[name], places) for name in (*shape, *planes)}
         if shape != RECTANGLE:
             for name in ("beta_deg", "phi_deg"):
                 if name not in stated:
                     raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
-        elif self.rows and "beta_deg" in stated:
-            stated["beta_deg"] = np.nan_to_num(stated["beta_deg"], nan=0.0, posinf=np.inf)
         listener = _Some(self, places)
-        # an empty cell states nothing, nor does what has a default
-        unsaid = JOINT if self.rows else ("joint_length_m", "phi_residual_deg")
+        # an empty cell gives nothing, nor does what has a default
+        unsaid = (*JOINT, *BOND) if self.rows else ("joint_length_m", "phi_residual_deg")
         there = {n: np.nan_to_num(v, nan=1.0) if n in unsaid else v for n, v in stated.items()}
         check_ranges(there, listener, columns=self.rows)
+        check_lengths(stated, listener)
         stated.setdefault("beta_deg", np.zeros(1))
         stated.setdefault("phi_deg", np.full(1, np.nan))
         stated.setdefault("phi_back_deg", stated["phi_deg"])
         if shape != RECTANGLE:
             listener.refuse(np.isnan(stated["phi_deg"]), FRICTION_MISSING)
-        is_free = np.array([*(facts.free_standing for facts in _FACTS), not self.backed])
+        free_kinds, kinds = np.array([facts.free_standing for facts in _FACTS]), self.kinds[places]
+        is_free = np.where(kinds < 0, ~self.backed[places], free_kinds[kinds])
         for free_standing in (False, True):
-            own = (is_free[self.kinds[places]] == free_standing) & self.free[places]
+            own = (is_free == free_standing) & self.free[places]
             if own.any():
                 here = np.flatnonzero(own)
                 values = {name: _at(value, here) for name, value in stated.items()}
@@ -336,8 +357,9 @@ class _Sorted:
         # a friction angle that leaves a rectangle no choice: between that of its toe and 90°
         phi = np.where(taken, 0.5 * (blocks.alpha3_deg + 90.0), phi)
         back = np.where(np.isnan(back), phi, back)
-        strength, listener = dict(self.bond), _Some(self, places)
-        for name in ("water_m", "jrc", "joint_length_m"):
+        strength: dict[str, Any] = {}
+        listener = _Some(self, places)
+        for name in ("cohesion_pa", "water_m", "jrc", "joint_length_m"):
             if name in stated:
                 strength[name] = np.nan_to_num(stated[name])
         if "jrc" in stated:
@@ -347,8 +369,15 @@ class _Sorted:
                 (strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa"
             )
             strength["jcs_mpa"] = np.nan_to_num(jcs, nan=1.0)
-        if free_standing:
-            strength.pop("water_m", None)
+        if free_standing and "water_m" in strength:
+            listener.refuse(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
+        if strength:
+            density = stated.get("density_kg_m3", np.full(1, np.nan))
+            needed: Any = False
+            for name in ("cohesion_pa", "water_m", "jrc"):
+                needed = needed | (strength.get(name, np.zeros(1)) > 0.0)
+            listener.remark(np.isnan(density) & needed, DENSITY_ASSUMED)
+            strength["density_kg_m3"] = np.where(np.isnan(density), DENSITY_KG_M3, density)
         on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
         judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
         residual = stated.get("phi_residual_deg", np.full(1, np.nan))
@@ -375,12 +404,11 @@ class _Sorted:
             listener.refuse(reasons == code, REASONS[code])
         self.modes[places] = codes
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
-        unusual = int(np.count_nonzero((across_m < LEAST_M) | (across_m > MOST_M)))
-        if unusual:
-            self.remarks[
-                f"{unusual:,} of {n:,} blocks measure less than {LEAST_M:g} m or more than "
-                f"{MOST_M:g} m: lengths are in m"
-            ] = None
+        text = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
+        listener.remark(across_m < LEAST_M, text, value=across_m)
+        long = [stated[name] > MOST_M for name in LENGTHS if name in stated]
+        if not np.any(long):
+            check_size(np.broadcast_to(blocks.p2, (n,)), listener)
         displacement = np.full(1, np.nan)
         if "displacement_m" in self.given:
             self.read.add("displacement_m")
@@ -403,8 +431,8 @@ class _Sorted:
             self.kinds[of_these] = _FACTS.index(facts)
             judged = ModeShapes(
                 blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
-                _at(back, here), _at(taken, here), self.backed,
-                ~left[here] & bool(self.bond.get("cohesion_pa")),
+                _at(back, here), _at(taken, here), self.backed[of_these],
+                _at(np.asarray(strength.get("cohesion_pa", np.zeros(1))) > 0.0, here),
                 _at(np.asarray(strength.get("jrc", np.zeros(1))) > 0.0, here),
                 _at(np.asarray(strength.get("water_m", np.zeros(1))) > 0.0, here),
             )  # fmt: skip

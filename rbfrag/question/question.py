@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
-from rbfrag.fragility.prediction import Prediction, answer_given, is_single, with_remarks
+from rbfrag.fragility.prediction import (
+    AT_REST,
+    Prediction,
+    answer_given,
+    is_single,
+    with_remarks,
+)
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.fields import (
     SCENE,
@@ -23,6 +29,8 @@ from rbfrag.question.fields import (
     keywords_in_words,
     names_of,
 )
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.solver.kinds import BY_MECHANICS, facts_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -96,7 +104,7 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
         DatabaseError: the database cannot be read.
     """
     if not question.keys() <= QuestionFields.__optional_keys__:
-        raise unknown_field(question, QuestionFields.__optional_keys__)
+        question = by_field_name(question, QuestionFields.__optional_keys__)
     given: dict[str, Any] = {} if p2 is None else {"p2": p2}
     if kr is not None:
         given["kr"] = kr
@@ -128,17 +136,50 @@ if predict.__doc__:  # python -OO leaves none
     predict.__doc__ = predict.__doc__.replace("    KEYWORDS", keywords_in_words(QuestionFields))
 
 
-def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownFieldError:
-    """Return the error of the first keyword that is none, with the one that may be meant."""
+def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
+    """Return inputs by their field, whichever of its names each is given by.
+
+    Args:
+        question: values by keyword, option word or name of a column.
+        known: fields that the answer takes.
+
+    Raises:
+        UnknownFieldError: a name of no such field, with the one that may be meant.
+        InputError: one field by two names.
+    """
+    from rbfrag.question.table import field_of
+
+    result: dict[str, Any] = {}
+    names: dict[str, str] = {}
+    for name, value in question.items():
+        field = name
+        if name not in known:
+            match = field_of(name)
+            if match is None or match.field not in known or match.unit is not None:
+                raise unknown_field(name, known)
+            field = match.field
+            if match.column == "no_back" and value is not None:
+                value = not value
+            elif match.column == "free_standing":
+                value = "rocking" if value else None
+        if field in result:
+            both = (names[field], name)
+            raise InputError(f"{name} and {names[field]} are the same field: give one", fields=both)
+        result[field], names[field] = value, name
+    return result
+
+
+def unknown_field(name: str, known: Collection[str]) -> UnknownFieldError:
+    """Return the error of a name that is not a field, with the one that may be meant."""
     from difflib import get_close_matches
 
     from rbfrag.question.table import field_of
 
-    name = next(name for name in question if name not in known)
-    stated = field_of(name)
-    near = [stated[0]] if stated else get_close_matches(name, known, 1)
-    hint = f": did you mean {near[0]}?" if near else "; help(rbfrag.predict) lists them"
-    return UnknownFieldError(f"{name[:60]} is no field of a question{hint}")
+    match = field_of(name)
+    near = [match.field] if match else get_close_matches(name, known, 1)
+    near = [field for field in near if field in known]
+    hint = f"; did you mean {near[0]!r}?" if near else "; help(rbfrag.predict) lists them"
+    return UnknownFieldError(f"unknown field {name[:60]!r}{hint}")
 
 
 OF_SHAKING = frozenset({*names_of(ShakingFields), *MEASURES})
@@ -146,9 +187,51 @@ OF_SHAKING = frozenset({*names_of(ShakingFields), *MEASURES})
 
 
 def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
-    """Return the single block of a question as answers read it; its measures are left aside."""
+    """Return the single block of a question as answers read it, without its measures.
+
+    A block that fails at rest has no numbers; ``at_rest`` has the reason.
+    """
     block = {n: value for n, value in given.items() if n not in OF_SHAKING}
-    return one_block(block, kind, given.get("pga_g"))
+    return one_block(block, kind, given.get("pga_g"), at_rest=True)
+
+
+def ask_at_rest(
+    measures: Mapping[str, Any],
+    blocks: Blocks,
+    *,
+    model: Model | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    rotation_deg: float | None = None,
+    **scenario: Any,
+) -> Prediction:
+    """Return P = 1 of a block that fails without an earthquake, with the reason.
+
+    Args:
+        measures: the shaking, which must suffice for a model as it does for any block.
+        blocks: the block; ``at_rest`` has the reason.
+        model: the model that is asked for; the answer names it, and does not use it.
+        level: confidence level.
+        db: database of the model.
+        rotation_deg: rotation that counts as failure [deg].
+        scenario: ``mechanism`` and ``gmm`` of a scenario, and what else the block does not need.
+    """
+    (group,) = blocks.groups
+    assert group.kind is not None
+    if scenario.get("mechanism") or scenario.get("gmm") or not SCENE.isdisjoint(measures):
+        from rbfrag.question.scenario import Source, shaken
+
+        source = Source(scenario.get("mechanism"), scenario.get("gmm"))
+        measures, _ = shaken(measures, source, model, db)
+    names = (*facts_of(group.kind).parameters, *measures)
+    chosen = find_model(model, names, db, kind=group.kind, rotation_deg=rotation_deg)
+    text = f"{blocks.at_rest} ({AT_REST})"
+    warning = Diagnostic(text, "unstable_at_rest", severity="warning")
+    return Prediction(
+        group.kind, 1.0, 1.0, 1.0, None, None, level, chosen.row.name, chosen.term.name,
+        chosen.method.name, group.kind, None, 0.0, True, (warning,), data=chosen.data,
+        how=BY_MECHANICS,
+    )  # fmt: skip
 
 
 def _answer_motion(
@@ -166,6 +249,9 @@ def _answer_motion(
     measures = {name: value for name, value in given.items() if name in OF_SHAKING}
     blocks = described(given, kind)
     group = blocks.groups[0]
+    if blocks.at_rest:
+        of_record = {"xp_m_s": 0.0, "pga_g": 0.0}
+        return with_remarks(ask_at_rest(of_record, blocks, **options), blocks.remarks)
     answer = predict_motion(
         {**group.numbers, **measures}, motion, kind=group.kind, polarity=polarity, **options
     )
@@ -230,6 +316,11 @@ def ask(
             blocks = described(given, kind)
             (group,) = blocks.groups
             own = {**group.numbers, **{n: given[n] for n in given if n in MEASURES}}
+            if blocks.at_rest:
+                at_rest = ask_at_rest(
+                    own, blocks, model=model, level=level, db=db, rotation_deg=rotation_deg
+                )
+                return with_remarks(at_rest, blocks.remarks)
             chosen = find_model(model, own, db, kind=group.kind, rotation_deg=rotation_deg)
             answer = answer_given(chosen, own, level, **how)
             assert isinstance(answer, Prediction)

@@ -18,7 +18,9 @@ from rbfrag.question.fields import (
     column_of,
     declared,
     names_of,
+    word_of,
 )
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
@@ -42,11 +44,21 @@ WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
 
 PLANES = names_of(PlaneFields)
 
-LEAST_DEG = 1.6
-"""Friction angles below this are seldom meant [deg]: it may be one in radians."""
+LEAST_DEG, LEAST_DIP_DEG = 1.6, 0.8
+"""Friction angles and dips below this are questioned [deg]: radians may have been meant."""
 
-LEAST_M, MOST_M = 0.05, 60.0
-"""Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
+LEAST_M, MOST_M, LEAST_P2 = 0.05, 30.0, 0.1
+"""Blocks smaller or larger than this, or of a smaller p², are questioned: another unit may have
+been meant."""
+
+LENGTHS = ("height_m", "width_m", "s1_m", "s2_m", "r3_m")
+
+DENSITY_KG_M3 = 2650.0
+"""Density of the rock that is assumed where it is needed and not given [kg/m³]."""
+
+DENSITY_ASSUMED = Diagnostic(
+    f"the density is not given: {DENSITY_KG_M3:,.0f} kg/m³ is assumed", "density_assumed"
+)
 
 FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
 
@@ -93,13 +105,16 @@ STEEP = (
     "beta - alpha1 are to be less"
 )
 
-TAKEN_TO_TOPPLE = (
-    "no friction angle is given: the rectangle is taken to topple, backed by a slope; with phi its "
-    "mode is checked"
+TAKEN_TO_TOPPLE = Diagnostic(
+    "no friction angle is given: the rectangle is assumed to topple, backed by a slope; with phi "
+    "its mode is checked",
+    "friction_not_given",
 )
 
-TAKEN_NOT_TO_SLIP = (
-    "no friction angle is given: the corners of the free-standing rectangle are taken not to slip"
+TAKEN_NOT_TO_SLIP = Diagnostic(
+    "no friction angle is given: the corners of the free-standing rectangle are assumed not to "
+    "slip",
+    "friction_not_given",
 )
 
 _WEAKER = (
@@ -113,7 +128,7 @@ _INSTEAD = {
     "confined_topple": "; kind confined_toppling tells how likely it falls",
 }
 
-_RADIANS = "{name} is less than a rock's: angles are in degrees, is it in radians?"
+_RADIANS = "{name} = {{value:g}}° is unusually small: is it in radians? Angles are in degrees"
 
 
 class Listener(Protocol):
@@ -132,8 +147,8 @@ class Listener(Protocol):
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         """Say where blocks fail at rest; arguments as for `refuse`."""
 
-    def remark(self, holds: Any, text: str) -> None:
-        """Say what is to be known of the answer where it holds."""
+    def remark(self, holds: Any, text: str, **values: Any) -> None:
+        """Say what is to be known of the answer where it holds; the text may have values too."""
 
 
 class ModeShapes(NamedTuple):
@@ -147,7 +162,7 @@ class ModeShapes(NamedTuple):
         phi_deg: friction angles of the bases [deg].
         phi_back_deg: those of the back planes [deg].
         taken: whether the friction is not known, and they are taken not to slide.
-        backed: whether a plane is behind them.
+        backed: whether, or behind which of them, a plane is.
         bonded: whether, or which of, their bases have cohesion.
         rough: whether, or which of, their bases are rough.
         wet: whether, or in which of them, water stands behind them.
@@ -160,7 +175,7 @@ class ModeShapes(NamedTuple):
     phi_deg: Any
     phi_back_deg: Any
     taken: Any
-    backed: bool
+    backed: Any
     bonded: Any = False
     rough: Any = False
     wet: Any = False
@@ -231,18 +246,44 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
     fields = declared()
     for name, value in stated.items():
         is_friction = name in ("phi_deg", "phi_back_deg")
-        if is_friction:
-            listener.remark((value > 0.0) & (value < LEAST_DEG), _RADIANS.format(name=name))
+        if is_friction or name == "beta_deg":
+            least = LEAST_DEG if is_friction else LEAST_DIP_DEG
+            small = (abs(value) > 0.0) & (abs(value) < least) & (value % 0.25 != 0.0)
+            text = Diagnostic(_RADIANS.format(name=name), "check_unit", fields=(name,))
+            listener.remark(small, text, value=value)
         usable = fields[name].usable(value)
         if usable is True:  # a single number: no text is needed
             continue
         about, unknown = fields[name], value != value
         shown = column_of(name) if columns else name
         if not is_friction and name != "displacement_m":
-            text = "is empty" if columns else "is no number"
-            listener.refuse(unknown, f"{shown} {text}", name)
-        text = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
-        listener.refuse(usable ^ True ^ unknown, text, name, value=value)
+            why = "is empty" if columns else "is not a number"
+            level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
+            listener.refuse(unknown, f"{shown} {why}{level}", name)
+        wrong = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
+        listener.refuse(usable ^ True ^ unknown, wrong, name, value=value)
+
+
+def check_lengths(lengths: Mapping[str, Any], listener: Listener) -> None:
+    """Question lengths that are seldom meant: centimetres may have been typed.
+
+    Args:
+        lengths: values by field [m].
+        listener: hears of it.
+    """
+    for name in LENGTHS:
+        if name in lengths:
+            text = Diagnostic(
+                f"Check the unit: {word_of(name)} {{value:g}} m (in cm?)", "check_unit"
+            )
+            listener.remark(lengths[name] > MOST_M, text, value=lengths[name])
+
+
+def check_size(p2: Any, listener: Listener) -> None:
+    """Question a p² [1/s²] that no block seen so far has."""
+    text = Diagnostic("Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m", "check_unit")
+    small = (p2 > 0.0) & (p2 < LEAST_P2)
+    listener.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
 
 
 def numbers_of_shape(
@@ -291,8 +332,7 @@ def numbers_of_shape(
         listener.refuse(p2 != p2, NO_UNIQUE_MOTION)
         return {**dict(zip(facts.parameters, (k, p2), strict=True)), **stated}
     listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
-    if stands_free_of(facts, judged.backed):
-        listener.remark(True, NOT_BACKED)
+    listener.remark((judged.backed ^ True) & stands_free_of(facts, False), NOT_BACKED)
     if not facts.free_standing:
         return {"p2": judged.body.p2, "kr": k, **stated}
     body = judged.body

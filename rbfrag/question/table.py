@@ -1,14 +1,22 @@
-"""Headers of tables: which column states which field, in which unit."""
+"""Headers and cells of tables: which column is which field, in which unit.
+
+Names in five languages stand in ``headers.toml``. A column that is not understood is named as
+ignored; one that sounds like an input that would change the answer is rejected.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+import tomllib
+import unicodedata
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.question.fields import (
+    MeasureFields,
     RowFields,
     column_of,
     columns_declared,
@@ -16,102 +24,145 @@ from rbfrag.question.fields import (
     names_of,
     word_of,
 )
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.solver.kinds import KINDS
+
+_PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
 
 FACTORS = {
     "m": {"m": 1.0, "cm": 0.01, "mm": 0.001},
     "km": {"km": 1.0, "m": 0.001},
-    "m/s": {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001},
+    "m/s": {"m/s": 1.0, "cm/s": 0.01, "cms": 0.01, "mm/s": 0.001},
     "g": {
         "g": 1.0, "%g": 0.01, "m/s2": 1.0 / 9.80665, "cm/s2": 0.01 / 9.80665, "gal": 0.01 / 9.80665,
     },
-    "deg": {"deg": 1.0, "°": 1.0, "degrees": 1.0},
+    "deg": {"deg": 1.0, "°": 1.0, "degrees": 1.0, "grad": 1.0, "rad": 57.29577951308232},
     "1/s²": {"1/s2": 1.0, "s-2": 1.0, "rad2/s2": 1.0},
     "s": {"s": 1.0, "ms": 0.001},
-    "MPa": {"mpa": 1.0},
+    "Pa": _PRESSURES,
+    "MPa": {unit: factor / 1e6 for unit, factor in _PRESSURES.items()},
+    "kg/m³": {
+        "kg/m3": 1.0, "g/cm3": 1e3, "t/m3": 1e3, "kn/m3": 1e3 / 9.80665, "n/m3": 1.0 / 9.80665,
+    },
     "": {"": 1.0, "-": 1.0, "g": 1.0, "%": 0.01},
 }  # fmt: skip
-"""By the unit of a field the units that a column may state, and what turns them into it."""
+"""By the unit of a field the units of a column or a value, and the factor into the field's unit."""
 
-_IN_BRACKETS = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
+_IN_BRACKETS = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*\??$")
 _UNITS = {unit.replace("/", "[/_]") for units in FACTORS.values() for unit in units if unit}
 _AT_THE_END = re.compile(rf"(.+?)[\s,_]+({'|'.join(sorted(_UNITS))})")
-_SUPERSCRIPTS = str.maketrans({"²": "2", " ": None, "^": None})
-_FEWEST_LETTERS = 6
-
-LOUD = ("phi", "frict", "dip", "beta", "incl", "pg", "sa", "shak", "slope")
-"""Beginnings of words that sound like friction, dip or shaking."""
+_SUPERSCRIPTS = str.maketrans({"²": "2", "³": "3", " ": None, "^": None})
+_NUMBER = re.compile(r"([+\-−]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.DOTALL)
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_FEWEST_LETTERS = 5
 
 WRITTEN = frozenset((
     "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain",
-    "how", "reason", "block_sd", "model", "term", "method", "level", "years", "numerical_error",
-    "site", "state", "yield_g", "kct", "azimuth_deg",
+    "how", "warnings", "reason", "block_sd", "model", "term", "method", "level", "years",
+    "numerical_error", "site", "state", "yield_g", "kct", "azimuth_deg",
 ))  # fmt: skip
-"""Columns of answers: nothing is said of them where they are not read again."""
+"""Columns of answers, which a table that is read again has as well."""
+
+INSTEAD_OF = {
+    "beta_deg": ("base", "kr", "ks", "kct"),
+    "phi_deg": ("kr", "ky", "ks", "kct"),
+    "kind": ("free_standing", "ky", "ks", "kct"),
+    "back_fracture": ("kind", "free_standing", "back"),
+    "height_m": ("kr", "ky", "ks", "kct", "alpha1_deg", "s1_m"),
+    "width_m": ("kr", "ky", "ks", "kct", "alpha1_deg", "s1_m"),
+    "s1_m": ("kr", "ky", "ks", "kct", "height_m", "alpha1_deg"),
+    "pgv_m_s": (*names_of(MeasureFields), "rjb_km"),
+}
+"""By a field that a column sounds like the fields that may take its place."""
+
+MULTIPLIERS = ("count", "weight", "component")
+"""Fields of a column that an answer uses or rejects, and never ignores."""
 
 ROWS_ABOVE = 20
 """So many rows are looked at for the names of the columns."""
 
 
 class Column(NamedTuple):
-    """A column that states a field.
+    """A column that is a field.
 
     Args:
         header: what the table calls it.
         factor: what turns its numbers into the unit of the field.
+        inverse: whether it says the contrary, as "no back" does.
     """
 
     header: str
     factor: float = 1.0
+    inverse: bool = False
 
 
-class Header(NamedTuple):
-    """The columns of a table.
+class HeaderMatch(NamedTuple):
+    """The field that a header names.
 
     Args:
-        columns: those that are read, by the field that they state.
-        remarks: which units are converted.
+        field: the field.
+        unit: the unit that the header names; None for none.
+        column: ``free_standing`` and ``no_back`` for yes-or-no columns of kind and back fracture,
+            else the field.
     """
 
-    columns: dict[str, Column]
-    remarks: tuple[str, ...]
-
-    def unread(self, header: Sequence[str], read: Collection[str]) -> tuple[str, ...]:
-        """Return what is to be said of columns that an answer does not read.
-
-        Args:
-            header: all columns of the table.
-            read: the fields that it depends on, or hands on.
-        """
-        stated = {name: (field_of(name) or ("",))[0] for name in header if name not in WRITTEN}
-        left = [n for n, own in stated.items() if own not in read and n[:11] != "annual_rate"]
-        loud = [name for name in left if _sounds_like_input(name)]
-        texts = []
-        if loud:
-            which = "it" if len(loud) == 1 else "them"
-            texts.append(f"NOT READ: {_listed(loud)}: the answer does not depend on {which}")
-        if quiet := [name for name in left if name not in loud]:
-            texts.append(f"not read: {_listed(quiet)}")
-        return tuple(texts)
-
-
-def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:12])
-    return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown
-
-
-def _sounds_like_input(name: str) -> bool:
-    words = re.split(r"[^a-zφβ]+", name.lower())
-    return any(word.startswith(LOUD) or word in ("φ", "β") for word in words)
+    field: str
+    unit: str | None
+    column: str
 
 
 @cache
 def _names() -> dict[str, str]:
-    """Return the fields by all the names that a column may have."""
+    """Return the fields by all the names of their columns."""
     by_name: dict[str, str] = {}
     for name in columns_declared():
-        for each in (name, column_of(name), word_of(name), *declared()[name].others):
-            by_name[each] = name
+        for alias in (name, column_of(name), word_of(name), *declared()[name].others):
+            by_name[alias] = name
     return by_name
+
+
+class _Vocabulary(NamedTuple):
+    """The contents of ``headers.toml``, ready to be looked up."""
+
+    concepts: Mapping[str, tuple[str, ...]]
+    patterns: tuple[tuple[str, frozenset[str], frozenset[str], str | None], ...]
+    phrases: Mapping[str, str]
+    loud: tuple[tuple[str, str], ...]
+    quiet: tuple[str, ...]
+    kinds: Mapping[str, str]
+    answers: Mapping[str, bool]
+
+
+@cache
+def _vocabulary() -> _Vocabulary:
+    text = Path(__file__).with_name("headers.toml").read_text(encoding="utf-8")
+    data = tomllib.loads(text)
+    concepts = {w: tuple(c.split()) for c, words in data["words"].items() for w in words}
+    concepts |= dict.fromkeys(data["words"]["filler"], ())
+    patterns = []
+    for field, texts in data["fields"].items():
+        for text in texts:
+            words, _, unit = text.partition(" = ")
+            optional = {w[1:] for w in words.split() if w[0] == "~"}
+            required = frozenset(w for w in words.split() if w[0] != "~")
+            patterns.append((field, required, required | optional | {"block"}, unit or None))
+    kinds = {w: kind for kind, words in data["kinds"].items() for w in words}
+    return _Vocabulary(
+        concepts,
+        tuple(patterns),
+        {phrase: field for field, phrases in data["phrases"].items() for phrase in phrases},
+        tuple((stem, field) for field, stems in data["loud"].items() for stem in stems),
+        tuple(data["quiet"]["words"]),
+        kinds | {kind.replace("_", " "): kind for kind in KINDS},
+        {w: name == "yes" for name, words in data["answers"].items() for w in words},
+    )
+
+
+def plain_words(text: str) -> list[str]:
+    """Return the words of a text without case, accents and punctuation."""
+    letters = unicodedata.normalize("NFD", text.casefold().replace("ϕ", "φ"))
+    bare = "".join(c for c in letters if not unicodedata.combining(c))
+    return re.sub(r"[\W_]+", " ", bare).split()
 
 
 def header_of(name: str) -> str:
@@ -120,34 +171,101 @@ def header_of(name: str) -> str:
     return f"{word_of(name)} [{unit}]" if unit else word_of(name)
 
 
-def field_of(header: str) -> tuple[str, str | None] | None:
-    """Return the field that a column states and the unit that it names; None for no field."""
-    exact = _names().get(header)
-    if exact is not None:
-        return exact, None
+def field_of(header: str) -> HeaderMatch | None:
+    """Return the field that a header names; None for no field."""
+    if (exact := _names().get(header)) is not None:
+        return HeaderMatch(exact, None, "no_back" if header == "no_back" else exact)
     text = header.strip().lower()
-    name = _called(text)
-    if name is not None:
-        return name, None
+    if (match := _called(text)) is not None:
+        return match
     if bracket := _IN_BRACKETS.search(text):
-        name = _called(text[: bracket.start()])
-        return None if name is None else (name, bracket[1])
-    if end := _AT_THE_END.fullmatch(text.replace("²", "2")):
-        name, unit = _called(end[1]), end[2].replace("_", "/")
-        if name is not None and declared()[name].unit and unit_factor(declared()[name].unit, unit):
-            return name, unit
+        return _called(text[: bracket.start()], bracket[1])
+    if end := _AT_THE_END.fullmatch(text.translate({ord("²"): "2", ord("³"): "3"})):
+        match, unit = _called(end[1]), end[2].replace("_", "/")
+        if match is not None and unit_factor(declared()[match.field].unit, unit):
+            return match._replace(unit=unit)
     return None
 
 
-def _called(text: str) -> str | None:
-    return _names().get(re.sub(r"[\s\-]+", "_", text.strip()))
+def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
+    """Return the field of a header without its unit."""
+    name = _names().get(re.sub(r"[\s\-]+", "_", text.strip()))
+    if name is not None:
+        return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
+    known, words = _vocabulary(), plain_words(text)
+    column = known.phrases.get(" ".join(words))
+    default = None
+    if column is None:
+        meaning: set[str] = set()
+        for word in words:
+            if (concepts := known.concepts.get(word)) is None:
+                return None
+            meaning.update(concepts)
+        for pattern in known.patterns:
+            if pattern[1] <= meaning <= pattern[2]:
+                column, _, _, default = pattern
+                break
+        else:
+            return None
+        if words == ["c"] and not (unit and unit_factor("Pa", unit)):
+            return None  # one letter names a cohesion only with its unit
+        assert column is not None
+        if column == "back" and text.rstrip().endswith("?"):
+            column = "back_fracture"
+        elif column == "back_fracture" and unit and "/" in unit:
+            column = "back"  # dip/dip direction
+    field = {"free_standing": "kind", "no_back": "back_fracture"}.get(column, column)
+    return HeaderMatch(field, unit or default, column)
+
+
+def kind_named(text: str) -> str | None:
+    """Return the kind of failure that a word names, in any of five languages; None for no kind."""
+    return _vocabulary().kinds.get(" ".join(plain_words(text)))
+
+
+def yes_or_no(text: str) -> bool | None:
+    """Return whether a cell says yes; None where it says neither yes nor no."""
+    return _vocabulary().answers.get(" ".join(plain_words(text)))
+
+
+def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | None:
+    """Return the kinds that the cells of a column name; None where no cell names one.
+
+    Raises:
+        InputError: some words name a kind and some do not, or one is misspelled.
+    """
+    by_word = {cell: kind_named(cell) for cell in dict.fromkeys(cells) if cell.strip()}
+    others = [word for word, kind in by_word.items() if kind is None]
+    near = next((w for w in others for k in _vocabulary().kinds if _is_near(w.lower(), k)), None)
+    if near is not None or (others and len(others) < len(by_word)):
+        raise InputError(
+            f"{source}: column {header!r}: {near or others[0]!r:.42} is not a kind of failure; use "
+            f"{', '.join(KINDS)}, or leave the cell empty"
+        )
+    return None if others else [by_word.get(cell) or "" for cell in cells]
+
+
+def number_with_unit(text: str, unit: str, *, commas: bool = True) -> float | None:
+    """Return the number of a text in a unit: "40cm/s", "5°", "2,6"; None where it is none.
+
+    Args:
+        text: a number, perhaps with its unit behind it.
+        unit: the unit of the field.
+        commas: whether a comma may stand before the decimals.
+    """
+    match = _NUMBER.fullmatch(text.strip())
+    if match is None or ("," in match[1] and (not commas or _THOUSANDS.fullmatch(match[1]))):
+        return None
+    factor = 1.0 if not match[2] else unit_factor(unit, match[2])
+    number = float(match[1].replace(",", ".").replace("−", "-"))
+    return None if factor is None else number * factor
 
 
 def header_row(rows: Sequence[Sequence[object]]) -> int:
     """Return which of the first rows of a table holds the names of its columns.
 
-    That is the first which is not empty; one that states no number is a title above the first that
-    states two fields, or above the only one that states a number.
+    That is the first which is not empty; one without a field that is a number is a title above the
+    first row that names two fields, or above the only one that names a number.
     """
     first = next((i for i, row in enumerate(rows) if any(map(_text, row))), 0)
     stated = [_fields_in(row) for row in rows]
@@ -168,8 +286,8 @@ def fields_stated(rows: Sequence[Sequence[object]]) -> int:
 
 
 def _fields_in(row: Sequence[object]) -> set[str]:
-    stated = (field_of(cell) for cell in row if isinstance(cell, str) and cell.strip())
-    return {each[0] for each in stated if each is not None}
+    matches = (field_of(cell) for cell in row if isinstance(cell, str) and cell.strip())
+    return {match.field for match in matches if match is not None}
 
 
 def _has_number(fields: Collection[str]) -> bool:
@@ -188,68 +306,163 @@ def _is_number(cell: object) -> bool:
     return True
 
 
-def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> Header:
-    """Return which columns of a table state which fields.
+class Header(NamedTuple):
+    """The columns of a table.
+
+    Args:
+        columns: those that are used, by their field, or ``free_standing``.
+        unknown: headers that name no field.
+        unused: headers of other fields, and these fields.
+        warnings: which units are converted.
+    """
+
+    columns: dict[str, Column]
+    unknown: tuple[str, ...]
+    unused: Mapping[str, str]
+    warnings: tuple[Diagnostic, ...]
+
+    def ignored(self, header: Sequence[str], used: Collection[str]) -> Iterator[Diagnostic]:
+        """Yield the warning that names the columns that an answer ignores.
+
+        Args:
+            header: all columns of the table.
+            used: the fields that it depends on, or hands on.
+        """
+        headers = {column.header for name, column in self.columns.items() if name in used}
+        names = [name for name in header if name not in headers]
+        earlier = [name for name in names if name in WRITTEN or name.startswith("annual_rate")]
+        others = [name for name in names if name not in earlier]
+        for names, text in ((others, "ignored"), (earlier, "of an earlier answer ignored")):
+            if names:
+                word = "column" if len(names) == 1 else "columns"
+                yield Diagnostic(f"{word} {text}: {', '.join(names)}", "ignored_columns")
+
+    def check_unused(self, source: object, present: Collection[str]) -> None:
+        """Reject a column that is not used and would change the answer.
+
+        That is one that is not understood and sounds like an input, and one that multiplies
+        what is counted.
+
+        Args:
+            source: the table, for messages.
+            present: the fields of the table, and those that are given for all rows.
+
+        Raises:
+            InputError: the first such column, with the field that may be meant.
+        """
+        for text, multiplier in self.unused.items():
+            if multiplier in MULTIPLIERS:
+                raise InputError(
+                    f"{source}: the column {text!r} is not used by this answer: take it out, or "
+                    f"pass --ignore-columns {text!r}"
+                )
+        for text in self.unknown:
+            field = sounds_like(text)
+            if field is None or not {field, *INSTEAD_OF.get(field, ())}.isdisjoint(present):
+                continue
+            raise InputError(
+                f"{source}: the column {text[:60]!r} is not understood and may be the "
+                f"{declared()[field].what}: call it {column_of(field)!r}, or pass "
+                f"--ignore-columns {text[:60]!r}"
+            )
+
+
+def sounds_like(header: str) -> str | None:
+    """Return the field that would change the answer and that a header sounds like."""
+    known, words = _vocabulary(), plain_words(header)
+    if any(word.startswith(known.quiet) for word in words):
+        return None
+    for word in words:
+        for stem, field in known.loud:
+            if word == stem[:-1] if stem[-1] == "=" else word.startswith(stem):
+                return field
+    return None
+
+
+def columns_in(
+    header: Sequence[str],
+    source: object,
+    read: Collection[str],
+    ignored: Collection[str] = (),
+) -> Header:
+    """Return which columns of a table are which fields.
 
     Args:
         header: what the table calls its columns.
         source: the table, for messages.
-        read: the fields that the answer may read, and other columns by their own names; what is
+        read: the fields that the answer may use, and other columns by their own names; what is
             wrong with others is no concern.
+        ignored: columns that the caller wants to be ignored.
 
     Raises:
-        InputError: two columns of one field, a unit that is none of the field's, or a name that
-            misses a field's by one letter.
+        InputError: two columns of one field, a unit that does not belong to the field, a name that
+            misses a field's by one letter, or a column to be ignored that the table does not have.
     """
+    for text in ignored:
+        if text not in header:
+            have = ", ".join(header)
+            raise InputError(f"{source}: there is no column {text!r} to ignore; there are {have}")
     columns: dict[str, Column] = {}
-    remarks = []
+    unknown, warnings = [], []
+    unused: dict[str, str] = {}
     for text in header:
-        stated = field_of(text)
-        if stated is None:
+        match = None if text in ignored else field_of(text)
+        if text in ignored:
+            continue
+        if match is None:
             if text in read:
                 columns[text] = Column(text)
             else:
-                _refuse_near_miss(text, source, read)
+                _reject_near_miss(text, source, read)
+                unknown += [] if text in WRITTEN else [text]
             continue
-        name, unit = stated
+        name, unit, column = match
         field = declared()[name]
         if name not in read:
+            unused[text] = name
             continue
-        if field.is_text:  # of several names its own goes before the others
-            if name not in columns or text == name:
-                columns[name] = Column(text)
+        key = "free_standing" if column == "free_standing" else name
+        if field.is_text or name == "back_fracture":
+            # of several names its own goes before the others
+            if key not in columns or text == name:
+                columns[key] = Column(text, inverse=column == "no_back")
             continue
         if name in columns:
             other = columns[name].header
             twice = (
                 f"the column {text} is there twice"
                 if text == other
-                else f"the columns {other} and {text} both state the {field.what}"
+                else f"the columns {other} and {text} are both the {field.what}"
             )
             raise InputError(f"{source}: {twice}: leave one of them out")
         factor = 1.0 if unit is None else unit_factor(field.unit, unit)
-        if factor is None and name in names_of(RowFields) and not field.unit:
+        if factor is None and name in ("loss", "weight"):
             factor = 1.0  # losses are in any currency, weights of anything
         if factor is None:
-            units = " or ".join(each or "no unit" for each in FACTORS.get(field.unit, ("",)))
+            units = " or ".join(word or "no unit" for word in FACTORS.get(field.unit, ("",)))
             raise InputError(
-                f"{source}: the column {text} is in {unit!r}, and the {field.what} is read in "
+                f"{source}: the column {text} is in {unit!r}, and the {field.what} is expected in "
                 f"{units}: convert it, or name another unit"
             )
         if factor != 1.0:
-            remarks.append(f"the column {text} is converted from {unit} to {field.unit or '1'}")
+            warnings.append(
+                Diagnostic(
+                    f"column {text}: converted from {unit} to {field.unit or '1'}", "unit_converted"
+                )
+            )
         columns[name] = Column(text, factor)
-    return Header(columns, tuple(remarks))
+    return Header(columns, tuple(unknown), unused, tuple(warnings))
 
 
 def unit_factor(unit: str, stated: str) -> float | None:
     """Return what turns numbers in a stated unit into one of :data:`FACTORS`; None if nothing."""
     own, word = (each.lower().translate(_SUPERSCRIPTS) for each in (unit, stated))
+    word = word.rstrip(".") or word
     return FACTORS.get(unit, {}).get(word, 1.0 if own and own == word else None)
 
 
-def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:
-    """Refuse a header of six letters or more that misses a name by an edit, or by a swap."""
+def _reject_near_miss(text: str, source: object, read: Collection[str]) -> None:
+    """Reject a header of five letters or more that misses a name by an edit, or by a swap."""
     bare = _IN_BRACKETS.sub("", text.strip().lower()).replace(" ", "_")
     end = _AT_THE_END.fullmatch(bare)
     if bare in WRITTEN or sum(map(str.isalpha, bare)) < _FEWEST_LETTERS:
@@ -257,14 +470,14 @@ def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:
     for name, field in _names().items():
         if field in read and (_is_near(bare, name) or (end and _is_near(end[1], name))):
             raise InputError(
-                f"{source}: the column {text[:60]!r} is no name of a field: did you mean {name}, "
-                f"the {declared()[field].what}? Rename it"
+                f"{source}: unknown column {text[:60]!r}; did you mean {name!r}, the "
+                f"{declared()[field].what}?"
             )
 
 
 def _is_near(one: str, other: str) -> bool:
     """Return whether two texts differ by one edit, or by a swap of two neighbours."""
-    if abs(len(one) - len(other)) > 1 or one == other:
+    if abs(len(one) - len(other)) > 1 or one == other or len(other) < _FEWEST_LETTERS:
         return False
     start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
     if start is None:

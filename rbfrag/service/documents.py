@@ -128,6 +128,39 @@ class PredictArrays(_Document):
     """Probabilities of many blocks or motions; null where the input cannot be used."""
 
 
+class Note(_Document):
+    """A warning about a table; `rows` are the first it holds for, from 0, none for all."""
+
+    code: str
+    severity: str
+    text: str
+    fields: list[str]
+    rows: list[int]
+    row_count: int
+
+
+class TableAnswers(_Document):
+    """A table of blocks with its answers: what `rbfrag predict --blocks` prints as JSON.
+
+    `table` is the CSV file that is written, with the notes below it.
+    """
+
+    rows: int
+    answered: int
+    without_answer: int
+    in_domain: int
+    expected_failures: float
+    failures_low: float | None
+    failures_high: float | None
+    kind: str
+    model: str
+    term: str
+    method: str
+    warnings: list[str]
+    notes: list[Note]
+    table: str
+
+
 @keys_of(Cohesion)
 class CohesionAnswer(_Document):
     """What cohesion of the base adds."""

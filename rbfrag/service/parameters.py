@@ -44,7 +44,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, fail_fast=True)]
 """A number that stands for every element, or a list of one an element, null where there is none."""
 
-COLUMNS = frozenset(names_of(BlockFields, ShakingFields))
+COLUMNS = frozenset(names_of(BlockFields, ShakingFields, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
 _TEXTS = frozenset(names_of(SpaceFields))
@@ -148,6 +148,18 @@ class DrawingQuery(Parameters):
 @asking(*_QUESTION, examples={"p2": 3.0, "kr": 0.1, "pgv": 0.6})
 class PredictQuery(Parameters):
     """Parameters of `GET /v1/predict`."""
+
+
+@asking(*names_of(ShakingFields, RequestFields), "kind")
+class TableQuery(Parameters):
+    """Parameters of `/v1/table`: kind of rows that name none, and shaking if no column has any."""
+
+    form: Literal["csv", "xlsx"] = "csv"
+    """What the body is: csv (also cells pasted from a spreadsheet) or xlsx."""
+    sheet: Text | None = None
+    """Name of the sheet of a workbook. Default: the first."""
+    ignore_columns: Text | None = None
+    """Columns to ignore, separated by commas."""
 
 
 @asking(*_QUESTION, many=True)

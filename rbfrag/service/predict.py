@@ -2,35 +2,44 @@
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 
 from rbfrag.errors import InputError
+from rbfrag.exchange.tables.csv_file import NOTE
 from rbfrag.fragility.lookup import models_in_memory
-from rbfrag.question.document import prediction_document
-from rbfrag.question.question import OF_SHAKING, ask, described
-from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays
-from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows
+from rbfrag.question.document import answer_block
+from rbfrag.question.fields import ShakingFields, names_of
+from rbfrag.question.question import ask
+from rbfrag.results.diagnostic import as_documents, diagnostics
+from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays, TableAnswers
+from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows, TableQuery
 from rbfrag.service.problem import READ, SENT
-from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as
+from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as, sent_file
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool, in_thread
 
 ELEMENTS_BESIDE = 20_000
 """So many elements are answered beside other requests; more than these, by another process."""
 
+TABLE = "block_id,height_m,width_m,dip_deg,phi_deg,pgv_m_s\nA,2,0.4,3,35,0.6\n"
+"""A table of one block."""
+
 BYTES_BESIDE = 1 << 20
 """Longer bodies are parsed by another process, whatever they hold."""
 
 
-def answer_one(query: PredictQuery, db: str | None) -> dict[str, Any]:
+def answer_one(query: PredictQuery | PredictRows, db: str | None) -> dict[str, Any]:
     """Return what `rbfrag predict` prints as JSON."""
-    given, how = query.question()
-    blocks = described(given, how.pop("kind", None))
-    (group,) = blocks.groups
-    known = {**group.numbers, **{name: given[name] for name in given if name in OF_SHAKING}}
-    return prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how, db=db)
+    inputs, how = query.question()
+    document, _ = answer_block(inputs, **how, db=db)
+    return document
 
 
 def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
@@ -47,6 +56,8 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     import numpy as np
 
     rows = read_as(PredictRows, json_of(body))
+    if not any(isinstance(value, list) for _, value in rows):
+        return json_text(answer_one(rows, db))
     lengths = {name: len(value) for name, value in rows if isinstance(value, list)}
     for name, length in lengths.items():
         if length > row_limit:
@@ -67,6 +78,59 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     return json_text({n: v.tolist() if hasattr(v, "tolist") else v for n, v in columns.items()})
 
 
+def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None) -> bytes:
+    """Return the answers for a table of blocks as the command line reads it.
+
+    Args:
+        body: the table, CSV or a workbook.
+        query: what holds for all rows.
+        row_limit: most rows.
+        db: database of the models.
+
+    Raises:
+        InputError: a table that cannot be used, or of more rows than the limit.
+    """
+    from rbfrag.exchange.block_table import opened_table
+    from rbfrag.exchange.table_answers import predict_table
+
+    inputs, how = query.question()
+    kind = how.pop("kind", None)
+    ignored = query.ignore_columns.split(",") if query.ignore_columns else ()
+    with TemporaryDirectory() as folder:
+        source, target = Path(folder, f"table.{query.form}"), Path(folder, "answers.csv")
+        source.write_bytes(body)
+        try:
+            with opened_table(
+                source, names_of(ShakingFields), sheet=query.sheet, ignored=ignored
+            ) as table:
+                if not {*names_of(ShakingFields)}.isdisjoint(table.stated.columns):
+                    inputs = {}
+            summary = predict_table(
+                source, target, given=inputs, kind=kind, sheet=query.sheet, ignored=ignored,
+                excel_text=True, db=db, **how,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(str(error).replace(f"{source}", "the table")) from None
+        if summary["rows"] > row_limit:
+            raise InputError(
+                f"the table has {summary['rows']:,} rows; one request may hold {row_limit:,}: "
+                "split it"
+            )
+        answers = target.read_text(encoding="utf-8-sig")
+    summary["notes"] = as_documents(summary["warnings"])
+    return json_text({**summary, "table": answers + notes_below(summary["warnings"])})
+
+
+def notes_below(warnings: Sequence[str]) -> str:
+    """Return the warnings as lines below a CSV table, which is downloaded as one file."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    if warnings:
+        writer.writerow([])
+    writer.writerows([NOTE, each.code, str(each)] for each in diagnostics(warnings))
+    return text.getvalue()
+
+
 def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -> None:
     """Add the operations on `/v1/predict`, whose long work is done by a pool."""
 
@@ -84,9 +148,29 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
         return await in_thread(settings.time_limit, answer_one, query, settings.db)
 
     @routes.post(
+        "/v1/table",
+        summary="Probability that each block of a table fails",
+        response_model=TableAnswers,
+        responses=SENT,
+        openapi_extra=sent_as(
+            {
+                "text/csv": {"schema": {"type": "string"}, "example": TABLE},
+                "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
+            }
+        ),
+    )
+    async def predict_rows(request: Request, query: Annotated[TableQuery, Query()]) -> bytes:
+        """Return the table with the answers of `rbfrag predict --blocks`, and its warnings.
+
+        Columns are named as in the tables of the command line, in five languages and with units.
+        """
+        body = await sent_file(request)
+        return await pool.run(request, answer_table, body, query, settings.row_limit, settings.db)
+
+    @routes.post(
         "/v1/predict",
         summary="Probability that each of many blocks fails",
-        response_model=PredictArrays,
+        response_model=PredictArrays | PredictAnswer,
         responses=SENT,
         openapi_extra=sent_as({"application/json": {"schema": PredictRows.model_json_schema()}}),
     )
@@ -94,7 +178,8 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
         """Return probabilities of many blocks.
 
         Each name is a number or a list; numbers stand for every element. Where an element cannot
-        be used, its answer is null and `reason` says why.
+        be used, its answer is null and `reason` says why. Without a list the answer is that for one
+        block.
         """
         body = await request.body()
         check_json(body, settings.row_limit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Collection, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import parse_qsl
@@ -16,6 +16,8 @@ from python_multipart.exceptions import FormParserError
 
 from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
+from rbfrag.question.fields import parameter_of
+from rbfrag.question.table import field_of
 from rbfrag.service.problem import (
     BUSY,
     GONE,
@@ -184,6 +186,37 @@ def _no_number(word: str) -> NoReturn:
     raise InputError(f"{word} is no JSON number: give a finite one, or null for a missing one")
 
 
+def by_parameter(values: dict[str, Any], known: Collection[str]) -> dict[str, Any]:
+    """Return values by parameter, whichever name of its field each is given by.
+
+    Args:
+        values: values by parameter, keyword or name of a column.
+        known: the parameters of the operation; other names stay as they are.
+
+    Raises:
+        InputError: one field by two names.
+    """
+    result: dict[str, Any] = {}
+    for name, value in values.items():
+        match = None if name in known else field_of(name)
+        word = name if match is None else parameter_of(match.field)
+        if match is not None and word in known and match.unit is None:
+            if match.column == "free_standing":
+                value = "rocking" if _is_true(value) else None
+            elif match.column == "back_fracture":  # its parameter is no_back
+                value = not _is_true(value)
+        else:
+            word = name
+        if word in result:
+            raise InputError(f"{name} and {word} are the same field: give one", fields=(word,))
+        result[word] = value
+    return result
+
+
+def _is_true(value: Any) -> bool:
+    return value is True or str(value).lower() in ("true", "1", "yes")
+
+
 def read_as(model: type[T], values: Any) -> T:
     """Return values that a request states, or refuse what is none of a model.
 
@@ -191,6 +224,9 @@ def read_as(model: type[T], values: Any) -> T:
         model: what may be stated.
         values: the parameters of a query, or the JSON of a body.
     """
+    known = model.model_fields
+    if isinstance(values, dict) and not values.keys() <= known.keys():
+        values = by_parameter(values, known)
     try:
         return model.model_validate(values)
     except ValidationError as error:

@@ -25,6 +25,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.words import model_in_words, percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 from rbfrag.question.fields import BlockFields, WholeFields
+from rbfrag.results.diagnostic import diagnostics
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -127,7 +128,7 @@ def hazard(
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     check_files(table=release)
-    table, is_class, remarks, rows = blocks.given_blocks(given, reads=RELEASE)
+    table, is_class, remarks, rows = blocks.given_blocks(given, reads=(*RELEASE, "count"))
     if release is not None and is_class:
         raise InputError("--release needs the places of blocks, and a rock mass has none: --blocks")
     if rows is None:
@@ -150,12 +151,16 @@ def hazard(
         at.sites, at.site, at.given, cast("CurveKeywords", vars(meaning)),
         cast("AnsweringFields", answering),
         weight=branch_weights(wanted.weights, at.sites[0]), joint=wanted.joint,
-        at_least=wanted.counts(), years=wanted.years, one_class=is_class, run=run,
+        at_least=wanted.counts(), years=wanted.years, one_class=is_class,
+        count=None if is_class else at.columns.get("count"), run=run,
     )  # fmt: skip
+    notes = diagnostics(remarks, at.remarks, answer.warnings)
     if out is not None:
-        write_table(rate_columns(answer, at.columns, rows), out, excel_text=excel_text)
+        table = rate_columns(answer, at.columns, rows)
+        write_table(table, out, excel_text=excel_text, notes=notes)
     if release is not None:
-        write_table(release_columns(answer, at.columns), release, excel_text=excel_text)
+        table = release_columns(answer, at.columns)
+        write_table(table, release, excel_text=excel_text, notes=notes)
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
@@ -229,7 +234,7 @@ def _short(document: dict[str, Any]) -> dict[str, Any]:
 
 def _of_all(answer: HazardAnswer) -> Iterator[str]:
     """Yield what all blocks do, in sentences."""
-    size, sites = answer.annual_rate.size, len(answer.curves)
+    size, sites = int(answer.count.sum()), len(answer.curves)
     expected = answer.expected_failures_per_year
     ends = f"{answer.total_low:.2g} to {answer.total_high:.2g}, {100.0 * answer.level:g} %"
     where = f" at {sites:,} sites" if sites > 1 else ""

@@ -110,6 +110,8 @@ class LossTable:
         metavar="FILE",
     )
     sheet: str | None = option(options.SHEET, metavar="NAME")
+    ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME")
+    crs: str | None = option(options.CRS)
     within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
 
 
@@ -148,7 +150,10 @@ def losses(
     from rbfrag.hazards.event_counts import count_years
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    rows = read_blocks(table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet)
+    rows = read_blocks(
+        table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet,
+        ignored=options.column_names(table.ignore_columns), crs=table.crs,
+    )  # fmt: skip
     with ProgressBar("losses", "events") as bar:
         answer = answered(
             folder, rows, files=files.named(), samples=sampling.samples,
@@ -159,7 +164,7 @@ def losses(
             **answering, run=workers.runner(count_years), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
-        write_table(answer.table_columns(), out, excel_text=excel_text)
+        write_table(answer.table_columns(), out, excel_text=excel_text, notes=answer.warnings)
     if plot is not None:
         from rbfrag.plots.losses import plot_losses
 

@@ -14,9 +14,9 @@ from rbfrag.cli.output import (
     show_prediction,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import answer_in_short, table_in_words
+from rbfrag.fragility.words import units_to_check
 from rbfrag.question.fields import BlockFields, RequestFields, WholeFields
 
 SHOWN = 40
@@ -51,6 +51,7 @@ class BatchOptions:
         metavar="FILE",
     )
     sheet: str | None = option(options.SHEET, metavar="NAME")
+    ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME")
     out: str | None = option(
         "With --blocks: table to write, the same columns with kind, mode, probability, ci_low, "
         "ci_high, event_low, event_high, in_domain, how (what answered), reason and, of uncertain "
@@ -101,29 +102,32 @@ def predict(
         kind = for_all.pop("kind", None)
         summary = predict_table(
             table.blocks, table.out, given=for_all, kind=kind,
-            sheet=table.sheet, excel_text=table.excel_text, **request,
+            sheet=table.sheet, ignored=options.column_names(table.ignore_columns),
+            excel_text=table.excel_text, remarks=(*given.notes, *measures.notes), **request,
         )  # fmt: skip
         _show_table(summary, json=printing.json)
         return
-    from rbfrag.question.document import prediction_document
+    from rbfrag.question.document import answer_block, prediction_document
 
     question: dict[str, Any] = {**request}
-    if block_draws is not None:
-        from rbfrag.exchange.block_draws import read_draws
-
-        draws, question["weights"] = read_draws(block_draws)
-        numbers = {**draws, **given}
-        kind = numbers.pop("kind", None)
-    else:
-        kind, numbers, question["remarks"] = numbers_of(given, pga_g=measures.get("pga_g"))
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 
         question["motion"] = find_motion(record.motion, db=request.get("db"), reading=reading)
         question["polarity"] = record.polarity
-    known = {**numbers, **measures}
-    document = prediction_document(known, kind=kind, **question)
-    show_prediction(document, known, json=printing.json, verbose=printing.verbose)
+    question["remarks"] = (*given.notes, *measures.notes)
+    inputs = {**given, **measures}
+    kind = inputs.pop("kind", None)
+    if block_draws is None:
+        with given.named():
+            document, inputs = answer_block(inputs, kind=kind, **question)
+    else:
+        from rbfrag.exchange.block_draws import read_draws
+
+        draws, weights = read_draws(block_draws)
+        inputs = {**draws, **inputs}
+        document = prediction_document(inputs, kind=kind, weights=weights, **question)
+    show_prediction(document, inputs, json=printing.json, verbose=printing.verbose)
 
 
 def _show_table(summary: dict[str, Any], *, json: bool) -> None:
@@ -131,7 +135,9 @@ def _show_table(summary: dict[str, Any], *, json: bool) -> None:
         print_json(summary)
         return
     warnings, rows = summary.pop("warnings"), summary.pop("blocks", None)
-    print(table_in_words(summary))
+    questions = units_to_check(warnings)
+    for text in (*questions, table_in_words(summary)):
+        print(text)
     print()
     if rows is not None:
         print_rows([answer_in_short(row) for row in rows[:SHOWN]])
@@ -139,4 +145,4 @@ def _show_table(summary: dict[str, Any], *, json: bool) -> None:
             print(f"... and {more:,} more: --out FILE writes them all")
         print()
     print_pairs(summary)
-    print_warnings(warnings)
+    print_warnings(text for text in warnings if text not in questions)

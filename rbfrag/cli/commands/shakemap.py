@@ -19,6 +19,7 @@ from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import model_in_words
+from rbfrag.results.diagnostic import as_documents
 
 EXAMPLE = (
     "Example:  rbfrag shakemap grid.xml --height 2.4 --width 0.5 --out map.geojson --plot map.png"
@@ -92,7 +93,7 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight"), one_kind=True)
+    several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
     if target.suffix.lower() in RASTERS and "lon" in several.columns:
         raise InputError(
             f"{target}: a GeoTIFF file takes the nodes of a grid, and these blocks have places of "
@@ -104,7 +105,7 @@ def shakemap(
         seed=drawing.seed, **answering,
     )  # fmt: skip
     warnings = [*several.remarks, *answer.warnings]
-    about = {**answer.about, "warnings": warnings}
+    about = {**answer.about, "warnings": warnings, "notes": as_documents(warnings)}
     _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.plot import shakemap as draw
@@ -126,16 +127,17 @@ def _write(
     columns: dict[str, Any], about: dict[str, Any], target: Any, *, excel_text: bool
 ) -> None:
     suffix = target.suffix.lower()
+    notes = about["warnings"]
     if suffix in TABLES:
-        write_table(columns, target, excel_text=excel_text)
+        write_table(columns, target, excel_text=excel_text, notes=notes)
     elif suffix == ".gpkg":
         from rbfrag.exchange.points import write_geopackage
 
-        write_geopackage(columns, "toppling_probability", target)
+        write_geopackage(columns, "toppling_probability", target, notes)
     elif suffix in RASTERS:
         from rbfrag.exchange.geotiff import write_geotiff
 
-        write_geotiff(columns, {**about, "warnings": None}, target)
+        write_geotiff(columns, {**about, "warnings": "; ".join(notes), "notes": None}, target)
     else:
         from rbfrag.exchange.points import write_points
 

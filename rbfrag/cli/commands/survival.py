@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer
 
 EXAMPLE = (
-    "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kr-sigma 0.1 "
-    "--age 10000 --age-sd 2000 --component rotd50"
+    "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kind rocking "
+    "--kr-sigma 0.1 --age 10000 --age-sd 2000 --component rotd50"
 )
 
 BRANCH = ("name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent")
@@ -75,24 +75,32 @@ def survival(
 ) -> None:
     """Print how likely standing blocks are under a seismic hazard.
 
-    Several blocks of --blocks stand at one site. The factors are those on all rates of the hazard
+    --kind is required: rocking for free-standing blocks, toppling for those backed by rock. Several
+    blocks of --blocks stand at one site. The factors are those on all rates of the hazard
     at which the blocks stand with 5 % and 50 %. With --weights the branches of a logic tree are
     weighted again by what the standing blocks say of each.
     """
+    import numpy as np
+
     from rbfrag.hazards.curve_file import as_curves
     from rbfrag.hazards.standing_blocks import ALL_STAND
+    from rbfrag.hazards.survival import KIND_MISSING, require_kind
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    several = blocks.given_blocks(given)
-    remarks, rows = several.remarks, several.rows
+    if blocks.blocks is None:
+        require_kind(given)
+    several = blocks.given_blocks(given, reads=("count",), need_kind=KIND_MISSING)
+    remarks, rows, numbers = several.remarks, several.rows, several.numbers
     if rows is not None:
         rows.whole(ALL_STAND)
         remarks += rows.remarks
+        count = rows.blocks.get("count", np.ones(len(numbers["kind"]))).astype(np.intp)
+        numbers = {name: np.repeat(values, count).tolist() for name, values in numbers.items()}
     read = as_curves(curves, **vars(meaning))
     answer = answered(
         read, age_years=known.age, age_sd_years=known.age_sd, weights=weights, draws=known.draws,
-        seed=known.seed, **several.numbers, **vars(meaning), **answering,
+        seed=known.seed, **numbers, **vars(meaning), **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
     if plot is not None:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rbfrag.cli.parameters.options import EXCEL_TEXT, SHEET
+from rbfrag.cli.parameters.options import CRS, EXCEL_TEXT, IGNORE_COLUMNS, SHEET, column_names
 from rbfrag.cli.parameters.stack import Given, option
 from rbfrag.errors import InputError
 from rbfrag.question.fields import column_of
@@ -50,6 +50,8 @@ class TableOptions:
         metavar="FILE",
     )
     sheet: str | None = option(SHEET, metavar="NAME")
+    ignore_columns: str | None = option(IGNORE_COLUMNS, metavar="NAME,NAME")
+    crs: str | None = option(CRS)
 
     def given_blocks(
         self,
@@ -58,6 +60,7 @@ class TableOptions:
         name: str | None = None,
         reads: Collection[str] = (),
         one_kind: bool = False,
+        need_kind: str = "",
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
@@ -66,6 +69,7 @@ class TableOptions:
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
+            need_kind: why rows of a table need a kind, as for `read_blocks`.
         """
         from rbfrag.exchange.block_rows import read_blocks
 
@@ -74,9 +78,10 @@ class TableOptions:
         if self.blocks is not None:
             table: Any = self.blocks
             rows = read_blocks(
-                table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet
-            )
-            return GivenBlocks(rows.blocks, False, (), rows)
+                table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet,
+                ignored=column_names(self.ignore_columns), crs=self.crs, need_kind=need_kind,
+            )  # fmt: skip
+            return GivenBlocks(rows.blocks, False, given.notes, rows)
         kind, numbers, remarks = numbers_of(given)
         columns = {column_of(field): [value] for field, value in numbers.items()}
         names = {} if name is None else {"block_id": [name]}
@@ -100,6 +105,7 @@ class BlocksOptions(TableOptions):
         name: str | None = None,
         reads: Collection[str] = (),
         one_kind: bool = False,
+        need_kind: str = "",
         n: int | None = None,
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
@@ -109,10 +115,13 @@ class BlocksOptions(TableOptions):
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
+            need_kind: why rows of a table need a kind, as for `read_blocks`.
             n: number of realisations of the rock mass; None for what its file says.
         """
         if self.rockmass is None:
-            return super().given_blocks(given, name=name, reads=reads, one_kind=one_kind)
+            return super().given_blocks(
+                given, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind
+            )
         from rbfrag.fragility.method import TOPPLING_BLOCK
 
         if given.get("kind") not in (None, TOPPLING_BLOCK.kind):
@@ -142,7 +151,7 @@ def numbers_of(
     with given.named():
         blocks = one_block(stated, given.get("kind", kind), pga_g)
     (group,) = blocks.groups
-    return group.kind, {**group.numbers}, blocks.remarks
+    return group.kind, {**group.numbers}, (*given.notes, *blocks.remarks)
 
 
 class GivenBlocks(NamedTuple):

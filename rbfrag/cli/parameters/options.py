@@ -31,6 +31,19 @@ if TYPE_CHECKING:
 
 SHEET = "Sheet of a workbook that holds the table. Default: the first."
 
+IGNORE_COLUMNS = (
+    "Columns of the table to ignore, separated by commas: those that are not understood and "
+    "would be rejected."
+)
+
+CRS = "Coordinate reference system of x and y of rows that name none, such as EPSG:2056."
+
+
+def column_names(text: str | None) -> tuple[str, ...]:
+    """Return the names of columns that an option lists."""
+    return () if text is None else tuple(name.strip() for name in text.split(","))
+
+
 EXCEL_TEXT = (
     "In CSV: write texts that begin with = + - or @ with an apostrophe, so that Excel does not "
     "compute them; rbfrag takes it off when it reads the table."

@@ -132,6 +132,7 @@ NEEDS = (
     Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
     Need(("--out",), ("--blocks",), "--blocks", "--blocks FILE names the table", ("predict",)),
     Need(("--sheet",), ("--blocks",), "--blocks", "it is a sheet of that workbook"),
+    Need(("--ignore-columns", "--crs"), ("--blocks",), "--blocks", "it is about that table"),
     Need(("--excel-text",), ("--out",), "--out", "--out FILE names the table that it is about"),
     Need(("--excel-text",), ("--csv",), "--csv", "--csv FILE names the table that it is about"),
     Need(

@@ -19,10 +19,13 @@ from rbfrag.question.fields import (
     OTHER_WORDS,
     by_field,
     declared,
+    name_of,
     names_of,
     option_of,
     word_of,
 )
+from rbfrag.question.table import number_with_unit
+from rbfrag.results.diagnostic import Diagnostic
 
 
 def option(
@@ -66,9 +69,11 @@ class Given(dict[str, Any]):
 
     Attributes:
         file: the file that describes the block; None for none.
+        notes: how numbers with a decimal comma were understood.
     """
 
     file: str | None = None
+    notes: tuple[str, ...] = ()
 
     @contextmanager
     def named(self) -> Iterator[None]:
@@ -79,6 +84,16 @@ class Given(dict[str, Any]):
             if self.file is None or str(error).startswith(self.file):
                 raise
             raise InputError(f"{self.file}: {error}", fields=error.fields) from None
+
+
+class _WithComma(float):
+    """A number that was typed with a decimal comma.
+
+    Attributes:
+        text: what was typed.
+    """
+
+    text: str
 
 
 class FieldOptions(NamedTuple):
@@ -119,6 +134,11 @@ class FieldOptions(NamedTuple):
         """Return what was given, by field; of a block file what no option states anew."""
         files = [words[word] for word in FILES if words.get(word) is not None]
         given = Given(by_field({name: words[name] for name in words if name not in FILES}))
+        for field, value in given.items():
+            if isinstance(value, _WithComma):
+                note = f"{option_of(field)} {value.text} is {float(value):g}"
+                given.notes = (*given.notes, Diagnostic(note, "decimal_comma"))
+                given[field] = float(value)
         if files:
             from rbfrag.solver.block.file import read_block
 
@@ -286,6 +306,14 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
         number = kind(value)
     except ValueError:
         wanted = _NEEDS[kind]
+        about = declared().get(name_of(parameter.name)) if kind is float else None
+        read = None if about is None else number_with_unit(value, about.unit)
+        if about is not None and read is not None:
+            typed = _WithComma(read)
+            typed.text = value
+            return typed if "," in value else read
+        if about is not None and about.unit:
+            wanted += f", perhaps with its unit ({about.unit})"
     else:
         if parameter.min is None or number >= parameter.min:
             return number

@@ -31,6 +31,9 @@ from rbfrag.exchange.tables.parts import (
 )
 from rbfrag.question.table import ROWS_ABOVE, fields_stated, header_row
 
+NOTE = "# note"
+"""First cell of a line below a table that holds a warning about it."""
+
 _PEEK = 1 << 16
 _BOM = b"\xef\xbb\xbf"
 
@@ -75,7 +78,8 @@ def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
         if fast and dialect.delimiter == ",":
             done = yield from _by_arrow(origin, names, line, numeric)
         if done is not None:
-            yield from parts_of_rows(names, islice(rows, done, None), decimal=dialect.decimal)
+            decimal = "," if dialect.decimal == "," else ".,"
+            yield from parts_of_rows(names, islice(rows, done, None), decimal=decimal)
 
     return TableFile(names, read, remarks, "line", dialect)
 
@@ -84,7 +88,7 @@ def _rows(reader: Any) -> Rows:
     line = 0
     for row in reader:
         # blank lines are passed over, which spreadsheets write with all their delimiters
-        if row == [""] or "".join(row).strip():
+        if (row == [""] or "".join(row).strip()) and row[0] != NOTE:
             yield line + 1, row
         line = reader.line_num
 

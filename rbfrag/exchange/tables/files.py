@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -20,7 +21,8 @@ from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
 from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
 from rbfrag.exchange.tables.parts import Dialect, TableFile, TablePart, Write, pyarrow
 from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer
-from rbfrag.files import output_path, reading, written_whole
+from rbfrag.files import output_path, reading, write_text, written_whole
+from rbfrag.results.diagnostic import as_documents
 
 SUFFIXES = (".csv", ".xlsx", ".parquet")
 """File types of a table of blocks."""
@@ -125,6 +127,7 @@ def table_writer(
     stack: ExitStack,
     dialect: Dialect | None = None,
     fast: bool = False,
+    notes: Sequence[str] = (),
 ) -> Write:
     """Return a function that writes the parts of a table and their answers.
 
@@ -136,12 +139,31 @@ def table_writer(
         stack: closes the file at the end.
         dialect: how CSV is written; None for commas and points.
         fast: write CSV by pyarrow where it is installed.
+        notes: warnings, which may still grow until the stack closes; those of CSV are written by
+            :func:`write_csv_notes`.
     """
     suffix = partial.suffix.lower()
     if suffix == ".csv":
         return csv_writer(partial, header, answers, numeric, stack, dialect or Dialect(), fast=fast)
     make = parquet_writer if suffix == ".parquet" else workbook_writer
-    return make(partial, header, answers, numeric, stack)
+    return make(partial, header, answers, numeric, stack, notes)
+
+
+def write_csv_notes(target: Path, notes: Sequence[str]) -> None:
+    """Write the warnings about a CSV table next to it, as CSV on the Web has them (W3C, 2015).
+
+    The file is called as the table, with ``-metadata.json`` behind. Other types of tables hold
+    their notes themselves.
+    """
+    path = target.with_name(f"{target.name}-metadata.json")
+    if target.suffix.lower() != ".csv" or not (notes or path.exists()):
+        return
+    document = {
+        "@context": "http://www.w3.org/ns/csvw",
+        "url": target.name,
+        "notes": as_documents(notes),
+    }
+    write_text(json.dumps(document, ensure_ascii=False, indent=2) + "\n", path)
 
 
 def write_block_table(
@@ -149,6 +171,7 @@ def write_block_table(
     path: str | os.PathLike[str],
     *,
     excel_text: bool = False,
+    notes: Sequence[str] = (),
 ) -> Path:
     """Write a table of blocks, whole or not at all, and return its path.
 
@@ -158,12 +181,14 @@ def write_block_table(
         columns: arrays of one length by column name, units in the names.
         path: file to write, ``.csv``, ``.xlsx`` or ``.parquet``; an existing file is replaced.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
+        notes: warnings: a sheet of a workbook, metadata of Parquet, a file next to CSV.
     """
     target = table_path(path)
     if excel_text and target.suffix.lower() == ".csv":
         columns = changed_texts(columns, as_text)
     length = len(next(iter(columns.values())))
     with written_whole(target, "table") as partial, ExitStack() as stack:
-        write = table_writer(partial, [*columns], stack=stack)
+        write = table_writer(partial, [*columns], stack=stack, notes=notes)
         write(TablePart(range(length), dict(columns)), {})
+    write_csv_notes(target, notes)
     return target

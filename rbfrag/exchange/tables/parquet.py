@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables import parts
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, Write, keys, pyarrow
+from rbfrag.results.diagnostic import as_documents
 
 
 def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
@@ -98,10 +100,16 @@ def parquet_writer(
     answers: Sequence[str],
     numeric: Container[str],
     stack: ExitStack,
+    notes: Sequence[str] = (),
 ) -> Write:
-    """Return a function that writes parts as Parquet, where NaN is null."""
+    """Return a function that writes parts as Parquet, where NaN is null, and notes as metadata."""
     arrow, parquet = pyarrow()
     open_file: list[Any] = []
+
+    def add_notes() -> None:
+        if open_file and notes:
+            text = json.dumps(as_documents(notes), ensure_ascii=False)
+            open_file[0].add_key_value_metadata({"notes": text})
 
     def write(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         # a column of numbers has no place for a cell that is none: its reason tells of it
@@ -115,6 +123,7 @@ def parquet_writer(
             texts = [each.name for each in table.schema if arrow.types.is_string(each.type)]
             parquet_file = parquet.ParquetWriter(partial, table.schema, use_dictionary=texts)
             open_file.append(stack.enter_context(parquet_file))
+            stack.callback(add_notes)
         open_file[0].write_table(table.cast(open_file[0].schema))
 
     return write

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
-from rbfrag.question.table import ROWS_ABOVE, header_row
+from rbfrag.question.table import ROWS_ABOVE, header_row, number_with_unit
+from rbfrag.results.diagnostic import Diagnostic
 
 ROWS = 1 << 18
 """Rows that are read, answered and written at a time."""
@@ -36,24 +37,56 @@ class TablePart:
     faults: Mapping[int, str] = field(default_factory=dict)
     decimal: str = ".,"
 
-    def numbers(self, column: str) -> tuple[NDArray[np.float64], dict[int, str]]:
+    def without(self, rows: Sequence[int]) -> TablePart:
+        """Return the part without some of its rows, by their indices."""
+        if not rows:
+            return self
+        keep = [i for i in range(len(self.lines)) if i not in {*rows}]
+
+        def kept(column: Any) -> Any:
+            if isinstance(column, list):
+                return [column[i] for i in keep]
+            return column[keep] if isinstance(column, np.ndarray) else column.take(keep)
+
+        return TablePart(
+            [self.lines[i] for i in keep],
+            {name: kept(column) for name, column in self.cells.items()},
+            {new: self.faults[old] for new, old in enumerate(keep) if old in self.faults},
+            self.decimal,
+        )
+
+    def numbers(
+        self, column: str, unit: str = "", factor: float = 1.0
+    ) -> tuple[NDArray[np.float64], dict[int, str]]:
         """Return the numbers of a column, NaN where a cell is empty, and what the others are.
 
+        Args:
+            column: its name.
+            unit: unit of its field, for cells that carry a unit of their own.
+            factor: what turns the other cells into that unit.
+
         Returns:
-            The numbers, and by index the cells that are none, in words.
+            The numbers in the unit, and by index the cells that are none, in words.
         """
         cells = self.cells[column]
         if isinstance(cells, np.ndarray):
-            return cells, {}
+            return cells if factor == 1.0 else cells * factor, {}
         if "." in self.decimal:
             with suppress(AttributeError, ValueError):  # else they are looked at one by one
-                return np.array([float(c) if c.strip() else np.nan for c in cells]), {}
+                numbers = np.array([float(c) if c.strip() else np.nan for c in cells])
+                return numbers if factor == 1.0 else numbers * factor, {}
         values, faults = np.full(len(cells), np.nan), {}
         for i, cell in enumerate(cells):
             try:
-                values[i] = _number(cell, self.decimal)
+                values[i] = _number(cell, self.decimal) * factor
             except (ValueError, OverflowError) as error:
-                faults[i] = f"{column} {error}"
+                # "7°" and "30 cm" carry a unit, which goes before that of the header
+                bare = not isinstance(cell, str) or _is_number(cell.strip().replace(",", "."))
+                number = None if bare else number_with_unit(cell, unit)
+                if number is None:
+                    faults[i] = f"{column} {error}"
+                else:
+                    values[i] = number
         return values, faults
 
 
@@ -96,7 +129,7 @@ class TableFile:
 
     names: Sequence[str]
     read: Callable[[Container[str]], Parts]
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[Diagnostic] = field(default_factory=list)
     word: str = "row"
     dialect: Dialect = field(default_factory=Dialect)
     sheets: Sequence[str] = ()
@@ -111,7 +144,7 @@ class TableFile:
         nameless = [key for key, name in zip(keys(self.names), self.names, strict=True) if not name]
         for part in self.read(numeric):
             for key in nameless:
-                remark = f"{key} is neither read nor written"
+                remark = Diagnostic(f"{key} is ignored and not written", "table_layout")
                 if any(cells_of(part.cells.pop(key))) and remark not in self.remarks:
                     self.remarks.append(remark)
             yield part
@@ -122,7 +155,7 @@ def keys(names: Sequence[str]) -> list[str]:
     return [name or f"column {i} without a name" for i, name in enumerate(names, 1)]
 
 
-def split_header(rows: Rows, word: str) -> tuple[list[str], int, Rows, list[str]]:
+def split_header(rows: Rows, word: str) -> tuple[list[str], int, Rows, list[Diagnostic]]:
     """Return the names of columns, the number of their row, the rows below, and what to say.
 
     Args:
@@ -135,8 +168,9 @@ def split_header(rows: Rows, word: str) -> tuple[list[str], int, Rows, list[str]
     names = ["" if cell is None else str(cell).strip() for cell in cells]
     while names and not names[-1]:  # spreadsheets write delimiters behind the last column
         names.pop()
-    remarks = [f"the names of the columns stand in {word} {line}: what is above is not read"]
-    return names, line, chain(first[at + 1 :], rows), remarks if at else []
+    text = f"the names of the columns are in {word} {line}: the lines above are ignored"
+    remarks = [Diagnostic(text, "table_layout")] if at else []
+    return names, line, chain(first[at + 1 :], rows), remarks
 
 
 def parts_of_rows(
@@ -186,10 +220,6 @@ def _number(cell: object, decimal: str) -> float:
         raise ValueError(f"{shown} has a decimal point, and the table has decimal commas")
     if "." in text or not _is_number(pointed):
         raise ValueError(f"{shown} is not a number")
-    if "," not in decimal:
-        raise ValueError(
-            f"{shown} is not a number: a decimal comma goes with semicolons between the cells"
-        )
     if decimal != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", text):
         raise ValueError(f"{shown} is {pointed} or {text.replace(',', '')}: write it as a number")
     return float(pointed)

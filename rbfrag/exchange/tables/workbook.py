@@ -28,6 +28,7 @@ from rbfrag.exchange.tables.parts import (
     parts_of_rows,
     split_header,
 )
+from rbfrag.results.diagnostic import as_documents
 
 MOST_ROWS = 1 << 20
 """Rows of a sheet, its first with the names."""
@@ -157,8 +158,9 @@ def workbook_writer(
     answers: Sequence[str],
     numeric: Container[str],
     stack: ExitStack,
+    notes: Sequence[str] = (),
 ) -> Write:
-    """Return a function that writes parts into the one sheet of a workbook.
+    """Return a function that writes parts into a sheet of a workbook, and notes into another.
 
     Texts stay texts, also those that begin with =, unless they are numbers as Excel itself would
     write them; NaN is an empty cell. Numbers are written with 16 digits.
@@ -204,8 +206,18 @@ def workbook_writer(
         for row in zip(*columns, strict=True):
             sheet.append([cell_of(value) for value in row])
 
+    def add_notes() -> None:
+        if not notes:
+            return
+        other = book.create_sheet("notes")
+        other.append(["code", "note", "rows"])
+        for each in as_documents(notes):
+            rows = ", ".join(str(row + 1) for row in each["rows"]) or "all"
+            other.append([each["code"], cell_of(each["text"]), rows])
+
     def close(kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
+            add_notes()
             book.save(partial)
         else:
             sheet.close()  # it holds a file open

@@ -31,6 +31,9 @@ const KNOWS = {
 /** How the sentence of the service begins that the page says in its own place. */
 const SAID = /^no friction angle is given/;
 
+/** How the question about a unit begins, which stands before the answer. */
+const UNIT = "Check the unit";
+
 /** An equals sign that does not part from what stands beside it. */
 const IS = "\u00a0=\u00a0";
 
@@ -48,7 +51,8 @@ export function showAnswer(answer) {
     ? "within the fitted range"
     : "outside the fitted range: an extrapolation";
   byId("probability").textContent = percent(answer.probability);
-  byId("sentence").textContent = inOneSentence(answer);
+  const questions = answer.warnings.filter((/** @type {string} */ text) => text.startsWith(UNIT));
+  byId("sentence").textContent = [...questions, inOneSentence(answer)].join(" ");
   byId("in-words").textContent = ranges(answer);
   const domain = byId("domain");
   domain.textContent = range;

@@ -24,7 +24,6 @@ function inWords(block) {
   const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
   if (block.state === "locked")
     return `Locked: no horizontal acceleration moves it; else it ${does}.`;
-  if (block.state === "unstable") return `Unstable: it ${does} at rest, without an earthquake.`;
   const from = quantity(block.yield_acceleration, "g");
   return `It ${does}, from a horizontal acceleration of ${from}.`;
 }
@@ -34,7 +33,7 @@ function inWords(block) {
  * @param {any} found answer of /v1/drawing
  */
 export function whyNoAnswer({ block, numbers }) {
-  if (numbers) return "";
+  if (numbers || block.state === "unstable") return "";
   const words = inWords(block);
   return block.state === "stable" ? `${words} No fragility model answers for it.` : words;
 }

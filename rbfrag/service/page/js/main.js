@@ -114,6 +114,13 @@ async function answerQuestion(asked) {
       return nothingKnown(noAnswer, found.block.warnings);
     }
     showAnswer(answer);
+    if (!found.numbers) {
+      // unstable at rest: P = 1 for any shaking
+      sheets.hide();
+      record.placeBlock(null);
+      byId("taken").textContent = "";
+      return busy(asked !== question);
+    }
     sayOfBlock(asked, found);
     await sheets.show(asked, answer, found, () => asked === question);
     // X(p) bounds what a block does that a slope backs

@@ -39,7 +39,7 @@ export function verbOf({ kind }) {
 
 /**
  * @typedef {{kind: string, probability: number, ci_low: number, ci_high: number,
- *   event_low: number | null, event_high: number | null, level: number,
+ *   event_low: number | null, event_high: number | null, level: number, how: string,
  *   sites?: number | null}} Answer
  */
 
@@ -50,6 +50,9 @@ export function verbOf({ kind }) {
  */
 export function inOneSentence(answer) {
   const { probability: p, ci_high: high } = answer;
+  if (p === 1 && answer.how === "by mechanics") {
+    return "The block is unstable without shaking: check dip and friction.";
+  }
   if (p === 0 && high === 0) return "No earthquake motion with this shaking makes the block fail.";
   const of = among(p);
   return (
@@ -65,7 +68,7 @@ export function inOneSentence(answer) {
  */
 export function ranges(answer) {
   const { probability: p, ci_low: low, ci_high: high, event_low, event_high, level } = answer;
-  if (p === 0 && high === 0) return "";
+  if ((p === 0 && high === 0) || low === 1) return "";
   const of = among(p);
   const between = (/** @type {number} */ a, /** @type {number} */ b) =>
     count(a, of) === count(b, of) ? count(a, of) : `between ${count(a, of)} and ${count(b, of)}`;
