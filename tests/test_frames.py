@@ -64,9 +64,11 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
         assert rbfrag.hazard(given, 3.0, 0.1, **settings).annual_rate == (
             rbfrag.hazard(curve, 3.0, 0.1, **settings).annual_rate
         )
-        standing = rbfrag.survival(given, 3.0, 0.1, age_years=1e4, **settings)
+        standing = rbfrag.survival(given, 3.0, 0.1, kind="rocking", age_years=1e4, **settings)
         assert standing.annual_rate_any == (
-            rbfrag.survival(curve, 3.0, 0.1, age_years=1e4, **settings).annual_rate_any
+            rbfrag.survival(
+                curve, 3.0, 0.1, kind="rocking", age_years=1e4, **settings
+            ).annual_rate_any
         )
     halves = rbfrag.hazard([file, file], 3.0, 0.1, weights="0.5,0.5", **settings)
     assert halves.annual_rate == rbfrag.hazard(file, 3.0, 0.1, **settings).annual_rate
@@ -107,7 +109,7 @@ def test_every_answer_is_a_table_and_one_line(tmp_path) -> None:
         rbfrag.respond(record, p2=3.0, kr=0.1, history=True),
         rbfrag.stability(block, beta_deg=0.0, phi_deg=40.0),
         rbfrag.hazard(curve, 3.0, 0.1),
-        rbfrag.survival(curve, p2=3.0, kr=0.1, age_years=1000.0),
+        rbfrag.survival(curve, p2=3.0, kr=0.1, kind="rocking", age_years=1000.0),
         rbfrag.respond_draws(record, p2=3.0, kr=0.1, draws=4),
         curve,
         rbfrag.BlockArray.from_angles([10.0, 20.0], 30.0, 1.0),

@@ -101,7 +101,7 @@ class BlockRows:
     def checked(self) -> BlockRows:
         """Return the table itself, or refuse one without a block, or of blocks without weight."""
         if not self.reasons.size:
-            raise InputError(f"{self.source}: there is no block in the file")
+            raise InputError(no_block(self.source, self.remarks))
         if self.refused_count == self.reasons.size:
             self._refuse("")
         weight = self.blocks.get("weight")
@@ -159,6 +159,12 @@ class BlockRows:
     def _refuse(self, why: str) -> NoReturn:
         reasons = self.refused["reason"].tolist()
         refuse(self.source, self.places, reasons, self.reasons.size, why)
+
+
+def no_block(source: object, warnings: Sequence[str]) -> str:
+    """Return that a table has no block, perhaps but the example of the template."""
+    example = next((f": {text}" for text in warnings if "template" in text), "")
+    return f"{source}: there is no block in the file{example}"
 
 
 Blocks = str | os.PathLike[str] | Mapping[str, Any] | BlockRows

@@ -17,9 +17,16 @@ from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
-from rbfrag.question.fields import BlockFields, column_of, declared, names_of
+from rbfrag.question.fields import (
+    BY_ROW,
+    BlockFields,
+    ShakingFields,
+    column_of,
+    declared,
+    names_of,
+)
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import RECTANGLE, SHAPES, SPACE
+from rbfrag.question.shapes import OF_A_SHAPE, RECTANGLE, SHAPES, SPACE
 from rbfrag.question.table import (
     Column,
     Header,
@@ -32,6 +39,9 @@ from rbfrag.results.diagnostic import Diagnostic
 
 TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *SPACE)
 """Columns of texts."""
+
+SHAKING_TEXTS = ("component", "mechanism")
+"""Columns of texts about the shaking."""
 
 IF_EMPTY = {"count": 1.0, "weight": 1.0, "amplification": 1.0}
 """What an empty cell stands for; of a standard deviation it is 0."""
@@ -319,3 +329,39 @@ def opened_table(
         name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
         header = columns_in(file.header, name, (*read, *texts), ignored)
         yield BlockTable(name, file, header, texts)
+
+
+def read_rows(
+    source: str | os.PathLike[str],
+    given: Mapping[str, Any],
+    *,
+    sheet: str | None = None,
+    ignored: Sequence[str] = (),
+) -> tuple[list[dict[str, Any]], tuple[Diagnostic, ...]]:
+    """Return the inputs of each row of a table, for answers row by row, and its warnings.
+
+    Args:
+        source: the table.
+        given: fields that hold for rows whose cell is empty.
+        sheet: of a workbook, the name of the sheet; None for the first.
+        ignored: columns to ignore.
+
+    Returns:
+        Fields by name, with ``block_id``, ``count`` and, of a row that cannot be used, ``reason``.
+    """
+    read = (*names_of(BlockFields, ShakingFields, *BY_ROW), "count")
+    texts = (*TEXTS, *SHAKING_TEXTS)
+    with opened_table(source, read, texts, sheet=sheet, ignored=ignored) as table:
+        table.check(given, given.get("kind"))
+        columns, faults, _ = table.whole()
+    rows = []
+    for i, cells in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
+        row = {n: v for n, v in zip(columns, cells, strict=True) if v == v and v != ""}
+        if kinds_by_numbers(row):  # which go before a shape
+            row = {name: row[name] for name in row if name not in OF_A_SHAPE}
+        elif "beta_deg" in columns and {"beta_deg", "base"}.isdisjoint({*row, *given}):
+            faults.setdefault(i, f"{column_of('beta_deg')} is empty: enter 0 for a level base")
+        if "back_fracture" in row:
+            row["back_fracture"] = bool(row["back_fracture"])
+        rows.append({**given, **row, **({"reason": faults[i]} if i in faults else {})})
+    return rows, table.warnings((*read, *texts))

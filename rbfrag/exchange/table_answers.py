@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE
-from rbfrag.exchange.block_table import TEXTS, BlockTable, opened_table
+from rbfrag.exchange.block_rows import PLACE, no_block
+from rbfrag.exchange.block_table import SHAKING_TEXTS, TEXTS, BlockTable, opened_table
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
 from rbfrag.exchange.tables.parts import TablePart, Write
@@ -46,9 +46,6 @@ ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "how", "warnings", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
 _SHAKING, _SCATTER = names_of(ShakingFields), frozenset(names_of(ScatterFields))
-
-_SHAKING_TEXTS = ("component", "mechanism")
-"""Columns of texts about the shaking."""
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
@@ -119,7 +116,7 @@ def predict_table(
     chosen = {name: {} for name in ("kind", "model", "term", "method", "read")}
     notes: list[str] = []
     by_row: dict[str, Diagnostic] = {}
-    texts = (*TEXTS, *_SHAKING_TEXTS)
+    texts = (*TEXTS, *SHAKING_TEXTS)
     with (
         opened_table(origin, read, texts, sheet=sheet, ignored=ignored) as table,
         ExitStack() as stack,
@@ -151,7 +148,7 @@ def predict_table(
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
         total, answered, inside = counts.tolist()
         if not total:
-            raise InputError(f"{origin}: there is no block in the file")
+            raise InputError(no_block(origin, table.file.remarks))
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])
@@ -251,7 +248,7 @@ def _answer(
         else:
             # an option holds for the rows whose cell is empty
             inputs[name] = np.where(np.isnan(column), given.get(name, np.nan), column)
-    for name in (*SPACE, *_SHAKING_TEXTS):
+    for name in (*SPACE, *SHAKING_TEXTS):
         if (cells := table.text(part, name)) is not None:
             default = given.get(name) or ""
             texts = np.array([cell or default for cell in cells], dtype=object)
@@ -259,11 +256,9 @@ def _answer(
                 inputs[name] = texts
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
-    options = {name: inputs.pop(name) for name in _SHAKING_TEXTS if name in inputs}
+    options = {name: inputs.pop(name) for name in SHAKING_TEXTS if name in inputs}
     with table.named():
-        predicted = ask(
-            inputs, kind=requested, mode=modes, rows=True, **{**question, **options}
-        )
+        predicted = ask(inputs, kind=requested, mode=modes, rows=True, **{**question, **options})
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")

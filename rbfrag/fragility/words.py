@@ -57,7 +57,7 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     sentences = [
         *questions,
         f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, "
-        f"{level})."
+        f"{level}).",
     ]
     if sites is not None:
         where = f"At {at_sites(sites)}"

@@ -281,7 +281,9 @@ def check_lengths(lengths: Mapping[str, Any], listener: Listener) -> None:
 
 def check_size(p2: Any, listener: Listener) -> None:
     """Question a p² [1/s²] that no block seen so far has."""
-    text = Diagnostic("Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m", "check_unit")
+    text = Diagnostic(
+        "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m", "check_unit"
+    )
     small = (p2 > 0.0) & (p2 < LEAST_P2)
     listener.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
 

@@ -75,6 +75,9 @@ INSTEAD_OF = {
 }
 """By a field that a column sounds like the fields that may take its place."""
 
+CARRIED = ("lon", "lat", "x", "y", "z", "crs")
+"""Fields of where a block is, which are handed on where that does not matter."""
+
 MULTIPLIERS = ("count", "weight", "component")
 """Fields of a column that an answer uses or rejects, and never ignores."""
 
@@ -176,10 +179,12 @@ def field_of(header: str) -> HeaderMatch | None:
     if (exact := _names().get(header)) is not None:
         return HeaderMatch(exact, None, "no_back" if header == "no_back" else exact)
     text = header.strip().lower()
-    if (match := _called(text)) is not None:
-        return match
+    if (name := _names().get(_as_name(text))) is not None:
+        return HeaderMatch(name, None, name)
     if bracket := _IN_BRACKETS.search(text):
         return _called(text[: bracket.start()], bracket[1])
+    if (match := _called(text)) is not None:
+        return match
     if end := _AT_THE_END.fullmatch(text.translate({ord("²"): "2", ord("³"): "3"})):
         match, unit = _called(end[1]), end[2].replace("_", "/")
         if match is not None and unit_factor(declared()[match.field].unit, unit):
@@ -187,9 +192,13 @@ def field_of(header: str) -> HeaderMatch | None:
     return None
 
 
+def _as_name(text: str) -> str:
+    return re.sub(r"[\s\-]+", "_", text.strip())
+
+
 def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
     """Return the field of a header without its unit."""
-    name = _names().get(re.sub(r"[\s\-]+", "_", text.strip()))
+    name = _names().get(_as_name(text))
     if name is not None:
         return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
     known, words = _vocabulary(), plain_words(text)
@@ -329,7 +338,8 @@ class Header(NamedTuple):
             used: the fields that it depends on, or hands on.
         """
         headers = {column.header for name, column in self.columns.items() if name in used}
-        names = [name for name in header if name not in headers]
+        carried = {text for text, field in self.unused.items() if field in CARRIED}
+        names = [name for name in header if name not in headers | carried]
         earlier = [name for name in names if name in WRITTEN or name.startswith("annual_rate")]
         others = [name for name in names if name not in earlier]
         for names, text in ((others, "ignored"), (earlier, "of an earlier answer ignored")):

@@ -52,10 +52,10 @@ def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -
             assert row[name] == pytest.approx(alone[name], rel=1e-12)
         assert (row["kind"], row["mode"], row["reason"]) == ("toppling", "topple", "")
     assert found["warnings"] == [
-        "the names of the columns stand in row 4: what is above is not read",
-        "column 5 without a name is neither read nor written",
-        "the column Width [cm] is converted from cm to m",
-        "not read: remark",
+        "the names of the columns are in row 4: the lines above are ignored",
+        "column 5 without a name is ignored and not written",
+        "column Width [cm]: converted from cm to m",
+        "column ignored: remark",
     ]
 
 
@@ -79,7 +79,7 @@ def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch)
 def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
     found = shell.json("hazard", "curve.csv", *ASKED)
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
-    shell("survival", "curve.csv", *ASKED, "--age", "100")
+    shell("survival", "curve.csv", *ASKED, "--kind", "rocking", "--age", "100")
     shell("export", "pelicun", *ASKED, "--out", "a.csv")
     first = refuses("predict", "--pgv", "0.6", "--blocks", "survey.xlsx")
     assert "columns are Contents (of the first sheet; the sheets are Sheet, north wall)" in first
@@ -100,15 +100,32 @@ def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
     assert "--sheet goes with --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
 
 
+def add_row(path: Path) -> None:
+    """Write a block below the example of a template: the same with another name."""
+    if path.suffix == ".csv":
+        text = path.read_text("utf-8")
+        path.write_text(text + text.splitlines()[1].replace("example", "A1") + "\n", "utf-8")
+        return
+    book = openpyxl.load_workbook(path)
+    sheet = book["blocks"]
+    sheet.append(["A1", *[cell.value for cell in sheet[2]][1:]])
+    book.save(path)
+
+
 @pytest.mark.parametrize("suffix", ["xlsx", "csv"])
 def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> None:
     name = f"blocks.{suffix}"
     assert f"predict --blocks {name}" in shell("block", "--template", name).stdout
+    assert "the row 'example' of the template is skipped" in refuses(
+        "predict", "--blocks", name, "--pgv", "0.6"
+    )
+    add_row(Path(name))
     found = shell.json("predict", "--blocks", name, "--pgv", "0.6")
     (row,) = found["blocks"]
-    assert found["warnings"] == []  # nothing is said of columns that are empty
+    # nothing is said of columns that are empty
+    assert found["warnings"] == ["the row 'example' of the template is skipped"]
     alone = of_one(shell, "2.4", "0.5", "3")
-    assert row["block_id"] == "example"
+    assert row["block_id"] == "A1"
     assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)
     assert "--template does not go with --height" in refuses(
         "block", "--template", name, "--height", "2"

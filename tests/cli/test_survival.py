@@ -15,7 +15,7 @@ from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
 
-BLOCK = ("--p2", "3", "--kr", "0.1", "--component", "single")
+BLOCK = ("--p2", "3", "--kr", "0.1", "--kind", "toppling", "--component", "single")
 TREE = "openquake_classical_logic_tree/three_realizations"
 
 
@@ -66,7 +66,7 @@ def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
 
 def test_a_table_has_its_own_sigmas(shell: Shell, curve: str) -> None:
     Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma,p2_sigma\nA7,3,0.1,0.2,\n")
-    asked = ("--component", "single", "--age", "200")
+    asked = ("--component", "single", "--kind", "toppling", "--age", "200")
     table = shell.json("survival", curve, "--blocks", "one.csv", "--kr-sigma", "0.7", *asked)
     alone = shell.json("survival", curve, *BLOCK, "--kr-sigma", "0.2", "--age", "200")
     assert table["probability_standing"] == alone["probability_standing"]
@@ -155,5 +155,7 @@ def test_refusals(
 
 def test_a_sigma_below_zero_is_refused_by_name(refuses: Callable[..., str], curve: str) -> None:
     Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma\nA7,3,0.1,-0.2\n")
-    message = refuses("survival", curve, "--blocks", "one.csv", "--age", "100")
+    message = refuses(
+        "survival", curve, "--blocks", "one.csv", "--kind", "toppling", "--age", "100"
+    )
     assert "line 2 (block A7): kr_sigma = -0.2 is negative" in message

@@ -230,7 +230,7 @@ def test_arrays_in_python_are_answered_as_tables() -> None:
     with pytest.raises(
         rbfrag.InputError, match=r"2 of 4 blocks.*that all of them stand.*element 1.*element 2"
     ):
-        rbfrag.survival("curve.csv", p2, kr, age_years=100.0)
+        rbfrag.survival("curve.csv", p2, kr, kind="toppling", age_years=100.0)
     with pytest.raises(rbfrag.InputError, match=r"2 of 4 blocks.*row 2: kr = -0\.1.*row 3: p2"):
         rbfrag.export.nrml("a.xml", p2, kr)
 

@@ -137,9 +137,7 @@ def test_bad_rows_leave_the_others_as_they_are(
 def test_predictions_name_the_same_row(tmp_path: Path, form: str, kind: str) -> None:
     source = table(tmp_path, form, [SOUND, SOUND, BAD[kind][0], SOUND])
     target = tmp_path / f"out{source.suffix}"
-    told: Any = predict_table(
-        source, target, given={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
-    )
+    told: Any = predict_table(source, target, given={"pgv_m_s": 0.6}, ignored=("weight",))
     place = f"{WORDS.get(form, 'row')} {FIRST.get(form, 1) + 2}"
     (said,) = (text for text in told["warnings"] if "could not be used" in text)
     assert said.startswith("1 of 4 blocks could not be used; the reasons stand in the column")
@@ -212,18 +210,22 @@ def test_rectangles_are_refused_in_their_own_words() -> None:
 def test_kinds_of_rows() -> None:
     columns: dict[str, Any] = {
         "p2_1_s2": np.full(5, 3.0), "kr": np.full(5, 0.1),
-        "kind": ["", "rocking", "sliding", "rolling", "toppling"],
+        "kind": ["", "rocking", "sliding", "free-standing", "toppling"],
         "restitution": [np.nan, 1.2, 0.9, 0.9, 0.9],
     }  # fmt: skip
     own: BlockRows = read_blocks(columns)
-    assert own.blocks["row"].tolist() == [0, 4]
-    rocking, sliding, rolling = own.refused["reason"].tolist()
+    assert own.blocks["row"].tolist() == [0, 3, 4]
+    assert own.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
+    rocking, sliding = own.refused["reason"].tolist()
     assert rocking.startswith("restitution = 1.2 is no ratio of speeds")
     assert sliding == (
         "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
         "displacement_m"
     )
-    assert rolling.startswith("kind = 'rolling' is none of confined_toppling, rocking")
+    for word in ("rolling", "toppeling"):  # beside words that name a kind, and nearly one
+        wrong = {**columns, "kind": ["", "rocking", "sliding", word, "toppling"]}
+        with pytest.raises(InputError, match=f"'{word}' is not a kind of failure"):
+            read_blocks(wrong)
     columns["restitution"][1] = 0.9
     one = read_blocks(columns, one_kind=True)
     assert one.refused["reason"][0] == (

@@ -143,7 +143,7 @@ def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
         told = answer(source, target)
         assert (told["rows"], told["answered"]) == (count, count)
         assert told["warnings"] == [
-            "the names of the columns stand in line 5: what is above is not read"
+            "the names of the columns are in line 5: the lines above are ignored"
         ]
         assert target.read_text().count("\n") == count + 1
     source.write_text("\n".join([title + names, row, row.replace("3", "x")]))
@@ -157,7 +157,9 @@ def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
     assert told["answered"] == 1
     assert "kr = '1.234' has a decimal point, and the table has decimal commas" in str(told)
     source.write_text('p2_1_s2,kr\n3,"0,1"\n')
-    with pytest.raises(InputError, match="line 2: kr = '0,1' is not a number: a decimal comma"):
+    assert answer(source, tmp_path / "b.csv", pgv_m_s=0.6)["answered"] == 1
+    source.write_text('p2_1_s2,kr\n3,"1,100"\n')
+    with pytest.raises(InputError, match="line 2: kr = '1,100' is 1.100 or 1100"):
         read_blocks(source)
 
 

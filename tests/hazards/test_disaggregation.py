@@ -112,7 +112,7 @@ def test_survival_stands_on_the_same_rate(tmp_path: Path) -> None:
     file = written(tmp_path, MAG)
     curve = hazard_curve("pga_g", LEVELS, 1e-4 * LEVELS**-2.0)
     rate = rbfrag.hazard(curve, 3.0, 0.1, disaggregation=file).annual_rate[0]
-    stands = rbfrag.survival(curve, 3.0, 0.1, age_years=100.0, disaggregation=file)
+    stands = rbfrag.survival(curve, 3.0, 0.1, kind="toppling", age_years=100.0, disaggregation=file)
     assert stands.annual_rate_any == pytest.approx(rate)
 
 

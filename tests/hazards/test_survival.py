@@ -110,13 +110,17 @@ def test_two_equal_blocks_that_fail_together_are_one() -> None:
 
 
 def answered(row: ModelRow, p2: Any, kr: Any, **asked: Any) -> Any:
-    return survival(power_law(), p2, kr, age_years=2e4, component="single", model=row, **asked)
+    return survival(
+        power_law(), p2, kr, kind="toppling", age_years=2e4, component="single", model=row, **asked
+    )
 
 
 def test_one_block_has_the_rate_of_hazard() -> None:
     row = model_row()
     expected = hazard(power_law(), 3.0, 0.1, component="rotd50", model=row)
-    answer = survival(power_law(), 3.0, 0.1, age_years=2e4, component="rotd50", model=row)
+    answer = survival(
+        power_law(), 3.0, 0.1, kind="toppling", age_years=2e4, component="rotd50", model=row
+    )
     assert answer.annual_rate_any == pytest.approx(expected.annual_rate[0], rel=1e-4)
     ends = (expected.ci_high[0], expected.ci_low[0])
     for found, rate in zip((answer.ci_low, answer.ci_high), ends, strict=True):
@@ -272,7 +276,9 @@ def test_more_than_the_ranges_and_the_ends_is_told() -> None:
     row = model_row()
     x = np.array([0.7, 0.8, 0.9])
     short = hazard_curve("pgv_m_s", x, K * x**-B)
-    answer = survival(short, 300.0, 1.0, age_years=YEARS, model=row, component="single")
+    answer = survival(
+        short, 300.0, 1.0, kind="toppling", age_years=YEARS, model=row, component="single"
+    )
     told = " ".join(answer.warnings)
     assert "the curve begins at" in told
     assert "the curve ends at" in told

@@ -49,7 +49,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if each.name != "question":
             (package / each.name).symlink_to(each)
     (package / "question").mkdir()
-    for each in (PACKAGE / "question").glob("*.py"):
+    for each in (PACKAGE / "question").glob("*.*"):
         text = each.read_text(encoding="utf-8")
         if each.name == "fields.py":
             head, mark, rest = text.partition(

@@ -42,7 +42,9 @@ from rbfrag.solver.stability.single import stability
 def test_a_column_states_a_field_under_any_of_its_names(
     header: str, field: str, unit: str | None
 ) -> None:
-    assert field_of(header) == (field, unit)
+    match = field_of(header)
+    assert match is not None
+    assert (match.field, match.unit) == (field, unit)
 
 
 def test_no_name_stands_for_two_fields() -> None:
@@ -55,11 +57,11 @@ def test_no_name_stands_for_two_fields() -> None:
 @pytest.mark.parametrize(
     ("header", "words"),
     [
-        (["hieght_m", "width_m"], "did you mean height_m"),
-        (["\uf07fheight_m", "width_m"], r"the column '.uf07fheight_m' is no name"),
-        (["height_m", "restitutoin"], "did you mean restitution"),
-        (["hieght_cm", "width_m"], "did you mean height"),
-        (["dip", "beta"], "both state the dip of the base"),
+        (["hieght_m", "width_m"], "unknown column 'hieght_m'; did you mean 'height_m'"),
+        (["hight", "width_m"], "did you mean 'height'"),
+        (["height_m", "restitutoin"], "did you mean 'restitution'"),
+        (["hieght_cm", "width_m"], "did you mean 'height"),
+        (["dip", "beta"], "are both the dip of the base"),
         (["kr", "kr"], "kr is there twice"),
         (["Height [ft]"], "'ft'"),
         (["PGA (knots)"], "'knots'"),
@@ -70,19 +72,29 @@ def test_what_cannot_be_meant_is_refused(header: list[str], words: str) -> None:
         columns_in(header, "blocks.csv", columns_declared())
 
 
-def test_other_columns_are_named_loudly_where_they_sound_like_input() -> None:
-    header = ["p2_1_s2", "kr", "dip direction", "note"]
+def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewhere() -> None:
+    header = ["height_m", "width_m", "dip direction", "note"]
     stated = columns_in(header, "blocks.csv", columns_declared())
-    loud, quiet = stated.unread(header, ("p2", "kr"))
-    assert loud.startswith("NOT READ: dip direction")
-    assert quiet == "not read: note"
+    with pytest.raises(InputError, match="'dip direction' is not understood and may be the dip of"):
+        stated.check_unused("blocks.csv", stated.columns)
+    # of a block given by its numbers the dip does not matter
+    stated.check_unused("blocks.csv", ("p2", "kr"))
+    stated.check_unused("blocks.csv", ("height_m", "width_m", "beta_deg"))
+    (warning,) = stated.ignored(header, ("height_m", "width_m"))
+    assert warning == "columns ignored: dip direction, note"
+    assert warning.code == "ignored_columns"
+    left_out = columns_in(header, "blocks.csv", columns_declared(), ["dip direction"])
+    left_out.check_unused("blocks.csv", left_out.columns)
 
 
-def test_columns_of_written_answers_are_not_worth_a_word(tmp_path: Path) -> None:
+def test_columns_of_an_earlier_answer_are_named_as_ignored(tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
-    source.write_text("block_id,p2_1_s2,kr,pgv_m_s,weight,lon,lat\na,3,0.1,0.6,1,20,40\n")
+    source.write_text("block_id,p2_1_s2,kr,pgv_m_s,lon,lat\na,3,0.1,0.6,20,40\n")
     assert predict_table(source, target, given={})["warnings"] == []
-    assert read_blocks(target).remarks == ("NOT READ: pgv_m_s: the answer does not depend on it",)
+    assert read_blocks(target).remarks == (
+        "column ignored: pgv_m_s",
+        "columns of an earlier answer ignored: probability, ci_low, ci_high, in_domain, how",
+    )
 
 
 def test_losses_are_in_any_currency() -> None:
@@ -140,7 +152,7 @@ def test_units_in_headers_are_converted_and_said(tmp_path: Path) -> None:
     plain, _ = answered(tmp_path, "height_m,width_m,pgv_m_s\n2,0.4,0.8\n")
     rows, warnings = answered(tmp_path, "H (cm),W [mm],PGV [cm/s]\n200,400,80\n")
     assert float(rows[0]["probability"]) == pytest.approx(float(plain[0]["probability"]), rel=1e-12)
-    assert sum("is converted" in text for text in warnings) == 3
+    assert sum(": converted from" in text for text in warnings) == 3
 
 
 def test_a_rectangle_that_slides_is_never_answered_as_one_that_topples(tmp_path: Path) -> None:

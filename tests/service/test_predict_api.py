@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import rbfrag
 from rbfrag.cli.main import app
 from rbfrag.cli.output import show_prediction
-from rbfrag.question.document import prediction_document
+from rbfrag.question.document import answer_block
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 
@@ -19,7 +19,8 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    show_prediction(prediction_document(given, **more, db=str(database)), given, json=True)
+    document, _ = answer_block(given, **more, db=str(database))
+    show_prediction(document, given, json=True)
     return json.loads(capsys.readouterr().out)
 
 
@@ -60,7 +61,7 @@ def test_planes_in_space_are_answered_as_by_the_command_line(client, database):
         assert posted.json()[name][1] is None
     assert "base and back make a wedge" in posted.json()["reason"][1]
     alone = client.post("/v1/predict", json={**planes, **shape}).json()
-    assert alone["probability"] == posted.json()["probability"][:1]
+    assert alone == wanted
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -116,7 +117,6 @@ def test_a_list_says_which_element_cannot_be_used(client):
         ("ky=0.1&pgv=0.6", "displacement is missing"),
         ("p2=3&kr=0.1&ky=0.1&pgv=0.6", "ky does not go with kind toppling"),
         ("p2=3&kr=0.1&kind=falls&pgv=0.6", "no falls model"),
-        ("p2=3&kr=0&pgv=0.6", "kr = 0"),
         ("p2=3&kr=nan&pgv=0.6", "kr = nan"),
         ("p2=3&kr=0.1&pgv=inf", "pgv = inf"),
         ("p2=3&kr=0.1&pgv=0.6&pgv=0.7", "pgv is given twice"),

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Any
+from typing import Annotated, Any
 
-from rbfrag.cli.output import print_json, print_rows, print_sentences, print_warnings
+from rbfrag.cli.output import (
+    print_json,
+    print_pairs,
+    print_rows,
+    print_sentences,
+    print_warnings,
+)
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
+from rbfrag.question.fields import BlockFields, RequestFields, WholeFields
+from rbfrag.results.diagnostic import diagnostics
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
 
@@ -25,9 +33,14 @@ class Heading:
 class Hazard:
     """How often a year the block is asked to fail."""
 
-    hazard: str | None = option(
-        "Hazard curve, as  rbfrag hazard  reads it: the page has the annual rate, too.",
+    hazard: list[str] | None = option(
+        "Hazard curve, as in  rbfrag hazard: the report has the return period of failure, too; "
+        "give it once for each branch of a logic tree.",
         metavar="CURVE",
+    )
+    weights: str | None = option(
+        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
+        "realizations."
     )
     years: float = option("Period of the probability [years].", 50.0)
 
@@ -42,42 +55,55 @@ def report(
         metavar="[BLOCKS]",
     ),
     sheet: str | None = option(options.SHEET, metavar="NAME"),
+    ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME"),
     out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
-    given: options.Block,
-    measures: options.Measures,
+    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    shaking: options.Shaking,
+    request: Annotated[Given, fields_of(RequestFields)],
     rate: Hazard,
     meaning: options.Curve,
     heading: Heading,
-    answering: options.Ranging,
     json: options.Json = False,
 ) -> None:
     """Write one document about blocks: PDF or HTML to attach.
 
-    A page has the answer in a sentence, the block to scale, a table of what was asked, the design
-    chart and the fragility curve with the block on them, with --hazard the annual rate, and the
-    versions of program, model and data. The same question gives the same file.
+    It takes what predict and hazard take. A page has the answer in a sentence, the block to scale,
+    a table of what was asked, the design chart and the fragility curve with the block on them, with
+    --hazard the return period of failure, the notes, and the versions of program, model and data.
+    Of a table the first page lists the blocks, those that are unstable without shaking first, and
+    the totals. The same question gives the same file.
     """
-    from rbfrag.exchange.block_table import stated_rows
+    from rbfrag.exchange.block_table import read_rows
     from rbfrag.plots.report.contents import COLUMNS, RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
-    known: dict[str, Any] = {**given, **measures}
-    rows, remarks = stated_rows(blocks, known, sheet=sheet) if blocks else ([known], ())
+    inputs: dict[str, Any] = {**given, **shaking, **request}
+    rows, remarks = [inputs], (*given.notes, *shaking.notes)
+    if blocks:
+        names = options.column_names(ignore_columns)
+        rows, of_table = read_rows(blocks, inputs, sheet=sheet, ignored=names)
+        remarks += of_table
     title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
+    question = RateQuestion(rate.hazard, rate.years, vars(meaning), rate.weights)
     with given.named():
-        entries = write_report(
-            out, rows, RateQuestion(rate.hazard, rate.years, vars(meaning)), title=title,
-            date=heading.date, **answering,
-        )  # fmt: skip
-    reports = [entry.contents for entry in entries if entry.contents is not None]
+        report = write_report(out, rows, question, title=title, date=heading.date, warnings=remarks)
+    contents = [entry.contents for entry in report.entries if entry.contents is not None]
     if json:
-        documents = [each.document for each in reports]
-        print_json({"file": out, **(documents[0] if blocks is None else {"blocks": documents})})
+        documents = [{"block_id": e.name, **e.contents.document} for e in report.entries
+                     if e.contents is not None]  # fmt: skip
+        rejected = [{"block_id": e.name, "reason": e.reason} for e in report.entries if e.reason]
+        several = {"blocks": documents, "rejected": rejected, **report.totals}
+        warnings = {"warnings": [*report.warnings]} if blocks else {}
+        print_json({"file": out, **(several if blocks else contents[0].document), **warnings})
         return
     if len(rows) == 1:
-        print_sentences(reports[0].sentences)
+        print_sentences(contents[0].sentences)
     else:
-        print_rows([{**dict(zip_longest(COLUMNS, e.cells)), "reason": e.reason} for e in entries])
+        print_pairs(dict(report.summary))
+        print()
+        print_rows(
+            [{**dict(zip_longest(COLUMNS, e.cells)), "reason": e.reason} for e in report.entries]
+        )
         print()
     print(out)
-    print_warnings(dict.fromkeys((*remarks, *(text for each in reports for text in each.remarks))))
+    print_warnings(diagnostics(report.warnings, *(each.remarks for each in contents)))

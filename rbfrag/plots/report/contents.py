@@ -9,26 +9,39 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
+import numpy as np
+
 from rbfrag.errors import InputError
 from rbfrag.fragility import words
-from rbfrag.fragility.measures import STATED
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.measures import STATED, TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.hazards.annual_rate import probability_in
 from rbfrag.hazards.answer import HazardAnswer, hazard
+from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.report import as_dict, beyond_in_words, once_in, rate_in_words
+from rbfrag.hazards.report import as_dict, beyond_in_words, rate_in_words
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
-from rbfrag.question.document import prediction_document
-from rbfrag.question.fields import AnsweringFields, RangeFields
-from rbfrag.question.keywords import model_for
-from rbfrag.question.question import described
+from rbfrag.question.document import answer_block
+from rbfrag.question.fields import (
+    BlockFields,
+    RangeFields,
+    RequestFields,
+    ShakingFields,
+    WholeFields,
+    names_of,
+    word_of,
+)
+from rbfrag.question.question import OF_SHAKING
 from rbfrag.question.words import number_in_words
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kinds import KindFacts, facts_of
+from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 
@@ -45,14 +58,17 @@ class RateQuestion:
     """How often a year a block is asked to fail.
 
     Args:
-        curve: the hazard curve or its file; None where the question is of one shaking alone.
+        curve: the hazard curve or its file, or several of one logic tree; None where the question
+            is of one shaking alone.
         years: period of the probability [a].
         meaning: keywords that say which curve is meant and what its levels mean.
+        weights: weights of several curves as branches.
     """
 
-    curve: CurveLike | None = None
+    curve: CurveLike | Sequence[CurveLike] | None = None
     years: float = 50.0
     meaning: Mapping[str, Any] = field(default_factory=dict)
+    weights: Weights | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,16 +115,25 @@ class Contents:
     document: dict[str, Any]
     rate: Rate | None
 
+    @property
+    def is_unstable(self) -> bool:
+        """Whether the block fails without an earthquake."""
+        return bool(self.document["probability"] == 1.0 and self.document["how"] == BY_MECHANICS)
+
     def notes(self) -> tuple[str, ...]:
         """Return the warnings as sentences."""
-        return tuple(
-            f"Note: {text[:1].upper()}{text[1:]}{'' if text.endswith('?') else '.'}"
-            for text in self.remarks
-        )
+        return sentences_of(self.remarks)
 
     def columns(self) -> tuple[tuple[Table, ...], tuple[Table, ...]]:
         """Return the tables in two columns: the question, and the answer."""
         return self.tables[:2], self.tables[2:]
+
+
+def sentences_of(warnings: Sequence[str]) -> tuple[str, ...]:
+    """Return warnings as sentences."""
+    return tuple(
+        f"{text[:1].upper()}{text[1:]}{'' if text[-1:] in '?)' else '.'}" for text in warnings
+    )
 
 
 def contents_of(
@@ -119,36 +144,33 @@ def contents_of(
     Raises:
         InputError: a question that cannot be answered.
     """
-    stated = {name: value for name, value in given.items() if name not in (*STATED, "kind")}
-    measures = {name: given[name] for name in STATED if name in given}
-    shape, blocks = shape_of(stated), described(stated, given.get("kind"))
-    (group,) = blocks.groups
-    known = {**group.numbers, **measures}
-    how: dict[str, Any] = {**answering}
-    document = prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how)
+    options = {name: given[name] for name in ("kind", *names_of(RequestFields)) if name in given}
+    inputs = {name: value for name, value in given.items() if name not in options}
+    how: dict[str, Any] = {**options, **answering}
+    document, read = answer_block(inputs, **how)
     facts = facts_of(document["kind"])
-    numbers = dict(group.numbers)
-    of_model: AnsweringFields = {"model": document["model"]}
-    if "db" in answering:
-        of_model["db"] = answering["db"]
-    model = model_for(of_model, [*known], facts.kind)
-    answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), answering)
+    shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in BLOCK})
+    numbers = {name: value for name, value in read.items() if name not in OF_SHAKING}
+    medians = {n: about["median"] for n, about in (document["shaking"] or {}).items()}
+    measures = {name: value for name, value in read.items() if name in STATED} | medians
+    model = find_model(document["model"], TERMS[document["term"]].inputs, how.get("db"))
+    answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), how)
     about_rate: tuple[str, ...] = ()
     if answered is not None:
         about_rate = (rate_in_words(answered.document), *beyond_in_words(answered.answer))
-    warnings = [*document["warnings"], *(answered.document["warnings"] if answered else ())]
+    warnings = diagnostics(document["warnings"], answered.document["warnings"] if answered else ())
     return Contents(
         sentences=(
             *words.prediction_in_words(document),
             *about_rate,
-            *words.block_in_words(document["method"], known),
+            *words.block_in_words(document["method"], read),
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
-            ("Shaking", tuple(number_in_words(n, v, 6) for n, v in measures.items())),
+            ("Shaking", shaking_rows({n: v for n, v in given.items() if n in OF_REQUEST})),
             *_answer_tables(document, answered),
         ),
-        remarks=tuple(dict.fromkeys(warnings)),
+        remarks=warnings,
         versions=tuple(_versions(model, answered, document["data"])),
         drawing=_drawing(shape, numbers, free=facts.free_standing),
         numbers=numbers,
@@ -160,59 +182,192 @@ def contents_of(
     )
 
 
-class ReportedBlock(NamedTuple):
-    """One block of a report: what is said of it, or why nothing is."""
+BLOCK = frozenset(names_of(BlockFields, WholeFields))
+OF_REQUEST = (*names_of(ShakingFields), "component", "mechanism", "gmm")
+"""Fields of the shaking that a report prints as they were given."""
+
+
+def shaking_rows(given: Mapping[str, Any]) -> Rows:
+    """Return the shaking that was asked about, as names and values."""
+    return tuple(
+        number_in_words(name, value, 6) if isinstance(value, int | float)
+        else (word_of(name).replace("_", " "), str(value))
+        for name, value in given.items()
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ReportedBlock:
+    """One block of a report, or several identical ones: its answer, or why there is none."""
 
     name: str
     contents: Contents | None
     reason: str = ""
+    count: int = 1
 
     @property
     def cells(self) -> tuple[str, ...]:
         """Its row of the summary; of one that is not answered its name."""
+        name = self.name if self.count == 1 else f"{self.name} ({self.count} blocks)"
         if self.contents is None:
-            return (self.name,)
-        block, _, answer, *hazard = (rows for _, rows in self.contents.tables)
-        read = block[0], *answer[:2], *(rows[1] for rows in hazard)
-        return (self.name, *(value for _, value in read))
+            return (name,)
+        contents, document = self.contents, self.contents.document
+        answer = [value for _, value in contents.tables[2][1][:2]]
+        if contents.is_unstable:
+            answer = ["1   unstable without shaking", ""]
+        rate = document["hazard"]
+        period = "" if rate is None else return_period(rate["annual_rate"])
+        return (name, contents.tables[0][1][0][1], *answer, period)
 
 
-COLUMNS = ("block", "fails by", "P", "interval", "annual rate")
+COLUMNS = ("block", "failure mode", "P", "interval", "return period")
 
 
-def entries_of(
-    rows: Sequence[Mapping[str, Any]], rate: RateQuestion | None, **answering: Unpack[RangeFields]
-) -> list[ReportedBlock]:
+class Report(NamedTuple):
+    """What a report is of.
+
+    Args:
+        entries: the blocks, those that are unstable without shaking first.
+        summary: names and values of what holds for all of them.
+        warnings: what to know about the table and the sums.
+        totals: the sums under the keys of the JSON contract.
+    """
+
+    entries: list[ReportedBlock]
+    summary: Rows = ()
+    warnings: tuple[str, ...] = ()
+    totals: Mapping[str, Any] = {}
+
+
+def report_of(
+    rows: Sequence[Mapping[str, Any]],
+    rate: RateQuestion | None,
+    warnings: Sequence[str] = (),
+    **answering: Unpack[RangeFields],
+) -> Report:
     """Answer a question about each of several blocks; one alone must be answered.
 
     Args:
-        rows: fields of block and shaking, with ``block_id``, and ``reason`` of what is wrong.
+        rows: fields of block and shaking, with ``block_id``, ``count``, and ``reason`` of what is
+            wrong.
+        rate: how often a year they are asked to fail.
+        warnings: what to know about the table of the blocks.
+        answering: which model answers.
     """
     if not 0 < len(rows) <= 200:
         raise InputError(f"a report is of 1 to 200 blocks, and these are {len(rows):,}")
     entries, errors = [], []
     for i, row in enumerate(rows, start=1):
-        given = {name: row[name] for name in row if name not in ("block_id", "reason")}
+        count = row.get("count", 1.0)
+        given = {n: v for n, v in row.items() if n not in ("block_id", "site_id", "mode", "crs",
+                                                           "count", "reason")}  # fmt: skip
         name = str(row.get("block_id", i))
         try:
             if "reason" in row:
                 raise InputError(row["reason"])
-            entries.append(ReportedBlock(name, contents_of(given, rate, **answering)))
+            if count != int(count) or count < 1:
+                raise InputError(f"count = {count:g}: enter a whole number of blocks from 1 on")
+            contents = contents_of(given, rate, **answering)
+            entries.append(ReportedBlock(name, contents, count=int(count)))
         except InputError as error:
             errors.append(error)
             entries.append(ReportedBlock(name, None, str(error)))
     if len(errors) == len(rows):
         raise errors[0]
-    return entries
+    if len(entries) == 1 and entries[0].count == 1:
+        return Report(entries, (), tuple(warnings))
+    entries.sort(key=lambda entry: entry.contents is None or not entry.contents.is_unstable)
+    summary, totals, notes = _totals(entries, rows, rate or RateQuestion(), answering)
+    return Report(entries, summary, diagnostics(warnings, notes), totals)
 
 
-def _rate(block: Mapping[str, Any], question: RateQuestion, answering: RangeFields) -> Rate | None:
-    if question.curve is None:
+def _totals(
+    entries: Sequence[ReportedBlock],
+    rows: Sequence[Mapping[str, Any]],
+    rate: RateQuestion,
+    answering: RangeFields,
+) -> tuple[Rows, dict[str, Any], tuple[str, ...]]:
+    """Return what holds for all blocks of a report, its numbers, and what to know about them."""
+    answered = [(e.contents, e.count) for e in entries if e.contents is not None]
+    unstable = sum(count for contents, count in answered if contents.is_unstable)
+    standing = [pair for pair in answered if not pair[0].is_unstable]
+    expected = sum(count * contents.document["probability"] for contents, count in answered)
+    totals: dict[str, Any] = {
+        "rows": len(entries), "blocks_answered": sum(count for _, count in answered),
+        "blocks_unstable": unstable, "rows_rejected": len(entries) - len(answered),
+        "expected_failures": expected,
+    }  # fmt: skip
+    parts = [f"{totals['blocks_answered']:,} answered"]
+    parts += [f"{unstable:,} unstable without shaking (P = 1)"] if unstable else []
+    rejected = totals["rows_rejected"]
+    parts += [f"{rejected:,} rows rejected"] if rejected else []
+    asked = [{n: v for n, v in row.items() if n in OF_REQUEST} for row in rows]
+    same = all(shaking == asked[0] for shaking in asked)
+    shaking = ", ".join(f"{name} {value}" for name, value in shaking_rows(asked[0]))
+    summary = [
+        ("Blocks", "; ".join(parts)),
+        ("Shaking", shaking if same else "given row by row"),
+        ("Expected failures in this shaking", f"{expected:.2g}"),
+    ]
+    if rate.curve is None or not standing:
+        return tuple(summary), totals, ()
+    names = dict.fromkeys(name for contents, _ in standing for name in contents.numbers)
+    columns = {
+        name: np.array([contents.numbers.get(name, np.nan) for contents, _ in standing])
+        for name in names
+    }
+    kinds = [contents.document["kind"] for contents, _ in standing]
+    count = np.array([number for _, number in standing], dtype=np.float64)
+    how: dict[str, Any] = {n: v for n, v in answering.items() if n in ("level", "db")}
+    how |= {**columns, **rate.meaning, "kind": kinds}
+    answer = hazard(
+        as_curves(rate.curve, **rate.meaning), weights=rate.weights, joint=True, years=rate.years,
+        count=count, **how,
+    )  # fmt: skip
+    curve, expected_rate = answer.curves[0], answer.expected_failures_per_year
+    low, high = answer.total_low, answer.total_high
+    place = f", {curve.place}" if curve.place else ""
+    period = f"{rate.years:g} years"
+    not_in = f" (without the {unstable:,} unstable)" if unstable else ""
+    summary += [
+        ("Hazard curve", f"{curve.imt}{place}; {Path(curve.source).name}"),
+        (f"Expected failures per year{not_in}",
+         f"{expected_rate:.2g} ({low:.2g}–{high:.2g}, {100 * answer.level:g} % confidence)"),
+    ]  # fmt: skip
+    totals |= {"years": rate.years, "expected_failures_per_year": expected_rate}
+    joint = answer.joint
+    any_rate = answer.annual_rate_any
+    if any_rate is not None:
+        chance = float(probability_in(rate.years, np.asarray(any_rate)))
+        law = "one block" if joint is None else joint.joint_law
+        summary += [
+            ("At least one failure", f"return period {return_period(any_rate)}"),
+            (f"P(at least one failure in {period})", f"{words.percent(chance)} ({law})"),
+        ]
+        totals |= {"annual_rate_any": any_rate, "probability_any": chance, "joint_law": law}
+    elif joint is not None:
+        ends = [
+            joint.bounds[name]["probability_any"] for name in ("fully_dependent", "independent")
+        ]
+        summary.append(
+            (f"P(at least one failure in {period})",
+             f"{words.interval(*ends)} (full dependence to independence)")
+        )  # fmt: skip
+        totals |= {"bounds": joint.bounds}
+    return tuple(summary), totals, answer.warnings
+
+
+def _rate(
+    block: Mapping[str, Any], question: RateQuestion, answering: Mapping[str, Any]
+) -> Rate | None:
+    if question.curve is None or block.keys() <= {"kind"}:  # unstable without shaking
         return None
     curves = as_curves(question.curve, **question.meaning)
     # another model reads the curve's measure alone
     how: dict[str, Any] = {name: v for name, v in answering.items() if name in ("level", "db")}
-    answer = hazard(curves, years=question.years, **block, **question.meaning, **how)
+    answer = hazard(
+        curves, weights=question.weights, years=question.years, **block, **question.meaning, **how
+    )
     return Rate(curves[0], answer, as_dict(answer, [None]))
 
 
@@ -220,7 +375,7 @@ def _held(
     model: FragilityModel, numbers: Mapping[str, float], measures: Mapping[str, float]
 ) -> HeldMeasures | None:
     """Return what the design chart holds; None for a model that has none."""
-    others = dict(numbers)
+    others = {name: v for name, v in numbers.items() if not name.endswith("_sigma")}
     if model.term.name not in (*ONE_NUMBER_TERMS, *MORE_TERMS) or not all(
         others.pop(name, 0.0) for name in TOPPLING_BLOCK.names
     ):
@@ -256,14 +411,14 @@ def _block_rows(
     model: FragilityModel,
     y_m_s: float | None,
 ) -> Rows:
-    stands = " (stands free)" if facts.free_standing else " (backed by a slope)"
-    rows = [("fails by", mode_title(facts.kind) + (stands if facts.mode == "topple" else ""))]
+    stands = " (free-standing)" if facts.free_standing else " (rock face behind)"
+    rows = [("failure mode", mode_title(facts.kind) + (stands if facts.mode == "topple" else ""))]
     planes: Mapping[str, Any] = {}
     if shape is not None:
         block, planes = shape.block, shape.planes
         rows += [
-            ("height across the base", f"{block.s1_m:.4g} m"),
-            ("length of the base", f"{block.base_m:.4g} m"),
+            ("height", f"{block.s1_m:.4g} m"),
+            ("width of the base", f"{block.base_m:.4g} m"),
             ("angles of heel and toe", f"{block.alpha1_deg:.4g}°, {block.alpha3_deg:.4g}°"),
             ("dip of the base", f"{planes['beta_deg']:g}°"),
             ("friction angle", f"{planes['phi_deg']:g}°" if "phi_deg" in planes else "not given"),
@@ -278,6 +433,13 @@ def _block_rows(
         )
         rows.append((f"{first}, y = {k} g/{p}", f"{y_m_s:.3g} m/s"))
     return tuple(rows)
+
+
+def return_period(annual_rate: float) -> str:
+    """Return a return period in years, with three digits."""
+    if not annual_rate > 1e-8:
+        return "above 100 million years"
+    return f"{float(f'{1.0 / annual_rate:.3g}'):,.15g} years"
 
 
 def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
@@ -304,7 +466,7 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
         ("hazard curve", f"{curve.imt}{place}"),
         ("annual rate of failure", f"{document['annual_rate']:.3g} 1/a"),
         (f"interval ({level})", f"{document['ci_low']:.2g} to {document['ci_high']:.2g} 1/a"),
-        ("on average", once_in(document["annual_rate"])),
+        ("return period", return_period(document["annual_rate"])),
         (f"probability in {document['years']:g} years", words.percent(document["probability"])),
     )
 

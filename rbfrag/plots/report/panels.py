@@ -30,6 +30,8 @@ def panels_of(contents: Contents) -> list[Panel]:
     panels = []
     if (drawing := contents.drawing) is not None:
         panels.append(Panel("block", drawing.title, lambda part: _block(part, drawing)))
+    if contents.is_unstable:
+        return panels
     if contents.model.term.inputs[0] in AXIS:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))

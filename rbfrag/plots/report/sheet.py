@@ -12,7 +12,14 @@ from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.plots.canvas import BLUE, freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, ReportedBlock, Table
+from rbfrag.plots.report.contents import (
+    COLUMNS,
+    SYMBOL,
+    Contents,
+    Report,
+    Table,
+    sentences_of,
+)
 from rbfrag.plots.report.panels import panels_of
 from rbfrag.version import __version__
 
@@ -32,14 +39,17 @@ _STEP_IN = 0.158
 _TALLEST_ROW_IN = 3.7
 """Of pictures: two rows of them are spread over the page, one is not."""
 
-_TITLE, _WIDE, _NARROW, _FINE, _CELL = 48, 104, 80, 136, 30
-"""Letters that a line holds of the title, of small text, of the first sentence, of the notes, and
-that a cell does."""
+_TITLE, _WIDE, _NARROW, _FINE, _NOTE, _CELL = 48, 104, 80, 136, 112, 30
+"""Letters that a line holds of the title, of small text, of the first sentence, of the versions, of
+the notes, and that a cell does."""
+
+_NOTE_SIZE, _NOTE_STEP_IN = 8.0, 0.15
+"""Size of the letters of notes, and from one line to the next."""
 
 _TITLE_STEP_IN = 0.27
 
-_ROWS, _SUMMARY = 60, (_LEFT, 0.31, 0.54, 0.66, 0.82)
-"""Blocks of a page of the summary, and where its columns begin."""
+_LINES, _SUMMARY, _VALUE = 66, (_LEFT, 0.31, 0.54, 0.67, 0.82), 0.46
+"""Lines of a page of the summary, where the columns of its table begin, and values of its head."""
 
 _BELOW = {"r": "\N{LATIN SUBSCRIPT SMALL LETTER R}", "s": "\N{LATIN SUBSCRIPT SMALL LETTER S}"}
 
@@ -48,17 +58,17 @@ _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 
 
 @in_own_style
-def write_sheet(entries: Sequence[ReportedBlock], title: str, date: str, target: Path) -> None:
+def write_sheet(report: Report, title: str, date: str, target: Path) -> None:
     """Write a report as pages of A4, PDF, or of one block PNG, by the suffix of the file."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 
     about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
     is_png = target.suffix.lower() == ".png"
-    if len(entries) > 1 and is_png:
+    if len(report.entries) > 1 and is_png:
         raise InputError(f"{target}: several blocks need several pages: write .pdf or .html")
     with rc_context(_RC), written_whole(target, "report") as path, path.open("wb") as stream:
-        pages = _pages(entries, title, date)
+        pages = _pages(report, title, date)
         if is_png:
             next(pages).savefig(stream, format="png", metadata=about, dpi=130)
         else:
@@ -67,15 +77,16 @@ def write_sheet(entries: Sequence[ReportedBlock], title: str, date: str, target:
                     page.savefig(book, format="pdf")
 
 
-def _pages(entries: Sequence[ReportedBlock], title: str, date: str) -> Iterator[Figure]:
+def _pages(report: Report, title: str, date: str) -> Iterator[Figure]:
     """Yield the pages: one of a single block; or the summary, and half a page for each block."""
-    answered = [(e.name, e.contents) for e in entries if e.contents is not None]
+    answered = [(e.name, e.contents) for e in report.entries if e.contents is not None]
+    lines = _summary_lines(report)
     draws: list[Callable[[Figure], None]] = [
-        *(partial(_list, entries=entries, first=i, title=title, date=date)
-          for i in range(0, len(entries), _ROWS)),
+        *(partial(_list, lines=lines[i : i + _LINES], title=title, date=date)
+          for i in range(0, len(lines), _LINES)),
         *(partial(_draw_halves, entries=answered[i : i + 2]) for i in range(0, len(answered), 2)),
     ]  # fmt: skip
-    if len(entries) == 1:
+    if len(report.entries) == 1:
         draws = [partial(_draw, contents=answered[0][1], title=title, date=date)]
     for draw in draws:
         figure = new_figure(_WIDTH_IN, _HEIGHT_IN)
@@ -85,28 +96,50 @@ def _pages(entries: Sequence[ReportedBlock], title: str, date: str) -> Iterator[
         yield figure
 
 
+Line = tuple[tuple[float, str], ...]
+"""Texts of a line and where each begins; a heading stands alone, at the left edge."""
+
+
+def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
+    """Return the lines of the summary with their style: head, table of blocks, notes, versions."""
+    heading: dict[str, Any] = {"fontsize": 8.2, "fontweight": "bold", "color": BLUE}
+    plain: dict[str, Any] = {"fontsize": 8.2}
+    lines: list[tuple[Line, dict[str, Any]]] = [
+        (((_LEFT, name), (_VALUE, _cut(value, _NARROW))), plain) for name, value in report.summary
+    ]
+    lines += [((), plain), (tuple(zip(_SUMMARY, COLUMNS, strict=True)), heading)]
+    for entry in report.entries:
+        cells = [*zip(_SUMMARY, (_cut(cell, _CELL) for cell in entry.cells), strict=False)]
+        reasons = _wrapped(entry.reason, 84) if entry.reason else []
+        cells += [(_SUMMARY[1], text) for text in reasons[:1]]
+        lines.append((tuple(cells), plain))
+        lines += [(((_SUMMARY[1], text),), plain) for text in reasons[1:]]
+    notes = sentences_of(report.warnings)
+    if notes:
+        lines += [((), plain), (((_LEFT, "Notes"),), heading)]
+        lines += [(((_LEFT, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
+    versions = dict.fromkeys(v for e in report.entries if e.contents for v in e.contents.versions)
+    lines += [((), plain)]
+    lines += [(((_LEFT, text),), {"fontsize": 6.8}) for text in _wrapped_all(versions)]
+    return lines
+
+
 def _list(
-    figure: Figure, entries: Sequence[ReportedBlock], first: int, title: str, date: str
+    figure: Figure, lines: Sequence[tuple[Line, dict[str, Any]]], title: str, date: str
 ) -> None:
     (part,) = figure.subfigures(1, 1, squeeze=False)[0]
     _write(part, _LEFT, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
     _write(part, _RIGHT, 0.964, date, fontsize=9, ha="right")
-    of_page = entries[first : first + _ROWS]
-    for i, cells in enumerate([COLUMNS, *(entry.cells for entry in of_page)]):
-        style = {} if i else {"fontweight": "bold", "color": BLUE}
-        y, reason = 0.93 - i * _STEP_IN / _HEIGHT_IN, of_page[i - 1].reason if i else ""
-        for x, cell in zip(_SUMMARY, cells, strict=False):
-            _write(part, x, y, _cut(cell, _CELL), fontsize=8.2, **style)
-        _write(part, _SUMMARY[1], y, _cut(reason, _NARROW), fontsize=8.2)
-    versions = dict.fromkeys(v for e in entries if e.contents for v in e.contents.versions)
-    _write_lines(part, _wrapped_all(versions), _HEIGHT_IN)
+    for i, (texts, style) in enumerate(lines):
+        for x, text in texts:
+            _write(part, x, 0.93 - i * _STEP_IN / _HEIGHT_IN, text, **style)
 
 
 def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> None:
     halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
     for half, (name, contents) in zip(halves, entries, strict=False):
-        notes, head_in = _wrapped_all(contents.notes()), 0.85 + 0.17 * len(_head_lines(contents))
-        foot_in = 0.35 + 0.13 * len(notes)
+        notes, head_in = _note_lines(contents.notes()), 0.85 + 0.17 * len(_head_lines(contents))
+        foot_in = 0.35 + _NOTE_STEP_IN * (len(notes) + 1)
         heights = [head_in, 0.5 * _HEIGHT_IN - head_in - foot_in, foot_in]
         head, body, foot = half.subfigures(3, 1, height_ratios=heights)
         _write_head(head, contents, [_cut(name, _TITLE)], "", head_in)
@@ -118,7 +151,7 @@ def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> Non
                 axes.set_xlabel(fill(axes.get_xlabel(), 24))
             for legend in cell.legends:
                 legend.remove()
-        _write_lines(foot, notes, foot_in)
+        _write_notes(foot, notes, foot_in)
 
 
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
@@ -126,11 +159,13 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
     lines = (sum(1.5 + len(rows) for _, rows in tables) for tables in contents.columns())
     tables_in = 0.1 + _STEP_IN * max(lines)
-    notes = _wrapped_all((*contents.notes(), *contents.versions))
-    foot_in = 0.35 + 0.13 * len(notes)
+    notes, versions = _note_lines(contents.notes()), _wrapped_all(contents.versions)
+    versions_in = 0.35 + 0.13 * len(versions)
+    foot_in = versions_in + _NOTE_STEP_IN * (len(notes) + 1)
     panels = panels_of(contents)
     rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
-    row_in = min((_HEIGHT_IN - head_in - tables_in - foot_in) / len(rows), _TALLEST_ROW_IN)
+    room_in = (_HEIGHT_IN - head_in - tables_in - foot_in) / max(len(rows), 1)
+    row_in = min(room_in, _TALLEST_ROW_IN)
     heights = [head_in, tables_in, *[row_in] * len(rows)]
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
@@ -145,7 +180,8 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
         for cell, panel in zip(cells, row, strict=True):
             panel.draw(cell)
             cell.suptitle(_shown(panel.title), fontsize=9, parse_math=False)
-    _write_lines(parts[-1], notes, heights[-1])
+    _write_lines(parts[-1], versions, heights[-1])
+    _write_notes(parts[-1], notes, heights[-1], versions_in)
 
 
 def _head_lines(contents: Contents) -> list[tuple[str, bool]]:
@@ -207,6 +243,23 @@ def _write_table(
             _write(part, x, y, name, fontsize=8.2)
             _write(part, x + wide, y, _cut(value, _CELL), fontsize=8.2)
         y -= 1.5 * step
+
+
+def _note_lines(sentences: Iterable[str]) -> list[str]:
+    return [line for text in sentences for line in _wrapped(text, _NOTE)]
+
+
+def _write_notes(
+    part: SubFigure, lines: Sequence[str], tall_in: float, above_in: float = 0.2
+) -> None:
+    """Write the notes under their heading, the last so far above the foot of a part."""
+    if not lines:
+        return
+    y = (above_in + _NOTE_STEP_IN * len(lines)) / tall_in
+    _write(part, _LEFT, y, "Notes", fontsize=9, fontweight="bold", color=BLUE)
+    for line in lines:
+        y -= _NOTE_STEP_IN / tall_in
+        _write(part, _LEFT, y, line, fontsize=_NOTE_SIZE)
 
 
 def _write_lines(part: SubFigure, lines: Sequence[str], tall_in: float) -> None:

@@ -12,7 +12,16 @@ from pathlib import Path
 from rbfrag.files import write_text
 from rbfrag.plots.canvas import freeze_layout, in_own_style, new_figure
 from rbfrag.plots.labels import settle_labels
-from rbfrag.plots.report.contents import COLUMNS, SYMBOL, Contents, ReportedBlock, Table
+from rbfrag.plots.report.contents import (
+    COLUMNS,
+    SYMBOL,
+    Contents,
+    Report,
+    ReportedBlock,
+    Rows,
+    Table,
+    sentences_of,
+)
 from rbfrag.plots.report.panels import Panel, panels_of
 
 _SIZE_IN = (5.4, 4.6)
@@ -34,8 +43,11 @@ figcaption { font-size: .9rem; }
 svg { width: 100%; height: auto; }
 table.all th { width: auto; }
 section { break-inside: avoid; margin-top: 2rem; }
-.note, footer { font-size: .85rem; color: #333; margin-top: 1rem; }
-.note, footer p { margin: .2rem 0; }
+.notes { border: 1px solid #bbb; border-radius: 4px; padding: 0 1rem; margin: 1rem 0; }
+.notes h2 { margin-top: .5rem; }
+.notes ul { padding-left: 1.2rem; margin: .3rem 0 .6rem; }
+footer { font-size: .85rem; color: #333; margin-top: 1rem; }
+footer p { margin: .2rem 0; }
 sub { font-size: 75%; line-height: 0; }
 @page { size: A4; margin: 12mm; }
 @media print { body { font-size: 10px; margin: 0; max-width: none; }
@@ -44,8 +56,9 @@ sub { font-size: 75%; line-height: 0; }
 
 
 @in_own_style
-def write_html(entries: Sequence[ReportedBlock], title: str, date: str, target: Path) -> None:
+def write_html(report: Report, title: str, date: str, target: Path) -> None:
     """Write a report as a page that needs nothing but itself: the summary, and each block."""
+    entries = report.entries
     several = len(entries) > 1
     answered = [(e.name, e.contents) for e in entries if e.contents is not None]
     versions = dict.fromkeys(text for _, contents in answered for text in contents.versions)
@@ -54,7 +67,9 @@ def write_html(entries: Sequence[ReportedBlock], title: str, date: str, target: 
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{escape(title)}</title>", f"<style>{_STYLE}</style></head>", "<body>",
         f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
+        _rows(report.summary) if report.summary else "",
         _summary(entries) if several else "",
+        _notes(sentences_of(report.warnings)),
         *(_block(contents, name, f"b{i}-" if several else "")
           for i, (name, contents) in enumerate(answered)),
         "<footer>", *(f"<p>{escape(text)}</p>" for text in versions), "</footer>",
@@ -83,8 +98,14 @@ def _block(contents: Contents, name: str, prefix: str) -> str:
         f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
         '<div class="parts">', *map(_column, contents.columns()), "</div>",
         '<div class="parts">', *islice(figures, 2 if prefix else None), "</div>",
-        *(f'<p class="note">{_written(text)}</p>' for text in contents.notes()), "</section>",
+        _notes(contents.notes()), "</section>",
     ])  # fmt: skip
+
+
+def _notes(sentences: Sequence[str]) -> str:
+    """Return the warnings in a box; nothing where there are none."""
+    items = "".join(f"<li>{_written(text)}</li>" for text in sentences)
+    return f'<div class="notes"><h2>Notes</h2><ul>{items}</ul></div>' if items else ""
 
 
 def _written(text: str) -> str:
@@ -98,11 +119,15 @@ def _column(tables: Sequence[Table]) -> str:
 
 def _table(table: Table) -> str:
     heading, rows = table
+    return f"<h2>{escape(heading)}</h2>{_rows(rows)}"
+
+
+def _rows(rows: Rows) -> str:
     cells = "".join(
         f'<tr><th scope="row">{_written(name)}</th><td>{_written(value)}</td></tr>'
         for name, value in rows
     )
-    return f"<h2>{escape(heading)}</h2><table>{cells}</table>"
+    return f"<table>{cells}</table>"
 
 
 def _figure(panel: Panel) -> str:

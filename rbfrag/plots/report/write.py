@@ -9,13 +9,14 @@ from typing import Any, TypedDict, Unpack
 
 from rbfrag.files import output_path
 from rbfrag.fragility.measures import spectral
+from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve import CurveKeywords
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.plots.canvas import new_figure
-from rbfrag.plots.report.contents import RateQuestion, ReportedBlock, entries_of
+from rbfrag.plots.report.contents import RateQuestion, Report, report_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import MeasureFields, RangeFields
+from rbfrag.question.fields import RangeFields, RequestFields, ShakingFields
 from rbfrag.question.keywords import BlockKeywords, parts_of
 
 SUFFIXES = (".pdf", ".png", ".html")
@@ -30,21 +31,19 @@ class _Spectrum(TypedDict, total=False):
     sa_g: Mapping[float, float] | None
 
 
-class ReportKeywords(
-    BlockKeywords[float | None],
-    MeasureFields[float | None],
-    _Spectrum,
-    CurveKeywords,
-    RangeFields,
-    total=False,
-):
+class _Scenario(ShakingFields[float | None], RequestFields, total=False):
+    """The shaking, or the scenario that it follows from, and which model answers."""
+
+
+class ReportKeywords(BlockKeywords[float | None], _Scenario, _Spectrum, CurveKeywords, total=False):
     """What a report is of: a block, its shaking, the curve of a rate, and which model answers."""
 
 
 def report(
     out: str | PathLike[str],
     *,
-    curve: CurveLike | None = None,
+    curve: CurveLike | Sequence[CurveLike] | None = None,
+    weights: Weights | None = None,
     years: float = 50.0,
     title: str = TITLE,
     date: str = "",
@@ -57,12 +56,13 @@ def report(
 
     Args:
         out: file to write: .pdf or .png (a page of A4), or .html (one file that needs no other).
-        curve: hazard curve, or its file, for the annual rate.
+        curve: hazard curve, or its file, for the annual rate; or several of a logic tree.
+        weights: weights of several curves, as in :func:`rbfrag.hazard`.
         years: period of the probability [a].
         title: title of the page.
         date: date that is printed on it; nothing is, if empty.
-        question: fields of block and shaking, ``sa_g`` and ``kind``, ``model`` (a name), ``level``,
-            ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``,
+        question: fields of block and shaking or scenario, ``sa_g`` and ``kind``, ``model`` (a
+            name), ``level``, ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``,
             ``component``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard`
             has them.
 
@@ -73,12 +73,12 @@ def report(
         InputError: a question that cannot be answered, or a path that cannot be written.
         UnknownFieldError: a keyword that is none.
     """
-    block, shaking, spectrum, meaning, answering = parts_of(
-        (), question, BlockKeywords, MeasureFields, _Spectrum, CurveKeywords, RangeFields
+    block, shaking, spectrum, meaning = parts_of(
+        (), question, BlockKeywords, _Scenario, _Spectrum, CurveKeywords
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
-    rate = RateQuestion(curve, years, meaning)
-    write_report(out, [given], rate, title=title, date=date, **answering)
+    rate = RateQuestion(curve, years, meaning, weights)
+    write_report(out, [given], rate, title=title, date=date)
     return Path(out)
 
 
@@ -89,16 +89,17 @@ def write_report(
     *,
     title: str = TITLE,
     date: str = "",
+    warnings: Sequence[str] = (),
     **answering: Unpack[RangeFields],
-) -> list[ReportedBlock]:
-    """Write the report of blocks, each a row of its fields.
+) -> Report:
+    """Write the report of blocks, each a row of its fields, and return what it is of.
 
-    Returns:
-        What the report says of each.
+    Args:
+        warnings: what to know about the table of the blocks.
     """
     target = output_path(out, SUFFIXES, "report")
     new_figure()  # says which extra is missing, before long work
-    entries = entries_of(rows, rate, **answering)
+    contents = report_of(rows, rate, warnings, **answering)
     write = write_html if target.suffix.lower() == ".html" else write_sheet
-    write(entries, title, date, target)
-    return entries
+    write(contents, title, date, target)
+    return contents

@@ -9,7 +9,8 @@ from playwright.sync_api import expect
 import rbfrag
 from rbfrag.db.location import REFERENCE
 
-ROWS = "name\theight_m\tWidth (m)\nslab\t2\t0,4\n=post\t3\t0.3\nnone\t\t0.3\n"
+# a decimal comma, two languages, and a column that nothing depends on
+ROWS = "name\tHöhe [cm]\tWidth (m)\tDip of base (°)\tColour\nslab\t200\t0,4\t5°\tgrey\n=post\t300\t0.3\t0\t\nnone\t\t0.3\t0\t\n"
 
 DROP = """(text) => {
   const data = new DataTransfer();
@@ -23,7 +24,8 @@ def downloaded(page):
     with page.expect_download() as waited:
         page.click("#table-file")
     text = waited.value.path().read_text(encoding="utf-8-sig")
-    return list(csv.DictReader(io.StringIO(text)))
+    table, _, notes = text.partition("# note,")
+    return list(csv.DictReader(io.StringIO(table.strip("\n,")))), notes
 
 
 @pytest.mark.parametrize("dropped", [False, True])
@@ -35,23 +37,29 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
         page.fill("#table-text", ROWS)
         page.click("#table-ask")
     expect(page.locator("#table-said")).to_have_text("2 of 3 blocks are answered.")
-    slab, post, none = downloaded(page)
-    for row, height, width in ((slab, 2.0, 0.4), (post, 3.0, 0.3)):
-        known = rbfrag.predict(height_m=height, width_m=width, pgv_m_s=0.8, db=REFERENCE)
+    (slab, post, none), notes = downloaded(page)
+    for row, height, width, dip in ((slab, 2.0, 0.4, 5.0), (post, 3.0, 0.3, 0.0)):
+        known = rbfrag.predict(
+            height_m=height, width_m=width, beta_deg=dip, pgv_m_s=0.8, db=REFERENCE
+        )
         assert float(row["probability"]) == pytest.approx(known.probability, rel=1e-9)
         assert float(row["ci_low"]) == pytest.approx(known.ci_low, rel=1e-9)
     assert post["name"] == "'=post"
     assert none["probability"] == ""
     assert none["reason"]
+    for text in ("column Höhe [cm]: converted from cm to m", "column ignored: Colour"):
+        assert text in notes
+        expect(page.locator("#table-notes")).to_contain_text(text)
     expect(page.locator("#record-part")).to_be_hidden()
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "Paste names of columns"),
-        ("height,width\n2,wide\n", "Row 2: width is no number: wide"),
-        ("a,b\n1,2\n", "No column names a block"),
+        ("", "the body is empty"),
+        ("height,width\n2,wide\n", "'wide' is not a number"),
+        ("a,b\n1,2\n", "there is no column"),
+        ("height,width,dip quality\n2,1,5\n", "'dip quality' is not understood"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_refused(open_page, text, said):

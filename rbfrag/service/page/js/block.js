@@ -24,6 +24,7 @@ function inWords(block) {
   const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
   if (block.state === "locked")
     return `Locked: no horizontal acceleration moves it; else it ${does}.`;
+  if (block.state === "unstable") return `Unstable: it ${does} without an earthquake.`;
   const from = quantity(block.yield_acceleration, "g");
   return `It ${does}, from a horizontal acceleration of ${from}.`;
 }
