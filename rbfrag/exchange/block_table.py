@@ -191,7 +191,8 @@ def stated_rows(
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return what each row of a table states, beside ``given``, and the remarks of the table."""
     read = names_of(BlockFields, MeasureFields)
-    with opened_table(source, read, sheet=sheet) as table:
+    texts = (*TEXTS, "component")
+    with opened_table(source, read, texts, sheet=sheet) as table:
         table.check(given, given.get("kind"))
         columns, faults, _ = table.whole()
     rows = []
@@ -200,4 +201,4 @@ def stated_rows(
         if kinds_by_numbers(row):  # which go before a shape
             row = {name: row[name] for name in row if name not in OF_A_SHAPE}
         rows.append({**given, **row, **({"reason": faults[i]} if i in faults else {})})
-    return rows, table.remarks((*read, *TEXTS))
+    return rows, table.remarks((*read, *texts))

@@ -25,6 +25,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
+from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.question.fields import BlockFields, ScatterFields, ShakingFields, column_of, names_of
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import ask
@@ -72,7 +73,8 @@ def predict_table(
         kind: how the blocks fail; None for what they are given by.
         sheet: of a workbook, the name of the sheet; None for the first.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
-        question: ``rotation_deg``, ``model``, ``level`` and ``db`` of :func:`rbfrag.predict`.
+        question: ``rotation_deg``, ``component``, ``model``, ``level`` and ``db`` of
+            :func:`rbfrag.predict`.
 
     Returns:
         Counts: rows, answered, without an answer, in_domain; expected_failures and, if one
@@ -101,7 +103,8 @@ def predict_table(
     empty: set[str] = set()
     chosen: dict[str, dict[str, None]]
     chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
-    with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
+    texts = (*TEXTS, "component")
+    with opened_table(origin, read, texts, sheet=sheet) as table, ExitStack() as stack:
         table.check(given, kind)
         uncertain = not _SCATTER.isdisjoint((*table.stated.columns, *given))
         columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
@@ -129,7 +132,7 @@ def predict_table(
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])
-    known = (*chosen.pop("read"), *_SHAKING, *TEXTS, *PLACE, *PORTFOLIO)
+    known = (*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *PORTFOLIO)
     notes = chosen.pop("notes")
     missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
     return {
@@ -204,6 +207,11 @@ def _answer(
             if name in given:
                 raise InputError(f"{name} is an option and a column of {table.name}: give it once")
             values[name] = np.array(planes, dtype=object)
+    if (components := table.text(part, "component")) is not None:
+        faults = _wrong_components(components) | faults
+        of_all = question.get("component")
+        names = ["" if i in faults else name or of_all for i, name in enumerate(components)]
+        question = {**question, "component": names if any(names) else of_all}
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
     with table.named():
@@ -227,6 +235,17 @@ def _answer(
     answer["how"][bad] = ""
     answer["reason"][bad] = [*faults.values()]
     return predicted, answer
+
+
+def _wrong_components(components: Sequence[str]) -> dict[int, str]:
+    """Return why rows cannot be used whose horizontal component is unknown, by their index."""
+    faults = {}
+    for i, name in enumerate(components):
+        try:
+            component_named(name or SINGLE_COMPONENT)
+        except InputError as error:
+            faults[i] = str(error)
+    return faults
 
 
 def _written(

@@ -147,8 +147,10 @@ def with_remarks(answer: A, remarks: tuple[str, ...]) -> A:
     if not remarks:
         return answer
     field = "warnings" if isinstance(answer, Prediction) else "notes"
-    # dataclasses.replace takes as long as the answer
-    return type(answer)(**(vars(answer) | {field: (*remarks, *getattr(answer, field))}))
+    # a copy of the attributes: to make the object again takes as long as the answer
+    result = object.__new__(type(answer))
+    vars(result).update(vars(answer), **{field: (*remarks, *getattr(answer, field))})
+    return result
 
 
 def answer_given(

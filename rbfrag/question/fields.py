@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from textwrap import wrap
@@ -465,6 +465,19 @@ class SourceFields(TypedDict, total=False):
     ]
 
 
+class ComponentFields(TypedDict, total=False):
+    """Definition of the horizontal component that the measures are of."""
+
+    component: Annotated[
+        str | Sequence[str | None] | None,
+        Field(
+            "Horizontal component of the measures of shaking: single, geometric_mean, rotd50, "
+            "rotd100 or larger; default: single",
+            is_text=True,
+        ),
+    ]
+
+
 _KIND = Field(
     "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping, "
     "confined_toppling or sliding; default: what they are given by",
@@ -537,7 +550,7 @@ class RangeFields(AnsweringFields, total=False):
     ]
 
 
-class RequestFields(RangeFields, SourceFields, total=False):
+class RequestFields(RangeFields, SourceFields, ComponentFields, total=False):
     """What is asked of blocks and their shaking."""
 
     rotation_deg: Annotated[
@@ -636,7 +649,7 @@ GROUPS: Mapping[str, tuple[Any, ...]] = {
     "A block by its shape": ("block", ShapeFields),
     "Planes and joints": (PlaneFields, SpaceFields, JointFields, WholeFields, AtRestFields),
     "What the block may be": (ScatterFields,),
-    "More of the shaking": (MeasureFields, RecordFields),
+    "More of the shaking": (MeasureFields, ComponentFields, RecordFields),
     "Earthquake, site and scatter of the shaking": (SceneFields, SourceFields),
     "What is asked": (RequestFields,),
 }
@@ -690,7 +703,8 @@ def keywords_in_words(fields: Any) -> str:
 
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
-    return (*names_of(BlockFields, ShakingFields, RowFields, SpaceFields), "density_kg_m3")
+    classes = (BlockFields, ShakingFields, ComponentFields, RowFields, SpaceFields)
+    return (*names_of(*classes), "density_kg_m3")
 
 
 def column_of(name: str) -> str:

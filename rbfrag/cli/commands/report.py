@@ -61,7 +61,8 @@ def report(
     from rbfrag.plots.report.contents import COLUMNS, RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
-    known: dict[str, Any] = {**given, **measures}
+    component = {} if meaning.component is None else {"component": meaning.component}
+    known: dict[str, Any] = {**given, **measures, **component}
     rows, remarks = stated_rows(blocks, known, sheet=sheet) if blocks else ([known], ())
     title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
     with given.named():

@@ -158,7 +158,6 @@ NEEDS = (
         (
             "--imt",
             "--site",
-            "--component",
             "--convert",
             "--convert-sigma",
             "--years",

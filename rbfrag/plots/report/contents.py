@@ -22,6 +22,7 @@ from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
+from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.question.document import prediction_document
 from rbfrag.question.fields import AnsweringFields, RangeFields
 from rbfrag.question.keywords import model_for
@@ -119,12 +120,14 @@ def contents_of(
     Raises:
         InputError: a question that cannot be answered.
     """
-    stated = {name: value for name, value in given.items() if name not in (*STATED, "kind")}
+    asked = (*STATED, "kind", "component")
+    stated = {name: value for name, value in given.items() if name not in asked}
     measures = {name: given[name] for name in STATED if name in given}
     shape, blocks = shape_of(stated), described(stated, given.get("kind"))
     (group,) = blocks.groups
     known = {**group.numbers, **measures}
-    how: dict[str, Any] = {**answering}
+    component = given.get("component")
+    how: dict[str, Any] = {**answering, "component": component}
     document = prediction_document(known, kind=group.kind, remarks=blocks.remarks, **how)
     facts = facts_of(document["kind"])
     numbers = dict(group.numbers)
@@ -145,7 +148,7 @@ def contents_of(
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
-            ("Shaking", tuple(number_in_words(n, v, 6) for n, v in measures.items())),
+            ("Shaking", _shaking_rows(measures, component)),
             *_answer_tables(document, answered),
         ),
         remarks=tuple(dict.fromkeys(warnings)),
@@ -158,6 +161,12 @@ def contents_of(
         document={**document, "hazard": None if answered is None else answered.document},
         rate=answered,
     )
+
+
+def _shaking_rows(measures: Mapping[str, float], component: str | None) -> Rows:
+    rows = [number_in_words(n, v, 6) for n, v in measures.items()]
+    definition = component_named(component or SINGLE_COMPONENT)
+    return (*rows, ("horizontal component", definition.title))
 
 
 class ReportedBlock(NamedTuple):

@@ -63,8 +63,8 @@ def report(
         date: date that is printed on it; nothing is, if empty.
         question: fields of block and shaking, ``sa_g`` and ``kind``, ``model`` (a name), ``level``,
             ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``,
-            ``component``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard`
-            has them.
+            ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard` has them;
+            ``component`` of the measures and of the curve.
 
     Returns:
         The path.
@@ -77,6 +77,8 @@ def report(
         (), question, BlockKeywords, MeasureFields, _Spectrum, CurveKeywords, RangeFields
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
+    if (component := meaning.get("component")) is not None:
+        given["component"] = component
     rate = RateQuestion(curve, years, meaning)
     write_report(out, [given], rate, title=title, date=date, **answering)
     return Path(out)
