@@ -239,7 +239,7 @@ def ask(
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
             remarks = (*unread, *unused_measures(chosen, given))
             answer = answer_given(chosen, given, level, **how)
-            return with_remarks(answer, (*remarks, *_assumed(component, answer)))
+            return with_remarks(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)
             (group,) = blocks.groups
@@ -248,7 +248,7 @@ def ask(
             answer = answer_given(chosen, own, level, **how)
             assert isinstance(answer, Prediction)
             remarks = (*blocks.remarks, *unused_measures(chosen, own))
-            return with_remarks(answer, (*remarks, *_assumed(component, answer)))
+            return with_remarks(answer, remarks, _assumed(component, answer))
     if "block" in given:
         raise InputError("block is one block: give the fields of many as arrays")
     # Kept apart so that a single block does not load numpy.
@@ -258,7 +258,7 @@ def ask(
         given, kind, mode, rows=rows, level=level, **how,
         find=lambda own, of: find_model(model, own, db, kind=of, rotation_deg=rotation_deg),
     )  # fmt: skip
-    return with_remarks(answer, _assumed(component, answer))
+    return with_remarks(answer, (), _assumed(component, answer))
 
 
 def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables import workbook
 from rbfrag.exchange.tables.files import write_block_table
+from rbfrag.question.components import SINGLE_ASSUMED
 from tests.block_tables import read_columns
 
 HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")
@@ -143,7 +144,8 @@ def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
         told = answer(source, target)
         assert (told["rows"], told["answered"]) == (count, count)
         assert told["warnings"] == [
-            "the names of the columns stand in line 5: what is above is not read"
+            "the names of the columns stand in line 5: what is above is not read",
+            SINGLE_ASSUMED,
         ]
         assert target.read_text().count("\n") == count + 1
     source.write_text("\n".join([title + names, row, row.replace("3", "x")]))

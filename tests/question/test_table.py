@@ -81,7 +81,7 @@ def test_other_columns_are_named_loudly_where_they_sound_like_input() -> None:
 def test_columns_of_written_answers_are_not_worth_a_word(tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text("block_id,p2_1_s2,kr,pgv_m_s,weight,lon,lat\na,3,0.1,0.6,1,20,40\n")
-    assert predict_table(source, target, given={})["warnings"] == []
+    assert predict_table(source, target, given={}, component="single")["warnings"] == []
     assert read_blocks(target).remarks == ("NOT READ: pgv_m_s: the answer does not depend on it",)
 
 
