@@ -120,8 +120,8 @@ def contents_of(
     Raises:
         InputError: a question that cannot be answered.
     """
-    asked = (*STATED, "kind", "component")
-    stated = {name: value for name, value in given.items() if name not in asked}
+    not_of_block = (*STATED, "kind", "component")
+    stated = {name: value for name, value in given.items() if name not in not_of_block}
     measures = {name: given[name] for name in STATED if name in given}
     shape, blocks = shape_of(stated), described(stated, given.get("kind"))
     (group,) = blocks.groups
