@@ -63,7 +63,7 @@ def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> Non
 def test_what_the_component_means(shell: Shell, curve: Path) -> None:
     block = ("--p2", "3", "--kr", "0.1")
     unsaid = shell.json("hazard", curve, *block)
-    assert any("say which" in text for text in unsaid["warnings"])
+    assert any("assumed to be of a single" in text for text in unsaid["warnings"])
     single = shell.json("hazard", curve, *block, "--component", "single")
     assert unsaid["annual_rate"] == single["annual_rate"]
     larger = shell.json("hazard", curve, *block, "--component", "larger")
