@@ -21,7 +21,6 @@ from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.annual_rate import failure_rate
-from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.event_means import event_means
 from rbfrag.hazards.event_set import Duration, EventSet
@@ -30,6 +29,7 @@ from rbfrag.hazards.losses import event_losses
 from rbfrag.hazards.mass import curve_mass
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.question.components import component_named
 from rbfrag.question.keywords import model_for
 from rbfrag.question.question import predict
 from rbfrag.solver.results import FloatArray

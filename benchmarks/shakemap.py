@@ -17,9 +17,9 @@ from typing import TypeVar
 import numpy as np
 
 from rbfrag.exchange.shakemap import read_shakemap
-from rbfrag.hazards.conversions import component
 from rbfrag.hazards.maps.map_failures import DRAWS, Places, map_failures
 from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
+from rbfrag.question.components import component_named
 
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ def main() -> None:
     def answer(rows: slice) -> SiteProbability:
         return site_probability(
             {name: given.times * values[rows] for name, values in grid.measures.items()}, p2, kr,
-            component=component(given.component), db=given.database,
+            component=component_named(given.component), db=given.database,
             std_ln={name: np.full(grid.lon[rows].size, given.std) for name in names},
         )  # fmt: skip
 

@@ -16,9 +16,8 @@ from rbfrag.exchange.fragility_function import JUMP, FragilityFunction, chords
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.hazards.conversions import Component
-from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.question.components import Component, component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
@@ -81,23 +80,23 @@ class BlockCurve(NamedTuple):
     p: FloatArray
     lowest: float | None = None
 
-    def smoothed(self, meaning: Component) -> BlockCurve:
+    def smoothed(self, meaning: Component, measure: str) -> BlockCurve:
         """Return P over another definition of the component, whose scatter is integrated.
 
-        The steps of u must be equal. A single component is definition/ratio · exp(scatter ξ), ξ
+        The steps of u must be equal. A single component is definition/ratio · exp(sigma ξ), ξ
         standard normal. What P jumps by where it begins is integrated in closed form.
         """
-        if meaning.scatter == 0.0:
+        if meaning.sigma == 0.0:
             return self
         step = self.u[1] - self.u[0]
-        reach = math.ceil(_REACH * meaning.scatter / step)
-        xi = step / meaning.scatter * np.arange(-reach, reach + 1)
+        reach = math.ceil(_REACH * meaning.sigma / step)
+        xi = step / meaning.sigma * np.arange(-reach, reach + 1)
         weight = np.exp(-0.5 * xi**2)
         beyond = np.pad(self.p - self.p[0], (0, 2 * reach), mode="edge")
         rest = np.convolve(np.pad(beyond, (2 * reach, 0)), weight / weight.sum(), mode="valid")
         u = self.u[0] + step * np.arange(-reach, self.u.size + reach)
-        p = rest + self.p[0] * ndtr((u - self.u[0]) / meaning.scatter)
-        return BlockCurve(u + math.log(meaning.ratio), p, self.lowest)
+        p = rest + self.p[0] * ndtr((u - self.u[0]) / meaning.sigma)
+        return BlockCurve(u + math.log(meaning.ratio(measure)), p, self.lowest)
 
     def between(self, top: float) -> BlockCurve:
         """Return the part from P = `LEAST` to a level, or to where P is all but 1."""
@@ -149,13 +148,13 @@ def block_functions(
         DatabaseError: the database cannot be read.
     """
     model, meaning = model_for(answering, (*numbers, measure), kind), component_named(component)
-    measured, curves = curves_of(numbers, measure, model, names, meaning.scatter)
+    measured, curves = curves_of(numbers, measure, model, names, meaning.sigma)
     begun: list[float] = []
 
     def shown() -> Iterator[BlockCurve]:
         for curve in curves:
             begun.extend([] if curve.lowest is None else [curve.lowest])
-            yield curve.smoothed(meaning)
+            yield curve.smoothed(meaning, measure)
 
     top, state = CREDIBLE[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
     each = iter([_mean(shown(), top)]) if one_class else shown()

@@ -30,15 +30,15 @@ from rbfrag.hazards.between_measures import (
     component_of_velocity,
     velocity_of,
 )
-from rbfrag.hazards.conversions import Component
-from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.question.components import Component, component_named
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.shaking import doubts_about
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import facts_of
 
 
@@ -95,8 +95,9 @@ def losses(
             of PGV and SA(1.0) that the job has. Of PGA alone PGV is taken by the magnitudes of the
             ruptures, unless `model` is named. Several measures, of which `model` names the model,
             are drawn independently by the engine, which a warning tells of.
-        component: what the measures mean: single, geometric_mean, rotd50 or larger; None for
-            single, with a warning. Its scatter is common to the blocks of one site and event.
+        component: horizontal component of the measures: single, geometric_mean, rotd50, rotd100 or
+            larger; None for rotd50, with a note. Its dispersion is common to the blocks of one
+            site and event.
         within_km: farthest distance from a block to its site [km], where they are joined by place.
         run: does the parts of the work; None for this process.
         on_progress: called with the numbers of events done and of all.
@@ -116,7 +117,7 @@ def losses(
     given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
     rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
-    meaning = component_named("single" if component is None else component)
+    meaning = component_named("rotd50" if component is None else component)
     events = read_events(job, imts=imt or _best(job), **lasted)
     events, meaning, tau, remark = _by_one_measure(events, job, meaning, answering)
     rows, models = _with_models(
@@ -124,8 +125,12 @@ def losses(
     )
     portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
-        "the measures are taken as those of single components, which the models are fitted on; "
-        "ground motion models of the engine mostly mean rotd50 or the geometric mean: say which"
+        Diagnostic(
+            "the measures are assumed to be RotD50, as most ground-motion models predict; "
+            "component specifies another one",
+            "rotd50_component",
+            fields=("component",),
+        )
         if component is None
         else meaning.in_words("the measures are")
     )

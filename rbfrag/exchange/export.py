@@ -21,8 +21,8 @@ from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.frames import Tabular
-from rbfrag.hazards.conversions import Component, component
 from rbfrag.hazards.measure_type import requested_measure
+from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.words import numbers_in_words
@@ -43,7 +43,7 @@ class ExportAnswer(Tabular):
         lognormal: how many of them are lognormal.
         largest_relative_error: largest error of linear interpolation between their levels, as
             a fraction of P.
-        component: what the measure's horizontal component means.
+        component: horizontal component of the measure.
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
@@ -99,8 +99,9 @@ def nrml(
     - ``one_class``: one function, the mean over the blocks.
     - ``name``: identifier of a single block, or of the class; ``block`` if not given.
     - ``levels``: greatest number of levels of a function that is not lognormal; 80 if not given.
-    - ``component``: what the measure's horizontal component means: ``single`` (the default),
-      ``geometric_mean``, ``rotd50`` or ``larger``; P is integrated over its scatter.
+    - ``component``: horizontal component of the measure: ``single`` (the default),
+      ``geometric_mean``, ``rotd50``, ``rotd100`` or ``larger``; P is integrated over its
+      dispersion.
     - ``shares``: shares of the blocks [%]: a limit state each, that at least so many fail; one
       function of each block if not given.
     - ``model``, ``db``: as in :func:`rbfrag.predict`.
@@ -181,7 +182,7 @@ class _Request(NamedTuple):
         measure: what they run over, as `predict` calls it.
         one_class: whether one function stands for all.
         shares: shares of them [%] that are limit states of all, or None.
-        component: what the measure's horizontal component means.
+        component: horizontal component of the measure.
         how: number of levels, model and database.
         remarks: what is to be said of the blocks.
     """
@@ -208,7 +209,7 @@ class _Request(NamedTuple):
         names = [str(each) for each in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):
             names = [request.get("name", "block")]
-        meaning = component(request.get("component", "single"))
+        meaning = component_named(request.get("component", SINGLE_COMPONENT))
         how = {"levels": request.get("levels", 80), "component": meaning.name, **answering}
         remarks = (*rows.remarks, *medians)
         shares = request.get("shares")
@@ -262,7 +263,7 @@ class _Request(NamedTuple):
         functions = result.functions
         errors = [each.grid_error for each in functions if each.grid_error is not None]
         lognormal = sum(each.is_lognormal for each in functions)
-        meant = [] if self.component.scatter == 0.0 else [self.component.in_words("shaking is")]
+        meant = [] if self.component.sigma == 0.0 else [self.component.in_words("shaking is")]
         return ExportAnswer(
             file, description, len(functions), lognormal, max(errors, default=0.0),
             self.component.name, *result.about,

@@ -17,10 +17,10 @@ from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.fragility.words import row_in_words
 from rbfrag.frames import Tabular
-from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
 from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
+from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.shaking import doubts_about
@@ -103,7 +103,7 @@ def shakemap(
         blocks: instead of fields a table of blocks: a file, or columns by name, such as a pandas
             table.
         uncertainty: uncertainty.xml of the same map: the answer is integrated over it.
-        component: what the map's measures mean: larger, rotd50, geometric_mean or single.
+        component: horizontal component: larger, rotd100, rotd50, geometric_mean or single.
         allow_partial: read a grid that has not its declared size.
         draws: draws of shaking and blocks for the number of failures; None for 100, more where
             blocks are few.
@@ -146,12 +146,7 @@ def shakemap(
     table = rows.blocks
     warnings = [*rows.unusable_in_words(FROM_SUMS if own else FROM_MEAN), *shaken.warnings]
     warnings += doubts_about(measures)
-    warnings.append(
-        f"the map's measures are taken as {meaning.title}; Beyer and Bommer (2006) relate them "
-        "to one component"
-        if meaning.name != "single"
-        else "the map is taken to be of one component"
-    )
+    warnings.append(meaning.in_words("the map's measures are"))
     kind, read, medians = read_by_models(rows)
     warnings = [*medians, *warnings]
     weight, count = table.get("weight"), table.get("count")

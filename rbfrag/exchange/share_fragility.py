@@ -21,7 +21,7 @@ from rbfrag.exchange.block_fragility import (
 from rbfrag.exchange.fragility_function import FragilityFunction, chords
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.hazards.conversions import component as component_named
+from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.results import FloatArray
@@ -79,7 +79,7 @@ def share_functions(
         )
     numbers = {"p2": p2, "kr": kr}
     meaning = component_named(component)
-    kind, curves = curves_of(numbers, measure, chosen, [name], meaning.scatter)
+    kind, curves = curves_of(numbers, measure, chosen, [name], meaning.sigma)
     curve_of_each = [(ndtri(curve.p), curve.u) for curve in curves]
     blocks = Placement.of_numbers(chosen.method.block, numbers)
     assert blocks is not None
@@ -104,7 +104,7 @@ def share_functions(
     u = np.linspace(ends.min() - 1e-9, ends.max() + 1e-9, _FINE)
     ordered = np.sort(reached, axis=1)
     of_shares = [
-        BlockCurve(u, np.searchsorted(row, u, side="right") / DRAWS).smoothed(meaning)
+        BlockCurve(u, np.searchsorted(row, u, side="right") / DRAWS).smoothed(meaning, measure)
         for row in ordered
     ]
     covered = of_shares[0].u

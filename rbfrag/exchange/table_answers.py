@@ -25,6 +25,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
+from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.question.fields import (
     BY_ROW,
     BlockFields,
@@ -85,7 +86,8 @@ def predict_table(
         ignored: columns to ignore, whatever they are called.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
         remarks: warnings about the options, which go before those of the answer.
-        question: ``rotation_deg``, ``model``, ``level`` and ``db`` of :func:`rbfrag.predict`.
+        question: ``rotation_deg``, ``component``, ``mechanism``, ``model``, ``level`` and ``db`` of
+            :func:`rbfrag.predict`.
 
     Returns:
         Counts: rows, answered, without an answer, in_domain; expected_failures and, if one
@@ -152,12 +154,15 @@ def predict_table(
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])
-        used = (*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *RowFields.__optional_keys__)
+        used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *RowFields.__optional_keys__}
         missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
         notes += diagnostics(
-            remarks, by_row.values(), table.warnings({*used} - {"weight", "loss", "loss_sigma"}), missing,
+            remarks,
+            by_row.values(),
+            table.warnings(used - {"weight", "loss", "loss_sigma"}),
+            missing,
             formulas,
-        )  # fmt: skip
+        )
     if goal is not None:
         write_csv_notes(goal, notes)
     return {
@@ -248,17 +253,20 @@ def _answer(
         else:
             # an option holds for the rows whose cell is empty
             inputs[name] = np.where(np.isnan(column), given.get(name, np.nan), column)
-    for name in (*SPACE, *SHAKING_TEXTS):
+    for name in SPACE:
         if (cells := table.text(part, name)) is not None:
-            default = given.get(name) or ""
-            texts = np.array([cell or default for cell in cells], dtype=object)
-            if name in SPACE or (texts != "").any():
-                inputs[name] = texts
+            inputs[name] = np.array([cell or given.get(name, "") for cell in cells], dtype=object)
+    for name in SHAKING_TEXTS:
+        if (cells := table.text(part, name)) is not None and any(cells):
+            if name == "component":
+                faults = _wrong_components(cells) | faults
+            of_all = question.get(name)
+            filled = ["" if i in faults else cell or of_all for i, cell in enumerate(cells)]
+            question = {**question, name: filled}
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
-    options = {name: inputs.pop(name) for name in SHAKING_TEXTS if name in inputs}
     with table.named():
-        predicted = ask(inputs, kind=requested, mode=modes, rows=True, **{**question, **options})
+        predicted = ask(inputs, kind=requested, mode=modes, rows=True, **question)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")
@@ -279,6 +287,17 @@ def _answer(
     answer["reason"][bad] = [*faults.values()]
     answer["warnings"] = codes_by_row(predicted.notes, count.size)
     return predicted, answer, np.where(whole, count, 1.0)
+
+
+def _wrong_components(components: Sequence[str]) -> dict[int, str]:
+    """Return why rows cannot be used whose horizontal component is unknown, by their index."""
+    faults = {}
+    for i, name in enumerate(components):
+        try:
+            component_named(name or SINGLE_COMPONENT)
+        except InputError as error:
+            faults[i] = str(error)
+    return faults
 
 
 def _written(

@@ -143,13 +143,15 @@ class MotionPrediction(Prediction):
 A = TypeVar("A", bound="Prediction | PredictionArray")
 
 
-def with_remarks(answer: A, remarks: tuple[str, ...]) -> A:
-    """Return an answer with what is to be said of its blocks, first."""
-    if not remarks:
+def with_remarks(answer: A, remarks: tuple[str, ...], last: tuple[str, ...] = ()) -> A:
+    """Return an answer with what is to be said of its blocks, first, and of its shaking, last."""
+    if not remarks and not last:
         return answer
     field = "warnings" if isinstance(answer, Prediction) else "notes"
-    # dataclasses.replace takes as long as the answer
-    return type(answer)(**(vars(answer) | {field: (*remarks, *getattr(answer, field))}))
+    # a copy of the attributes: to make the object again takes as long as the answer
+    result = object.__new__(type(answer))
+    vars(result).update(vars(answer), **{field: (*remarks, *getattr(answer, field), *last)})
+    return result
 
 
 def answer_given(

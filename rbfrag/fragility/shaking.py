@@ -3,9 +3,9 @@
 The logarithms of the measures are normal about those of what is stated, with its standard
 deviations; those of several correlate as total residuals do, and a scatter that all share (of an
 amplification, of a component) is added. P is the sum over 41 points, .3 standard deviations apart:
-P has a kink where mechanics forbids failure, for which Gauss-Hermite is worse by far. One measure
-of a certain block is integrated here, without a library; all else in
-:mod:`rbfrag.fragility.uncertain`.
+P has a kink where mechanics forbids failure, for which Gauss-Hermite is worse by far. One variable
+and a certain block are integrated here, without a library: one measure, or several that all move as
+exp(power σ x), x being what they share. All else is in :mod:`rbfrag.fragility.uncertain`.
 """
 
 from __future__ import annotations
@@ -55,10 +55,12 @@ class Scatter:
     Args:
         names: the measures that scatter.
         common: what a scatter that all share is stated as; None where there is none.
+        single: whether one variable moves all of them: there is one, or only what all share.
     """
 
     names: tuple[str, ...]
     common: str | None = None
+    single: bool = True
 
     @classmethod
     def of(cls, term: Term, given: Mapping[str, Any]) -> tuple[Scatter | None, dict[str, Any]]:
@@ -85,13 +87,8 @@ class Scatter:
         stated = {SCATTERED[name] for name in rest if name in SCATTERED}
         common = "amplification_sigma" if "amplification_sigma" in rest else None
         moved = [name for name in term.inputs if name in (AMPLIFIED if common else stated)]
-        scatter = cls(tuple(moved), common) if moved else None
+        scatter = cls(tuple(moved), common, len(moved) == 1 or not stated) if moved else None
         return scatter, rest
-
-    @property
-    def single(self) -> bool:
-        """Whether one variable says it all."""
-        return len(self.names) == 1
 
     def in_numbers(self, given: Mapping[str, float], tau: Any) -> dict[str, dict[str, float]]:
         """Return median, sigma and, where it is known, tau of each measure that scatters."""
@@ -135,7 +132,7 @@ class MeanModel(FragilityModel):
 
 @dataclass(frozen=True)
 class ShakenModel(MeanModel):
-    """A fitted model that answers for one measure with scatter and one certain block."""
+    """A fitted model that answers for one variable of the shaking and one certain block."""
 
     scatter: Scatter = field(kw_only=True)
 
@@ -152,13 +149,15 @@ class ShakenModel(MeanModel):
         given: Mapping[str, Any],
     ) -> Answer:
         """Return the answer over all that the shaking may be; see :class:`FragilityModel`."""
-        (name,) = self.scatter.names
-        own, shared = (of(name, given) for of in (self.scatter.deviation, self.scatter.shared))
-        sigma, link = math.hypot(own, shared), self.method.link
+        scatter, link = self.scatter, self.method.link
+        sigmas = {
+            name: math.hypot(scatter.deviation(name, given), scatter.shared(name, given))
+            for name in scatter.names
+        }
         middle = outside = 0.0
         totals: list[float] = []
         for x, weight in zip(POINTS, WEIGHTS, strict=True):
-            at = {**given, name: given[name] * math.exp(sigma * x)}
+            at = {**given, **{n: given[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
             values = self.method.block.completed(at, self.term, ns)
             if any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
                 continue

@@ -36,7 +36,8 @@ class ShakingPoints:
     The first measure is taken in the equal steps of one alone, the second in steps of what it may
     be given the first. Of the others given both steps are taken in the direction in which eta moves
     most, and one point each of a sequence of low discrepancy in what is left, which moves eta
-    little: most formulas are linear in the logarithms of these measures.
+    little: most formulas are linear in the logarithms of these measures. Where all move together
+    the first axis is the only one.
 
     Args:
         model: the model that answers.
@@ -50,7 +51,7 @@ class ShakingPoints:
     @cached_property
     def _axes(self) -> list[FloatArray]:
         """Scores of the axes."""
-        k, first = len(self._scatter.names), np.array(POINTS)
+        k, first = 1 if self._scatter.single else len(self._scatter.names), np.array(POINTS)
         second = SECOND if k == 2 else BESIDE_OTHERS
         return [first[first > self._above], second, ALONG][:k]
 
@@ -58,6 +59,8 @@ class ShakingPoints:
     def _scores(self) -> list[FloatArray]:
         """Scores by which each measure moves, shape of the axes that it depends on, and (k,)."""
         k, axes = len(self._scatter.names), self._axes
+        if self._scatter.single:
+            return [axes[0][:, None]] * k
         scores = [
             np.stack(np.meshgrid(*axes[: i + 1], indexing="ij"), axis=-1) for i in range(len(axes))
         ]
@@ -85,7 +88,8 @@ class ShakingPoints:
     def factors(self, given: Mapping[str, FloatArray]) -> FloatArray:
         """Return what scores of the measures are multiplied by, shape (n, k, k)."""
         factors = self._lower(given)
-        return self._turned(given, factors) if factors.shape[1] > 3 else factors
+        turns = factors.shape[1] > 3 and not self._scatter.single
+        return self._turned(given, factors) if turns else factors
 
     def deviation(self, given: Mapping[str, FloatArray]) -> FloatArray:
         """Return the standard deviation of the first measure, shape (n,)."""

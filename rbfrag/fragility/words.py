@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.solver.kinds import BY_MECHANICS
@@ -157,7 +157,7 @@ def model_in_words(document: Mapping[str, Any]) -> str:
 
     if (term := TERMS.get(document["term"])) is None:  # several models
         return str(document["model"])
-    read = (_MEASURES.get(n) or n.partition("_")[0].upper() for n in term.inputs)
+    read = map(_measure, term.inputs)
     method = method_named(document["method"])
     kind = "" if method.block is TOPPLING_BLOCK else method.block.kind.replace("_", " ")
     own = "" if method.forms[term.name].rank == 0 else method.name
@@ -168,6 +168,16 @@ def model_in_words(document: Mapping[str, Any]) -> str:
 def row_in_words(row: ModelRow) -> str:
     """Return what people call a stored model."""
     return model_in_words({"model": row.name, "term": row.term, "method": row.method})
+
+
+def measures_in_words(names: Sequence[str]) -> str:
+    """Return measures as people call them: "PGV and SA(1 s)"."""
+    *others, last = map(_measure, names)
+    return " and ".join(filter(None, (", ".join(others), last)))
+
+
+def _measure(name: str) -> str:
+    return _MEASURES.get(name) or name.partition("_")[0].upper()
 
 
 _MEASURES = {

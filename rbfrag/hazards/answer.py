@@ -231,8 +231,8 @@ def hazard(
       is integrated.
     - ``convert_sigma``: standard deviation of ln PGV about the conversion; None for that of the
       motions of the shipped reference.
-    - ``component``: what the curve's horizontal component means: single, geometric_mean, rotd50 or
-      larger; None for single, with a warning.
+    - ``component``: horizontal component of the curve: single, geometric_mean, rotd50, rotd100 or
+      larger; None for that of the curve file, or else single, with a note.
     - ``disaggregation``: the OpenQuake engine's disaggregation of a curve of PGA by magnitude
       (Mag-*.csv or Mag_Dist-*.csv), by which PGV is taken from it.
     - ``model``, ``level``, ``db``: as in :func:`rbfrag.predict`.

@@ -7,10 +7,11 @@ stronger than those that most often make such a PGA. PGV and SA(1.0) need no mag
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from rbfrag.hazards.conversions import Component
+from rbfrag.question.components import Component
 from rbfrag.solver.results import FloatArray
 
 TAU = {"pgv_m_s": 0.15, "sa10_g": 0.15}
@@ -42,10 +43,11 @@ def velocity_of(pga_g: FloatArray, magnitude: FloatArray) -> FloatArray:
 
 def component_of_velocity(component: Component) -> Component:
     """Return what PGV by :func:`velocity_of` is to a model where PGA is of a component."""
-    return Component(
-        component.name, component.title, component.ratio**_SLOPE,
-        math.hypot(_SCATTER, _SLOPE * component.scatter),
-    )  # fmt: skip
+    return replace(
+        component,
+        amplitude=component.ratio("pga_g") ** _SLOPE,
+        sigma=math.hypot(_SCATTER, _SLOPE * component.sigma),
+    )
 
 
 def factors_between(tau: float) -> tuple[float, float]:

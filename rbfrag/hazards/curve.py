@@ -42,6 +42,7 @@ class _CurveSite(TypedDict, total=False):
     lon: float | None
     lat: float | None
     statistic: str
+    component: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,6 +65,8 @@ class HazardCurve(Tabular):
             rlz-001; empty where that is not stated.
         magnitudes_from_g: PGA [g] from which on its magnitudes are known, of a curve of PGV that
             was made of them; None of any other.
+        component: horizontal component of the levels, as its file names it (rotd50, …); empty
+            where it does not.
     """
 
     measure: str
@@ -78,6 +81,7 @@ class HazardCurve(Tabular):
     warnings: tuple[str, ...] = ()
     statistic: str = ""
     magnitudes_from_g: float | None = None
+    component: str = ""
 
     @property
     def imt(self) -> str:

@@ -24,6 +24,7 @@ from rbfrag.hazards.curve import (
 )
 from rbfrag.hazards.measure_type import openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.components import COMPONENTS
 
 CurveLike = HazardCurve | str | os.PathLike[str]
 """A curve, or the file that holds it."""
@@ -255,7 +256,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
     kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
-    statistic = _stated("kind", head, source, "")
+    statistic, component = _stated("kind", head, source, ""), _component_in(text)
     if len(rows) < 2:
         raise InputError(f"{source}: ends after line 1, before the names of the columns")
     names = [name.strip() for name in rows[1]]
@@ -299,6 +300,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 lon=_coordinate(place_of, "lon", 180.0, where),
                 lat=_coordinate(place_of, "lat", 90.0, where),
                 statistic=statistic,
+                component=component,
             )
         )
     if not curves:
@@ -412,7 +414,23 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     if years is not None:
         with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(rates, years)
-    return [hazard_curve(measure, levels, rates, source=source, period_s=period)]
+    return [
+        hazard_curve(
+            measure, levels, rates, source=source, period_s=period, component=_component_in(text)
+        )
+    ]
+
+
+_COMPONENT = re.compile(
+    r"^#.*?\bcomponent\s*[:=]\s*['\"]*([\w -]*\w)", re.IGNORECASE | re.MULTILINE
+)
+
+
+def _component_in(text: str) -> str:
+    """Return the horizontal component that a comment names (`component='RotD50'`), or nothing."""
+    match = _COMPONENT.search(text)
+    name = "" if match is None else re.sub(r"[\s-]+", "_", match[1].lower())
+    return name if name in COMPONENTS else ""
 
 
 _RETURN_PERIODS = frozenset(

@@ -13,10 +13,10 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, number_at, source_text
 from rbfrag.hazards.between_measures import component_of_velocity, velocity_of
-from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.mass import STEP, Grid, smoothing_of, under
-from rbfrag.hazards.shaking import LevelShaking
+from rbfrag.hazards.shaking import LevelShaking, component_of
+from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.solver.results import FloatArray
 
 _VALUE = re.compile(r"mean|rlz\d+")
@@ -138,7 +138,7 @@ class Disaggregation:
                     fields=("site",),
                 )
         name = meaning.get("component")
-        component = component_named("single" if name is None else name)
+        component = component_of(curve, name) or component_named(SINGLE_COMPONENT)
         shaking = LevelShaking.about("pgv_m_s", component_of_velocity(component))
         end = curve.levels[-1] if curve.end_level is None else curve.end_level
         grid = Grid.over(STEP, float(np.log(curve.levels[0])), float(np.log(end)))

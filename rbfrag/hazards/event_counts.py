@@ -465,7 +465,7 @@ def _bounds_of_z(
     sigma = portfolio.size_sigma[own] + portfolio.strength_sigma[own]
     scattered = (portfolio.count[own] > 1) & (sigma > 0.0)
     none = np.empty((_STRENGTHS, _SIZES, 1, 0))
-    if not (portfolio.component.scatter > 0.0 or sigma.any()):
+    if not (portfolio.component.sigma > 0.0 or sigma.any()):
         bound = ndtri(shaken.probability)[None]
         return lambda _: _Bounds(bound, scattered, none, strengths, weight)
     sites, site = np.unique(portfolio.site[own], return_inverse=True)
@@ -527,7 +527,7 @@ def _sum_by_moments(
 def _common(part: EventYears, shaken: Shaken) -> float:
     """Return the share of the scatter of what fails blocks that the component's is of."""
     portfolio, own = part.portfolio, shaken.block
-    if not portfolio.component.scatter > 0.0:
+    if not portfolio.component.sigma > 0.0:
         return 0.0
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
     ends = (portfolio.probability(own, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))

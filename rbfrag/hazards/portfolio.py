@@ -17,8 +17,8 @@ from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
-from rbfrag.hazards.conversions import Component
 from rbfrag.question.blocks import numbers_in
+from rbfrag.question.components import Component
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -184,7 +184,7 @@ class Portfolio:
         What does not scatter has the one point 0.
         """
         sigmas = (float(self.size_sigma.max()), float(self.strength_sigma.max()))
-        scatters = (self.component.scatter, *sigmas)
+        scatters = (self.component.sigma, *sigmas)
         points, weight = normal_product([scatter_steps(scatter) for scatter in scatters])
         return np.stack(points, axis=1), weight
 
@@ -218,8 +218,8 @@ class Portfolio:
                 shapes that broadcast likewise.
         """
         xi, z_p, z_k = points
-        shift = np.exp(self.component.scatter * np.asarray(xi)) / self.component.ratio
-        values = {name: shaking[name] * shift for name in self.measures}
+        shift = np.exp(self.component.sigma * np.asarray(xi))
+        values = {n: shaking[n] * shift / self.component.ratio(n) for n in self.measures}
         factors = np.exp(self.size_sigma[some] * z_p), np.exp(self.strength_sigma[some] * z_k)
         shape = np.broadcast_shapes(*(each.shape for each in (*values.values(), *factors)))
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)

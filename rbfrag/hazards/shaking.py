@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import scatter_steps
-from rbfrag.hazards.conversions import CONVERSIONS, Component, velocity_conversion
-from rbfrag.hazards.conversions import component as component_named
+from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
+from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 _SCATTER_POINTS = 25
@@ -49,22 +50,22 @@ class LevelShaking:
     def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> LevelShaking:
         """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
         if curve.magnitudes_from_g is not None:
-            single = cls.about("pgv_m_s", component_named("single"), warnings=curve.warnings)
+            single = cls.about(
+                "pgv_m_s", component_named(SINGLE_COMPONENT), warnings=curve.warnings
+            )
             return replace(single, magnitudes_from_g=curve.magnitudes_from_g)
         warnings = list(curve.warnings)
         name, factor, spread = _measure(
             curve, stated.get("convert"), stated.get("convert_sigma"), warnings
         )
-        component = stated.get("component")
-        meaning = component_named("single" if component is None else component)
+        component = component_of(curve, stated.get("component"))
         if component is None:
-            warnings.append(
-                "the curve's horizontal component is taken as a single one, which the models are "
-                "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
-            )
+            warnings.append(SINGLE_CURVE)
+            component = component_named(SINGLE_COMPONENT)
         else:
-            warnings.append(meaning.in_words("the curve is"))
-        return cls.about(name, meaning, factor, spread, tuple(warnings))
+            warnings.append(component.in_words("the curve is"))
+        ratio = None if curve.period_s is None else component.spectral_ratio(curve.period_s)
+        return cls.about(name, component, factor, spread, tuple(warnings), ratio)
 
     @classmethod
     def about(
@@ -74,17 +75,35 @@ class LevelShaking:
         factor: float = 1.0,
         spread: float = 0.0,
         warnings: tuple[str, ...] = (),
+        ratio: float | None = None,
     ) -> LevelShaking:
         """Return what a measure of a component is to a model.
 
         Args:
             factor: what it is multiplied by.
             spread: standard deviation of the logarithm of what results, beside the component's.
+            ratio: ratio of the component, where the levels are of another measure; None for that
+                of `name`.
         """
-        scatter = math.hypot(component.scatter, spread)
+        scatter = math.hypot(component.sigma, spread)
         xi, weight = scatter_steps(scatter, _REACH, _SCATTER_POINTS)
-        median = factor / component.ratio
+        median = factor / (component.ratio(name) if ratio is None else ratio)
         return cls(name, median * np.exp(scatter * xi), weight, median, warnings)
+
+
+SINGLE_CURVE = Diagnostic(
+    "the hazard curve is assumed to be of a single horizontal component; hazard tools mostly give "
+    "RotD50: use component rotd50",
+    "single_component",
+    fields=("component",),
+)
+"""Note of a rate whose curve does not specify the component."""
+
+
+def component_of(curve: HazardCurve, name: str | None) -> Component | None:
+    """Return the horizontal component of a curve; None where neither user nor file names it."""
+    name = curve.component or None if name is None else name
+    return None if name is None else component_named(name)
 
 
 def _measure(

@@ -293,7 +293,7 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name != "kv"}
 
 
-class _FailsAtRest(Exception):  # noqa: N818
+class _FailsAtRest(Exception):
     """A single block fails without an earthquake; the text is the reason."""
 
 

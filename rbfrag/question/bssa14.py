@@ -15,10 +15,6 @@ from rbfrag.fragility.method import Numbers
 
 MECHANISMS = ("unspecified", "strike-slip", "normal", "reverse")
 
-SINGLE_COMPONENT = 0.07 * math.log(10.0)
-"""Scatter of one component about RotD50, in ln: Beyer, K. & Bommer, J. J. (2006), Bulletin of the
-Seismological Society of America 96(4A), 1512-1522."""
-
 
 class _Coefficients(NamedTuple):
     """Of one measure; e0 holds a value for each mechanism."""

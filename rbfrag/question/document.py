@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
-from rbfrag.fragility.measures import STATED
+from rbfrag.fragility.measures import AMPLIFIED, STATED
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
+from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
 from rbfrag.question.fields import SCENE
 from rbfrag.question.question import OF_SHAKING, ask_at_rest, described
-from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from rbfrag.fragility.model import FragilityModel
     from rbfrag.fragility.prediction_motion import Polarity
     from rbfrag.motions.recognise import MotionLike
 
@@ -28,8 +30,8 @@ OF_EACH_MODEL = (
 """What a document has of the answer of each suited model."""
 
 BESIDE_A_MOTION = (
-    "the motion is the shaking at its site: leave rjb_km, vs30_m_s, amplification, mechanism and "
-    "gmm out"
+    "the motion is the shaking at its site: omit rjb_km, vs30_m_s, amplification, mechanism, gmm "
+    "and component"
 )
 
 
@@ -81,6 +83,7 @@ def prediction_document(
     weights: ArrayLike | None = None,
     mechanism: str | None = None,
     gmm: str | PathLike[str] | None = None,
+    component: str | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract, and that of every suited model.
 
@@ -99,21 +102,28 @@ def prediction_document(
         weights: of draws of the block, which the arrays are then.
         mechanism: how the fault of a scenario moves.
         gmm: table of medians and sigmas of a ground-motion model.
+        component: horizontal component of the measures; None for single, with a note.
 
     Raises:
         InputError: a value that cannot be used, or measures no model can work with.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    if mechanism is not None or gmm is not None or not SCENE.isdisjoint(given):
+    is_component_assumed = component is None and motion is None
+    source = mechanism, gmm, component
+    if source != (None, None, None) or not SCENE.isdisjoint(given):
         if motion is not None:
-            raise InputError(BESIDE_A_MOTION, fields=(*SCENE, "mechanism", "gmm"))
-        from rbfrag.question.scenario import Source, shaken
+            fields = (*SCENE, "mechanism", "gmm", "component")
+            raise InputError(BESIDE_A_MOTION, fields=fields)
+        from rbfrag.question.scenario import SITE, Source, shaken
 
-        given, further = shaken(given, Source(mechanism, gmm), model, db)
+        if source[:2] != (None, None) or not given.keys().isdisjoint(SITE):
+            is_component_assumed = False
+        given, further = shaken(given, Source(mechanism, gmm), model, db, component)
         remarks = (*remarks, *further)
     others: list[Prediction] = []
     unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     if motion is not None:
         # Kept apart: a motion needs numpy.
         from rbfrag.fragility.prediction_motion import predict_motion
@@ -141,16 +151,21 @@ def prediction_document(
             assert isinstance(answer, Prediction)
             others.append(answer)
         unused = unused_measures(models[0], given)
-    return _document(others, (*remarks, *unused), sites)
+        if is_component_assumed and 0.0 < others[0].probability < 1.0:
+            notes = (_as_rotd50(models[0], given, weights),)
+    return _document(others, (*remarks, *unused), sites, notes)
 
 
 def _document(
-    answers: Sequence[Prediction], warnings: Sequence[str], sites: float | None
+    answers: Sequence[Prediction],
+    warnings: Sequence[str],
+    sites: float | None,
+    notes: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return the answers of some models, the recommended first, under the keys of the contract."""
     recommended = answers[0]
     document = recommended.as_dict()
-    document["warnings"] = [*diagnostics(warnings, recommended.warnings)]
+    document["warnings"] = [*diagnostics(warnings, recommended.warnings, notes)]
     if sites is not None:
         document["sites"] = int(sites)
     document["answers"] = [
@@ -159,3 +174,21 @@ def _document(
         for answer in answers
     ]
     return document
+
+
+def _as_rotd50(
+    model: FragilityModel, inputs: Mapping[str, ArrayLike], weights: ArrayLike | None
+) -> Diagnostic:
+    """Return the note that a single component is assumed, with P for RotD50."""
+    from rbfrag.fragility.words import measures_in_words, percent
+
+    rotd50 = answer_given(model, to_single_component(inputs, "rotd50"), 0.95, weights=weights)
+    assert isinstance(rotd50, Prediction)
+    names = [name for name in model.term.inputs if name in AMPLIFIED]
+    are = "is" if len(names) == 1 else "are"
+    return Diagnostic(
+        f"{measures_in_words(names)} {are} assumed to be of a single horizontal component; as "
+        f"RotD50 P would be {percent(rotd50.probability)}",
+        SINGLE_ASSUMED.code,
+        fields=SINGLE_ASSUMED.fields,
+    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from textwrap import wrap
@@ -465,6 +465,19 @@ class SourceFields(TypedDict, total=False):
     ]
 
 
+class ComponentFields(TypedDict, total=False):
+    """Definition of the horizontal component that the measures are of."""
+
+    component: Annotated[
+        str | Sequence[str | None] | None,
+        Field(
+            "Horizontal component of the measures of shaking: single, geometric_mean, rotd50, "
+            "rotd100 or larger; default: single",
+            is_text=True,
+        ),
+    ]
+
+
 _KIND = Field(
     "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping, "
     "confined_toppling or sliding; default: what they are given by",
@@ -540,7 +553,7 @@ class RangeFields(AnsweringFields, total=False):
     ]
 
 
-class RequestFields(RangeFields, SourceFields, total=False):
+class RequestFields(RangeFields, SourceFields, ComponentFields, total=False):
     """What is asked of blocks and their shaking."""
 
     rotation_deg: Annotated[
@@ -639,7 +652,7 @@ GROUPS: Mapping[str, tuple[Any, ...]] = {
     "A block by its shape": ("block", ShapeFields),
     "Planes and joints": (PlaneFields, SpaceFields, JointFields, WholeFields, AtRestFields),
     "What the block may be": (ScatterFields,),
-    "More of the shaking": (MeasureFields, RecordFields),
+    "More of the shaking": (MeasureFields, ComponentFields, RecordFields),
     "Earthquake, site and scatter of the shaking": (SceneFields, SourceFields),
     "What is asked": (RequestFields,),
 }
@@ -697,7 +710,8 @@ BY_ROW = ("back_fracture", "cohesion_pa", "density_kg_m3")
 
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
-    return names_of(BlockFields, ShakingFields, RowFields, SpaceFields, *BY_ROW, "mechanism")
+    classes = (BlockFields, ShakingFields, ComponentFields, RowFields, SpaceFields)
+    return names_of(*classes, *BY_ROW, "mechanism")
 
 
 def column_of(name: str) -> str:

@@ -5,7 +5,7 @@ For a single block neither numpy nor any other library is loaded.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
@@ -20,6 +20,7 @@ from rbfrag.fragility.prediction import (
     with_remarks,
 )
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
+from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
 from rbfrag.question.fields import (
     SCENE,
     ArrayFields,
@@ -239,10 +240,12 @@ def _answer_motion(
 ) -> Prediction:
     from rbfrag.fragility.prediction_motion import predict_motion
 
-    for name in ("mechanism", "gmm"):
+    for name in ("mechanism", "gmm", "component"):
         if options.pop(name, None) is not None:
-            measures_of_it = f"{name} given beside a motion: the motion is one; leave it out"
-            raise InputError(measures_of_it, fields=(name,))
+            raise InputError(
+                f"{name} does not go with a motion, which is the shaking itself: omit it",
+                fields=(name,),
+            )
     defaults: dict[str, Any] = {"rotation_deg": None, "model": None, "level": 0.95, "db": None}
     of_arrays = ("nan", "interval")
     options = defaults | {name: each for name, each in options.items() if name not in of_arrays}
@@ -273,6 +276,7 @@ def ask(
     weights: ArrayLike | None = None,
     mechanism: str | None = None,
     gmm: str | PathLike[str] | None = None,
+    component: str | Sequence[str | None] | None = None,
     rows: bool = False,
 ) -> Prediction | PredictionArray:
     """Return the answer for blocks and measures by field; see :func:`predict`.
@@ -291,18 +295,27 @@ def ask(
         weights: of draws of one block.
         mechanism: how the fault of a scenario moves.
         gmm: table of medians and sigmas of a ground-motion model.
+        component: horizontal component of the measures, for all or one each; None for single, with
+            a note.
         rows: the arrays are columns of a table, which may state more than is needed.
     """
     if nan not in ("propagate", "raise"):
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
-    if mechanism is not None or gmm is not None or not SCENE.isdisjoint(given):
+    is_single_component = isinstance(component, str) and component == SINGLE_COMPONENT
+    converts = component is not None and not is_single_component
+    if mechanism is not None or gmm is not None or converts or not SCENE.isdisjoint(given):
         # Kept apart: most questions state measures.
-        from rbfrag.question.scenario import Source, shaken
+        from rbfrag.question.scenario import SITE, Source, shaken
 
-        given, remarks = shaken(given, Source(mechanism, gmm), model, db)
+        source = Source(mechanism, gmm)
+        is_scenario = source != Source() or not given.keys().isdisjoint(SITE)
+        given, remarks = shaken(given, source, model, db, component)
+        if component is not None or is_scenario:
+            component = SINGLE_COMPONENT
         answer = ask(
             given, kind=kind, mode=mode, rotation_deg=rotation_deg, sites=sites, model=model,
-            level=level, db=db, nan=nan, interval=interval, weights=weights, rows=rows,
+            level=level, db=db, nan=nan, interval=interval, weights=weights, component=component,
+            rows=rows,
         )  # fmt: skip
         return with_remarks(answer, remarks)
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
@@ -311,7 +324,8 @@ def ask(
             given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
             remarks = (*unread, *unused_measures(chosen, given))
-            return with_remarks(answer_given(chosen, given, level, **how), remarks)
+            answer = answer_given(chosen, given, level, **how)
+            return with_remarks(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)
             (group,) = blocks.groups
@@ -324,13 +338,24 @@ def ask(
             chosen = find_model(model, own, db, kind=group.kind, rotation_deg=rotation_deg)
             answer = answer_given(chosen, own, level, **how)
             assert isinstance(answer, Prediction)
-            return with_remarks(answer, (*blocks.remarks, *unused_measures(chosen, own)))
+            remarks = (*blocks.remarks, *unused_measures(chosen, own))
+            return with_remarks(answer, remarks, _assumed(component, answer))
     if "block" in given:
         raise InputError("block is one block: give the fields of many as arrays")
     # Kept apart so that a single block does not load numpy.
     from rbfrag.question.answers import ask_many
 
-    return ask_many(
+    answer = ask_many(
         given, kind, mode, rows=rows, level=level, **how,
         find=lambda own, of: find_model(model, own, db, kind=of, rotation_deg=rotation_deg),
     )  # fmt: skip
+    return with_remarks(answer, (), _assumed(component, answer))
+
+
+def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[str, ...]:
+    """Return the note that a single component is assumed, where P depends on the shaking."""
+    if component is not None:
+        return ()
+    p: Any = answer.probability
+    depends = 0.0 < p < 1.0 if type(p) is float else ((p > 0.0) & (p < 1.0)).any()
+    return (SINGLE_ASSUMED,) if depends else ()

@@ -17,9 +17,13 @@ from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, STATED, TERMS
 from rbfrag.fragility.method import SINGLE, Numbers, arrays
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import is_single, single
-from rbfrag.question.bssa14 import MEASURES, MECHANISMS, SINGLE_COMPONENT, Ordinate, bssa14
+from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
+from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma
 
-GROUND = ("magnitude", "rjb_km", "vs30_m_s")
+SITE = ("rjb_km", "vs30_m_s")
+"""Fields that make a question one of a scenario."""
+
+GROUND = ("magnitude", *SITE)
 
 _SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
 # that 400 km is the limit of the paper is from memory
@@ -49,6 +53,7 @@ def shaken(
     source: Source,
     model: Model | None = None,
     db: str | PathLike[str] | None = None,
+    component: Any = None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return a question that states measures and their scatter, and what is to be said of it.
 
@@ -57,12 +62,19 @@ def shaken(
         source: what else is said of the earthquake.
         model: the model that is asked for, which reads its measures; None for PGV alone.
         db: its database.
+        component: horizontal component of the measures, by name; None for single.
 
     Raises:
-        InputError: a scenario that is stated in part or beside measures, or out of range.
+        InputError: a scenario that is stated in part or beside measures, or out of range, or
+            with a component, which is RotD50.
     """
     question, remarks = dict(given), tuple[str, ...]()
-    if source != Source() or not question.keys().isdisjoint(("rjb_km", "vs30_m_s")):
+    if source != Source() or not question.keys().isdisjoint(SITE):
+        if component is not None:
+            raise InputError(
+                "component does not go with a scenario, whose ground-motion model predicts RotD50",
+                fields=("component",),
+            )
         names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
         measures = scenario(given, source, names)
         remarks = (ANOTHER_MODEL,)
@@ -74,8 +86,10 @@ def shaken(
             question[name], question[_SIGMAS[name]] = each.median, each.sigma(ns)
         if "pgv_m_s" in measures:
             question["pgv_tau"] = measures["pgv_m_s"].tau
-        own = given.get("amplification_sigma", 0.0)
-        question["amplification_sigma"] = ns.sqrt(own * own + SINGLE_COMPONENT**2)
+        sigma = given.get("amplification_sigma", 0.0)
+        question["amplification_sigma"] = total_sigma(sigma, COMPONENT_SIGMA)
+    elif component is not None:
+        question = to_single_component(question, component)
     factor = question.pop("amplification", None)
     if factor is not None:
         if is_single(factor) and not 0.0 < single("amplification", factor) < math.inf:

@@ -17,7 +17,6 @@ from typing import NamedTuple
 from rbfrag.errors import InputError
 from rbfrag.question.fields import (
     MeasureFields,
-    RowFields,
     column_of,
     columns_declared,
     declared,

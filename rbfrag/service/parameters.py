@@ -18,6 +18,7 @@ from rbfrag.question.fields import (
     AnsweringFields,
     AtRestFields,
     BlockFields,
+    ComponentFields,
     JointFields,
     MeasureFields,
     PlaneFields,
@@ -47,7 +48,7 @@ Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, f
 COLUMNS = frozenset(names_of(BlockFields, ShakingFields, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
-_TEXTS = frozenset(names_of(SpaceFields))
+_TEXTS = frozenset(names_of(SpaceFields, ComponentFields))
 """Texts of which many blocks have one each."""
 
 _NOT_SENT = frozenset({"block", "db", "gmm"})
@@ -243,4 +244,5 @@ class HazardQuery(Parameters):
     """Standard deviation of ln PGV about the conversion. Default: that of the reference's
     motions."""
     component: Text | None = None
-    """What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."""
+    """Horizontal component of the curve: single, geometric_mean, rotd50, rotd100 or larger.
+    Default: that of the curve file, else single."""

@@ -63,7 +63,7 @@ def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> Non
 def test_what_the_component_means(shell: Shell, curve: Path) -> None:
     block = ("--p2", "3", "--kr", "0.1")
     unsaid = shell.json("hazard", curve, *block)
-    assert any("say which" in text for text in unsaid["warnings"])
+    assert any("assumed to be of a single" in text for text in unsaid["warnings"])
     single = shell.json("hazard", curve, *block, "--component", "single")
     assert unsaid["annual_rate"] == single["annual_rate"]
     larger = shell.json("hazard", curve, *block, "--component", "larger")
@@ -294,8 +294,8 @@ def test_plot(shell: Shell, curve: Path) -> None:
          ("--convert", "newmark_hall_1982"), "is for SA(1), not for SA(2)"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n",
          ("--convert", "newmark_hall_1982"), "the curve is of PGV"),
-        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert", "x"), "'x' is not known"),
-        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--component", "x"), "'x' is not known"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert", "x"), "conversion 'x'"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--component", "x"), "component 'x'"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--years", "0"), "years = 0"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--site", "4"), "no site '4'"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.02\n", (), "the rate rises"),

@@ -182,7 +182,10 @@ def test_nodes_without_a_number_are_left_out_and_counted(shell: Shell, grid: Pat
     ("options", "words"),
     [
         (("--p2", "3", "--kr", "0.1", "--out", "a.jp2"), "none of .geojson"),
-        (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"), "'x' is not known"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"),
+            "component 'x'",
+        ),
         (("--out", "a.csv"), "--p2 is missing"),
         (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat go together"),
         (("--out", "a.csv", "--blocks", "bad.csv"), "line 2: kr = 0 is not above zero"),

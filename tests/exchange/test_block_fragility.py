@@ -17,7 +17,7 @@ from rbfrag.exchange.block_fragility import CREDIBLE, FLOOR, block_functions
 from rbfrag.exchange.fragility_function import FragilityFunction, chords, renamed
 from rbfrag.fragility.measures import ALONE, TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.hazards.conversions import COMPONENTS, Component
+from rbfrag.question.components import COMPONENTS, Component
 from tests.fragility.conftest import model_row
 
 ALLOWED = 0.01
@@ -81,14 +81,14 @@ def test_so_do_those_of_another_component(row: Any, measure: str, meaning: Compo
         assert function.levels is not None
         x = np.geomspace(function.levels[1], function.levels[-1], 40)[:-1]
         # Gauss's points on both sides of where PGA lifts the block
-        lifts = np.log(NUMBERS["kr"][i] * meaning.ratio / x) / meaning.scatter
+        lifts = np.log(NUMBERS["kr"][i] * meaning.ratio(measure) / x) / meaning.sigma
         ends = [np.full(x.size, -8.0), np.clip(lifts, -8.0, 8.0), np.full(x.size, 8.0)]
         smoothed = np.zeros(x.size)
         for low, high in pairwise(ends):
             half = 0.5 * (high - low)[:, None]
             xi = low[:, None] + half * (1.0 + NODES)
             p = probability(
-                model, i, measure, x[:, None] / meaning.ratio * np.exp(meaning.scatter * xi)
+                model, i, measure, x[:, None] / meaning.ratio(measure) * np.exp(meaning.sigma * xi)
             )
             smoothed += (half * WEIGHTS * norm.pdf(xi) * p).sum(axis=1)
         assert relative_error(function, x, smoothed) < ALLOWED
@@ -107,8 +107,8 @@ def test_a_lognormal_function_stays_one(meaning: Component) -> None:
     )
     assert single.median is not None
     assert single.beta is not None
-    assert other.median == pytest.approx(single.median * meaning.ratio, rel=1e-6)
-    assert other.beta == pytest.approx(np.hypot(single.beta, meaning.scatter), rel=1e-6)
+    assert other.median == pytest.approx(single.median * meaning.ratio("pgv_m_s"), rel=1e-6)
+    assert other.beta == pytest.approx(np.hypot(single.beta, meaning.sigma), rel=1e-6)
 
 
 def pga_model() -> FragilityModel:

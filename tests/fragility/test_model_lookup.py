@@ -124,7 +124,8 @@ def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     for _ in range(2):
         assert predict(3.0, 0.1, pgv_m_s=0.6).data == SHIPPED
-        assert predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).warnings == ()
+        answer = predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE, component="single")
+        assert answer.warnings == ()
 
 
 def test_a_database_without_a_model_does_not_take_the_place_of_the_reference(tmp_path, monkeypatch):

@@ -55,7 +55,7 @@ def test_probability_and_interval_against_scipy(row, term, level):
 
 
 def test_keys_of_the_json_contract(row):
-    answer = predict(3.0, 0.1, pgv_m_s=0.6, model=row())
+    answer = predict(3.0, 0.1, pgv_m_s=0.6, model=row(), component="single")
     assert list(answer.as_dict()) == [
         "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "level",
         "model", "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
@@ -110,7 +110,8 @@ def test_where_the_line_is_not_monotone_it_says_so(row):
 def test_negative_mass_near_zero_is_said(row):
     weak = predict(3.0, 0.01, pgv_m_s=0.021, model=row())
     assert any("negative critical velocities" in w for w in weak.warnings)
-    assert predict(3.0, 0.1, pgv_m_s=0.6, model=row()).warnings == ()
+    common = predict(3.0, 0.1, pgv_m_s=0.6, model=row(), component="single")
+    assert common.warnings == ()
 
 
 def draws(n, seed=2):
@@ -133,7 +134,8 @@ def test_arrays_agree_with_scalars(row, term):
     tails = many.probability[(many.probability > 0) & (many.probability < 1e-30)]
     assert tails.size > 5
     for i in range(2000):
-        one = predict(**{k: float(c[i]) for k, c in columns.items()}, model=row(term))
+        numbers = {k: float(c[i]) for k, c in columns.items()}
+        one = predict(**numbers, model=row(term), component="single")
         assert isinstance(one, Prediction)
         assert [many.probability[i], many.ci_low[i], many.ci_high[i]] == pytest.approx(
             [one.probability, one.ci_low, one.ci_high], rel=1e-12, abs=1e-250

@@ -13,7 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
 from rbfrag.hazards.between_measures import component_of_velocity, factors_between, velocity_of
-from rbfrag.hazards.conversions import COMPONENTS
+from rbfrag.question.components import COMPONENTS
 
 
 @pytest.fixture
@@ -39,11 +39,11 @@ def test_the_law_is_that_of_its_figures() -> None:
     ]  # fmt: skip
     assert velocity_of(pga, magnitude) == pytest.approx(expected)
     of_larger = component_of_velocity(COMPONENTS["larger"])
-    scatter = COMPONENTS["larger"].scatter
-    assert of_larger.scatter**2 == pytest.approx(0.434**2 + 0.873**2 * scatter**2)
+    scatter = COMPONENTS["larger"].sigma
+    assert of_larger.sigma**2 == pytest.approx(0.434**2 + 0.873**2 * scatter**2)
     # PGV of the single component that a larger PGA stands for
-    assert velocity_of(pga[:1] / 1.1, magnitude[:1]) == pytest.approx(
-        velocity_of(pga[:1], magnitude[:1]) / of_larger.ratio
+    assert velocity_of(pga[:1] / 1.14, magnitude[:1]) == pytest.approx(
+        velocity_of(pga[:1], magnitude[:1]) / of_larger.ratio("pgv_m_s")
     )
 
 

@@ -13,9 +13,9 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake.events import JobFiles, read_events, read_magnitudes
 from rbfrag.hazards.between_measures import component_of_velocity, velocity_of
-from rbfrag.hazards.conversions import COMPONENTS
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.disaggregation import Disaggregation
+from rbfrag.question.components import COMPONENTS
 
 HEAD = """#,,,,"generated_by='OpenQuake engine 3.26.2', investigation_time=50.0, \
 mag_bin_edges=[5.0, 5.5, 6.0], lon=174.776, lat=-41.279{}"
@@ -74,8 +74,8 @@ def test_one_magnitude_is_the_curve_moved_by_the_law(tmp_path: Path) -> None:
         component = component_of_velocity(COMPONENTS[name])
         made = known.velocity_curve(curve, component=name)
         pga = np.array([0.1, 0.3, 1.0])
-        velocity = velocity_of(pga, np.array(6.5)) / component.ratio
-        expected = 1e-3 * pga**-2.0 * math.exp(0.5 * (2.0 / 0.873 * component.scatter) ** 2)
+        velocity = velocity_of(pga, np.array(6.5)) / component.ratio("pgv_m_s")
+        expected = 1e-3 * pga**-2.0 * math.exp(0.5 * (2.0 / 0.873 * component.sigma) ** 2)
         assert made.rate_at(velocity) == pytest.approx(expected, rel=2e-4)
 
 

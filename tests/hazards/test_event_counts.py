@@ -14,7 +14,6 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement, pair_excess
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards import event_counts
-from rbfrag.hazards.conversions import component
 from rbfrag.hazards.event_counts import (
     EventYears,
     PartCounts,
@@ -27,6 +26,7 @@ from rbfrag.hazards.event_counts import (
 from rbfrag.hazards.event_set import Duration, EventSet
 from rbfrag.hazards.losses import shifted_portfolios
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.question.components import component_named
 from rbfrag.solver.results import FloatArray
 from tests.fragility.conftest import model_row
 from tests.fragility.portfolio_draws import SHARED
@@ -54,7 +54,7 @@ def portfolio(
     names = np.array([str(i) for i in range(n)], dtype=object)
     whole = {"block_id": names, "kind": np.full(n, "toppling", dtype=object), **given}
     model = FragilityModel.from_row(model_row(dependence=law))
-    return Portfolio.of(whole, of.site_ids, {"toppling": model}, component(meaning))
+    return Portfolio.of(whole, of.site_ids, {"toppling": model}, component_named(meaning))
 
 
 def counted(of: EventSet, blocks: Portfolio, samples: int, **about: Any) -> PartCounts:

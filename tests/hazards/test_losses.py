@@ -28,6 +28,7 @@ from rbfrag.hazards.event_counts import EventYears, SomeYears, count_years
 from rbfrag.hazards.losses import LossAnswer
 from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.components import COMPONENT_SIGMA
 from rbfrag.question.question import predict
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import SHARED, model_row
@@ -208,7 +209,7 @@ def test_sampled_frequencies_are_the_probabilities(tmp_path: Path, seed: int) ->
 def test_scatter_of_component_and_block(job: Path) -> None:
     xi, weight = np.polynomial.hermite_e.hermegauss(60)
     weight = weight / weight.sum()
-    scatter, sigma = 0.07 * math.log(10.0), 0.3
+    scatter, sigma = COMPONENT_SIGMA, 0.3
     answer = answered(job, table([0.4], "007"), component="geometric_mean", expected=True)
     mean = probability(0.4, 0.4 * np.exp(scatter * xi)) @ weight
     assert answer.average_annual_failures == pytest.approx(0.005 * mean, rel=1e-4)

@@ -12,7 +12,6 @@ from scipy.stats import norm
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.hazards.conversions import component
 from rbfrag.hazards.maps.map_failures import (
     MapFailures,
     Places,
@@ -20,6 +19,7 @@ from rbfrag.hazards.maps.map_failures import (
 )
 from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
+from rbfrag.question.components import component_named
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
 
@@ -44,7 +44,7 @@ def blocks_at_places(
     # certain values are stronger, lest nothing fails
     shaking = {name: (1.7 if certain else 1.0) * values for name, values in SHAKING.items()}
     return site_probability(
-        shaking, P2, KR, component=component(meaning), own_block=True,
+        shaking, P2, KR, component=component_named(meaning), own_block=True,
         std_ln=None if certain else STD, model=FragilityModel.from_row(row),
     )  # fmt: skip
 
@@ -65,7 +65,7 @@ def test_each_block_fails_as_often_as_the_map_says(row: Row, term: str) -> None:
     else:
         measures = {"pga_g": SHAKING["pga_g"], "sa10_g": np.array([0.5, 0.6, 0.7, 0.5])}
         answer = site_probability(
-            measures, P2, KR, component=component("rotd50"), own_block=True,
+            measures, P2, KR, component=component_named("rotd50"), own_block=True,
             std_ln={"pga_g": STD["pga_g"], "sa10_g": STD["pgv_m_s"]},
             model=FragilityModel.from_row(measure_row(term, dependence=shares(0.1, 0.3, 0.2, 0.4))),
         )  # fmt: skip
@@ -91,10 +91,10 @@ def test_against_dense_matrices(row: Row) -> None:
     x = np.radians(LON) * np.cos(np.radians(45.05)) * 6371.0
     y = np.radians(LAT) * 6371.0
     rho = np.exp(-3.0 / 25.7 * np.hypot(x[:, None] - x, y[:, None] - y))
-    larger = component("larger")
+    larger = component_named("larger")
     residual = np.outer(STD["pgv_m_s"], STD["pgv_m_s"]) * (between + (1.0 - between) * rho)
-    residual += larger.scatter**2 * np.eye(4)
-    ln_pgv = np.log(SHAKING["pgv_m_s"] / larger.ratio)
+    residual += larger.sigma**2 * np.eye(4)
+    ln_pgv = np.log(SHAKING["pgv_m_s"] / larger.ratio("pgv_m_s"))
     pgv = np.exp(random.multivariate_normal(ln_pgv, residual, draws))
     z = random.multivariate_normal(np.zeros(4), 0.3 + 0.7 * np.eye(4), draws)
     model = FragilityModel.from_row(row(dependence=law))
@@ -123,7 +123,7 @@ def test_all_in_common_is_all_or_nothing(row: Row) -> None:
     model = FragilityModel.from_row(row(dependence=shares(1.0)))
     one = np.ones(4)
     answer = site_probability(
-        {"pgv_m_s": 0.6 * one}, 3.0 * one, 0.1 * one, component=component("single"),
+        {"pgv_m_s": 0.6 * one}, 3.0 * one, 0.1 * one, component=component_named("single"),
         own_block=True, std_ln={"pgv_m_s": 0.5 * one}, model=model,
     )  # fmt: skip
     found = map_failures(
@@ -181,7 +181,7 @@ def test_a_seed_repeats_and_another_differs(row: Row) -> None:
 def test_a_class_at_every_node_counts_its_weights(row: Row) -> None:
     p2, kr, weight = np.array([3.0, 10.0]), np.array([0.1, 0.2]), np.array([3.0, 1.0])
     answer = site_probability(
-        SHAKING, p2, kr, component=component("rotd50"), weight=weight, std_ln=STD,
+        SHAKING, p2, kr, component=component_named("rotd50"), weight=weight, std_ln=STD,
         model=FragilityModel.from_row(row()),
     )  # fmt: skip
     found = map_failures(answer, {"p2": p2, "kr": kr}, PLACES, weight=weight, draws=20_000)
@@ -195,7 +195,7 @@ def test_a_class_at_every_node_counts_its_weights(row: Row) -> None:
 
 def test_where_nothing_fails(row: Row) -> None:
     answer = site_probability(
-        {"pgv_m_s": np.zeros(4)}, P2, KR, component=component("single"), own_block=True,
+        {"pgv_m_s": np.zeros(4)}, P2, KR, component=component_named("single"), own_block=True,
         model=FragilityModel.from_row(row()),
     )  # fmt: skip
     told = map_failures(answer, {"p2": P2, "kr": KR}, PLACES).as_dict()

@@ -10,9 +10,9 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.shaking_points import correlations
-from rbfrag.hazards.conversions import component
 from rbfrag.hazards.maps import site_probability as site_module
 from rbfrag.hazards.maps.site_probability import site_probability
+from rbfrag.question.components import component_named
 from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
 
@@ -21,11 +21,12 @@ FloatArray = NDArray[np.float64]
 PGV = np.array([0.0, 0.3, 0.7, 1.2])
 PGA = np.array([0.0, 0.3, 0.5, 0.9])
 SHAKING = {"pgv_m_s": PGV, "pga_g": PGA}
+SINGLE = component_named("single")
 
 
 def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
     p2, kr = np.array([3.0, 10.0]), np.array([0.1, 0.2])
-    found = site_probability(SHAKING, p2, kr, component=component("single"), model=model,
+    found = site_probability(SHAKING, p2, kr, component=SINGLE, model=model,
                              weight=np.array([3.0, 1.0]))  # fmt: skip
     each = predict(p2[None, :], kr[None, :], pgv_m_s=PGV[:, None], model=model).probability
     assert found.probability == pytest.approx(each @ [0.75, 0.25], rel=1e-14)
@@ -34,9 +35,7 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
 
 def test_own_blocks(model: FragilityModel) -> None:
     p2, kr = np.full(4, 3.0), np.array([0.05, 0.08, 0.1, 0.15])
-    found = site_probability(
-        SHAKING, p2, kr, component=component("single"), model=model, own_block=True
-    )
+    found = site_probability(SHAKING, p2, kr, component=SINGLE, model=model, own_block=True)
     assert found.probability == pytest.approx(predict(p2, kr, pgv_m_s=PGV, model=model).probability)
 
 
@@ -47,7 +46,7 @@ def test_only_sites_where_nothing_can_fail_are_left_out(
         return site_probability(
             {"pgv_m_s": np.geomspace(0.01, 1.0, 40), "pga_g": np.full(40, 0.5)},
             np.array([3.0, 1.0]),
-            np.array([0.1, 0.05]), component=component("larger"), model=model,
+            np.array([0.1, 0.05]), component=component_named("larger"), model=model,
         ).probability  # fmt: skip
 
     some = answer()
@@ -63,15 +62,15 @@ def test_only_sites_where_nothing_can_fail_are_left_out(
 @pytest.mark.parametrize("name", ["single", "rotd50", "larger"])
 def test_uncertain_shaking_is_the_mean(model: FragilityModel, name: str) -> None:
     # against plain sampling of ln PGV
-    meaning = component(name)
+    meaning = component_named(name)
     random = np.random.default_rng(5)
     pgv, std = np.array([0.5, 0.7]), np.array([0.3, 0.5])
     found = site_probability(
         {"pgv_m_s": pgv, "pga_g": np.array([0.4, 0.5])}, np.array([3.0]), np.array([0.1]),
         component=meaning, std_ln={"pgv_m_s": std, "pga_g": np.array([0.4, 0.4])}, model=model,
     )  # fmt: skip
-    draws = random.standard_normal((2, 200_000)) * np.hypot(std, meaning.scatter)[:, None]
-    shaken = (pgv / meaning.ratio)[:, None] * np.exp(draws)
+    draws = random.standard_normal((2, 200_000)) * np.hypot(std, meaning.sigma)[:, None]
+    shaken = (pgv / meaning.ratio("pgv_m_s"))[:, None] * np.exp(draws)
     sampled = predict(3.0, 0.1, pgv_m_s=shaken, model=model).probability.mean(axis=1)
     assert found.probability == pytest.approx(sampled, abs=0.004)
     assert (found.ci_low < found.probability).all()
@@ -101,7 +100,11 @@ def test_without_pgv_the_best_of_what_is_there_answers(
 ) -> None:
     shaking = measured(*names)
     found = site_probability(
-        shaking, np.array([3.0]), np.array([0.1]), component=component("single"), db=measures_db
+        shaking,
+        np.array([3.0]),
+        np.array([0.1]),
+        component=SINGLE,
+        db=measures_db,
     )
     assert found.shaking.model.term.name == term
     chosen = FragilityModel.from_row(measure_row(term))
@@ -116,7 +119,7 @@ def test_uncertain_spectral_accelerations_are_the_mean(
     measures_db: str, names: tuple[str, ...]
 ) -> None:
     # against plain sampling of the measures' logarithms with the published correlations
-    shaking, meaning = measured(*names), component("larger")
+    shaking, meaning = measured(*names), component_named("larger")
     std = {name: np.full(2, 0.5 + 0.05 * i) for i, name in enumerate(names)}
     found = site_probability(
         shaking, np.array([3.0]), np.array([0.1]), component=meaning, std_ln=std, db=measures_db
@@ -124,10 +127,10 @@ def test_uncertain_spectral_accelerations_are_the_mean(
     assert set(found.shaking.integrated) == set(names)
     random = np.random.default_rng(2)
     deviations = np.array([std[name][0] for name in names])
-    covariance = correlations(names) * np.outer(deviations, deviations) + meaning.scatter**2
+    covariance = correlations(names) * np.outer(deviations, deviations) + meaning.sigma**2
     drawn = random.multivariate_normal(np.zeros(len(names)), covariance, 200_000)
     sampled = {
-        name: shaking[name][:, None] / meaning.ratio * np.exp(drawn[:, i])
+        name: shaking[name][:, None] / meaning.ratio(name) * np.exp(drawn[:, i])
         for i, name in enumerate(names)
     }
     chosen = find_model(None, ("p2", "kr", *names), measures_db)
@@ -143,7 +146,7 @@ def test_one_deviation_alone_is_used(measures_db: str, names: tuple[str, ...], s
     # grids of version 3 state that of PGA alone; the last case has a first measure that is certain
     shaking, std = measured(*names), np.array([0.5, 0.5])
     found = site_probability(
-        shaking, np.array([3.0]), np.array([0.1]), component=component("single"), db=measures_db,
+        shaking, np.array([3.0]), np.array([0.1]), component=SINGLE, db=measures_db,
         std_ln={stated: std},
     )  # fmt: skip
     assert found.shaking.integrated == (stated,)
@@ -177,7 +180,7 @@ def test_weak_shaking_at_which_nothing_fails_is_not_missed(
     def answer() -> FloatArray:
         return site_probability(
             dict.fromkeys(names, 0.5 * scale), np.array([3.0, 1.0]), np.array([0.1, 0.05]),
-            component=component("larger"), std_ln=dict.fromkeys(names, np.full(30, 0.5)),
+            component=component_named("larger"), std_ln=dict.fromkeys(names, np.full(30, 0.5)),
             model=chosen,
         ).probability  # fmt: skip
 

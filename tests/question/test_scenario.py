@@ -12,7 +12,8 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.prediction import Prediction
-from rbfrag.question.bssa14 import MEASURES, SINGLE_COMPONENT, bssa14
+from rbfrag.question.bssa14 import MEASURES, bssa14
+from rbfrag.question.components import COMPONENT_SIGMA
 from rbfrag.question.question import predict
 
 BLOCK = {"p2": 3.6368, "kr": 0.15, "db": REFERENCE}
@@ -80,7 +81,7 @@ def test_deviations_far_off_on_soft_ground_and_small() -> None:
 def test_a_scenario_is_the_question_of_its_measures() -> None:
     found, shaking = ask(**S1), bssa14("pgv_m_s", 6.8, 11.765, 760.0, "reverse", SINGLE)
     sigma = math.sqrt(shaking.tau**2 + shaking.phi**2)
-    stated = ask(pgv_m_s=shaking.median, pgv_sigma=math.hypot(sigma, SINGLE_COMPONENT))
+    stated = ask(pgv_m_s=shaking.median, pgv_sigma=math.hypot(sigma, COMPONENT_SIGMA))
     assert found.probability == pytest.approx(stated.probability, rel=1e-12)
     assert found.model == stated.model
     assert found.shaking is not None
@@ -104,8 +105,7 @@ def test_a_model_reads_its_measures_of_the_scenario(model: str, names: tuple[str
     shaking = {n: bssa14(n, 7.5, 10.0, 500.0, "strike-slip", SINGLE) for n in names}
     sigma = {n: math.hypot(each.tau, each.phi) for n, each in shaking.items()}
     covariance = [
-        [correlation(a, b) * sigma[a] * sigma[b] + SINGLE_COMPONENT**2 for b in names]
-        for a in names
+        [correlation(a, b) * sigma[a] * sigma[b] + COMPONENT_SIGMA**2 for b in names] for a in names
     ]
     z = np.random.default_rng(4).multivariate_normal(np.zeros(len(names)), covariance, 1_000_000)
     drawn = {n: shaking[n].median * np.exp(z[:, i]) for i, n in enumerate(names)}
@@ -127,7 +127,7 @@ def test_a_table_of_another_model(tmp_path: Path) -> None:
     path.write_text("rjb_km,PGV [cm/s],pgv_sigma,pgv_tau\n5,40,0.6,0.3\n20,20,0.7,0.35\n")
     at_row = ask(gmm=path, rjb_km=20.0)
     assert at_row.probability == pytest.approx(
-        ask(pgv_m_s=0.2, pgv_sigma=math.hypot(0.7, SINGLE_COMPONENT)).probability, rel=1e-9
+        ask(pgv_m_s=0.2, pgv_sigma=math.hypot(0.7, COMPONENT_SIGMA)).probability, rel=1e-9
     )
     between = ask(gmm=path, rjb_km=10.0).shaking
     assert between is not None

@@ -34,7 +34,7 @@ class FunctionOptions(BlocksOptions):
     imt: str = option("Measure of the function: PGV, PGA, or SA at 1 s.", "PGV")
     levels: int = option("Greatest number of levels of a function that is not lognormal.", 80)
     component: str = option(
-        "What the measure's horizontal component means: single, geometric_mean, rotd50 or larger.",
+        "Horizontal component of the measure: single, geometric_mean, rotd50, rotd100 or larger.",
         "single",
     )
     shares: str | None = option(

@@ -92,7 +92,8 @@ class Meaning:
         "independently. Default: the first of PGV and SA(1.0) that the job has."
     )
     component: str | None = option(
-        "What the measures mean: single, geometric_mean, rotd50 or larger."
+        "Horizontal component of the measures: single, geometric_mean, rotd50, rotd100 or larger "
+        "[default: rotd50]."
     )
     kind: str | None = option(
         "Kind of failure of rows that state none. Default: toppling, backed by a slope."

@@ -59,7 +59,7 @@ def report(
     out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
     given: Annotated[Given, fields_of(BlockFields, WholeFields)],
     shaking: options.Shaking,
-    request: Annotated[Given, fields_of(RequestFields)],
+    request: Annotated[Given, fields_of(RequestFields, without=("component",))],
     rate: Hazard,
     meaning: options.Curve,
     heading: Heading,
@@ -78,6 +78,8 @@ def report(
     from rbfrag.plots.report.write import TITLE, write_report
 
     inputs: dict[str, Any] = {**given, **shaking, **request}
+    if meaning.component is not None:
+        inputs["component"] = meaning.component
     rows, remarks = [inputs], (*given.notes, *shaking.notes)
     if blocks:
         names = options.column_names(ignore_columns)

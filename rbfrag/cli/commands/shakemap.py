@@ -43,7 +43,7 @@ class MapOptions:
         "uncertainty.xml of the same map: the answer is integrated over it.", metavar="FILE"
     )
     component: str = option(
-        "What the map's measures mean: larger (ShakeMap's default), rotd50, "
+        "Horizontal component of the map's measures: larger (as ShakeMap), rotd100, rotd50, "
         "geometric_mean or single.",
         "larger",
     )

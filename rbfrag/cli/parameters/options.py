@@ -186,8 +186,8 @@ class Curve:
         "motions."
     )
     component: str | None = option(
-        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger. "
-        "Left out: single, with a warning."
+        "Horizontal component of the shaking: single, geometric_mean, rotd50, rotd100 or larger "
+        "[default: that of the curve file, else single]."
     )
     disaggregation: str | None = option(
         "OpenQuake's disaggregation of a curve of PGA by magnitude (Mag-*.csv or Mag_Dist-*.csv): "

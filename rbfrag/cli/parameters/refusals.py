@@ -159,7 +159,6 @@ NEEDS = (
         (
             "--imt",
             "--site",
-            "--component",
             "--convert",
             "--convert-sigma",
             "--years",

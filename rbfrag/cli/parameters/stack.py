@@ -134,11 +134,11 @@ class FieldOptions(NamedTuple):
         """Return what was given, by field; of a block file what no option states anew."""
         files = [words[word] for word in FILES if words.get(word) is not None]
         given = Given(by_field({name: words[name] for name in words if name not in FILES}))
-        for field, value in given.items():
+        for name, value in given.items():
             if isinstance(value, _WithComma):
-                note = f"{option_of(field)} {value.text} is {float(value):g}"
+                note = f"{option_of(name)} {value.text} is {float(value):g}"
                 given.notes = (*given.notes, Diagnostic(note, "decimal_comma"))
-                given[field] = float(value)
+                given[name] = float(value)
         if files:
             from rbfrag.solver.block.file import read_block
 

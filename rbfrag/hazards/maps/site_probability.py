@@ -15,8 +15,8 @@ from rbfrag.fragility.prediction_array import predict_many
 from rbfrag.fragility.shaking import Scatter
 from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.fragility.uncertain import UncertainModel
-from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.maps.site_shaking import SiteShaking
+from rbfrag.question.components import Component
 from rbfrag.question.fields import AnsweringFields, V
 from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.solver.results import FloatArray

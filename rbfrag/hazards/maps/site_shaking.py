@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.measures import SCATTERED
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.hazards.conversions import Component
+from rbfrag.question.components import Component
 from rbfrag.solver.results import FloatArray
 
 
@@ -48,9 +48,9 @@ class SiteShaking:
         nothing = np.zeros(measures[names[0]].size)
         return cls(
             model=model,
-            median=np.stack([measures[name] / component.ratio for name in names], axis=-1),
+            median=np.stack([measures[name] / component.ratio(name) for name in names], axis=-1),
             deviations=np.stack([given.get(name, nothing) for name in names], axis=-1),
-            scatter=component.scatter,
+            scatter=component.sigma,
             integrated=tuple(given),
         )
 

@@ -16,7 +16,7 @@ from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import RateQuestion, Report, report_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import RangeFields, RequestFields, ShakingFields
+from rbfrag.question.fields import RangeFields, ShakingFields, SourceFields
 from rbfrag.question.keywords import BlockKeywords, parts_of
 
 SUFFIXES = (".pdf", ".png", ".html")
@@ -31,8 +31,10 @@ class _Spectrum(TypedDict, total=False):
     sa_g: Mapping[float, float] | None
 
 
-class _Scenario(ShakingFields[float | None], RequestFields, total=False):
+class _Scenario(ShakingFields[float | None], SourceFields, RangeFields, total=False):
     """The shaking, or the scenario that it follows from, and which model answers."""
+
+    rotation_deg: float | None
 
 
 class ReportKeywords(BlockKeywords[float | None], _Scenario, _Spectrum, CurveKeywords, total=False):
@@ -62,9 +64,9 @@ def report(
         title: title of the page.
         date: date that is printed on it; nothing is, if empty.
         question: fields of block and shaking or scenario, ``sa_g`` and ``kind``, ``model`` (a
-            name), ``level``, ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``, ``site``,
-            ``component``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard`
-            has them.
+            name), ``level``, ``sites`` and ``db`` as :func:`rbfrag.predict` has them; ``imt``,
+            ``site``, ``convert`` and ``convert_sigma`` of the curve as :func:`rbfrag.hazard` has
+            them; ``component`` of the measures and of the curve.
 
     Returns:
         The path.
@@ -77,6 +79,8 @@ def report(
         (), question, BlockKeywords, _Scenario, _Spectrum, CurveKeywords
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
+    if (component := meaning.get("component")) is not None:
+        given["component"] = component
     rate = RateQuestion(curve, years, meaning, weights)
     write_report(out, [given], rate, title=title, date=date)
     return Path(out)

@@ -10,7 +10,10 @@ import rbfrag
 from rbfrag.db.location import REFERENCE
 
 # a decimal comma, two languages, and a column that nothing depends on
-ROWS = "name\tHöhe [cm]\tWidth (m)\tDip of base (°)\tColour\nslab\t200\t0,4\t5°\tgrey\n=post\t300\t0.3\t0\t\nnone\t\t0.3\t0\t\n"
+ROWS = (
+    "name\tHöhe [cm]\tWidth (m)\tDip of base (°)\tColour\n"
+    "slab\t200\t0,4\t5°\tgrey\n=post\t300\t0.3\t0\t\nnone\t\t0.3\t0\t\n"
+)
 
 DROP = """(text) => {
   const data = new DataTransfer();
