@@ -48,6 +48,12 @@ def formats_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
+def cases_dir() -> Path:
+    """Folder of field notes, headers and oracles."""
+    return _folder("RBFRAG_TEST_CASES", "../shared/cases4")
+
+
+@pytest.fixture(scope="session")
 def shaketable_dir() -> Path:
     """Folder of tests on a shake table (docs/evidence/shake-table.md)."""
     return _folder("RBFRAG_TEST_SHAKETABLE", "../shared/shaketable")

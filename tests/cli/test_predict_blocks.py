@@ -44,7 +44,7 @@ def of_one(shell: Shell, height: str, width: str, dip: str) -> Any:
 
 @pytest.mark.usefixtures("book")
 def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -> None:
-    found = shell.json("predict", *ASKED, "--pgv", "0.6")
+    found = shell.json("predict", *ASKED, "--pgv", "0.6", "--component", "single")
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     for row, sides in zip(found["blocks"], (("2.4", ".5", "3"), ("3", ".6", "5")), strict=True):
         alone = of_one(shell, *sides)
@@ -120,7 +120,7 @@ def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> 
         "predict", "--blocks", name, "--pgv", "0.6"
     )
     add_row(Path(name))
-    found = shell.json("predict", "--blocks", name, "--pgv", "0.6")
+    found = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
     (row,) = found["blocks"]
     # nothing is said of columns that are empty
     assert found["warnings"] == ["the row 'example' of the template is skipped"]

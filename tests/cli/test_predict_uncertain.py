@@ -13,10 +13,13 @@ ASKED = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
 DRAWS = "block_id,p2_1_s2,kr,weight\nrock,3,0.1,1\nrock,2.5,0.12,3\n"
 
 
+SINGLE = ("--component", "single")
+
+
 def test_sigmas_are_integrated_over_and_said(shell: Shell) -> None:
-    told = shell.json(*ASKED, "--kr-sigma", "0.2", "--p2-sigma", "0.1")
+    told = shell.json(*ASKED, "--kr-sigma", "0.2", "--p2-sigma", "0.1", *SINGLE)
     answers = told.pop("answers")
-    own = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, p2_sigma=0.1)
+    own = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, p2_sigma=0.1, component="single")
     assert told == own.as_dict()
     assert answers[0]["probability"] == own.probability
     words = shell(*ASKED, "--kr-sigma", "0.2").stdout
@@ -26,9 +29,12 @@ def test_sigmas_are_integrated_over_and_said(shell: Shell) -> None:
 
 def test_draws_of_a_table_are_one_block(shell: Shell) -> None:
     Path("draws.csv").write_text(DRAWS)
-    told = shell.json("predict", "--block-draws", "draws.csv", "--pgv", "0.6", "--pga", "0.3")
+    told = shell.json(
+        "predict", "--block-draws", "draws.csv", "--pgv", "0.6", "--pga", "0.3", *SINGLE
+    )
     told.pop("answers")
-    own = predict([3.0, 2.5], [0.1, 0.12], pgv_m_s=0.6, pga_g=0.3, weights=[1.0, 3.0])
+    shaking = {"pgv_m_s": 0.6, "pga_g": 0.3, "component": "single"}
+    own = predict([3.0, 2.5], [0.1, 0.12], **shaking, weights=[1.0, 3.0])
     assert told == own.as_dict()
 
 
