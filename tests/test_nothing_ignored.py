@@ -62,7 +62,11 @@ PLANES: dict[str, Any] = {
 ANGLES = {"alpha1_deg": -15.0, "alpha3_deg": 16.0, "r3_m": 1.2, "beta_deg": 3.0, "phi_deg": 40.0}
 NUMBERS = {"p2": 3.0, "kr": 0.1}
 SCENARIO = {"magnitude": 7.0, "rjb_km": 4.0, "vs30_m_s": 700.0}
-PGV, PGA = {"pgv_m_s": 0.6}, {"pga_g": 0.7}
+PGV, PGA = {"pgv_m_s": 0.6}, {"pgv_m_s": 0.6, "pga_g": 0.7}
+STANDING = {"base": "4/150", "back": "78/095", "face": "80/090", "s1_m": 2.0, "s2_m": 0.4,
+            "phi_deg": 40.0, "pgv_m_s": 2.0}  # fmt: skip
+SLENDER = {"s1_m": 2.0, "s2_m": 0.5, "gamma_deg": 74.0, "beta_deg": 4.0, "phi_deg": 40.0,
+           "pgv_m_s": 2.0}  # fmt: skip
 AFTER = {"phi_residual_deg": 30.0}
 
 # by field: a question, and the value that is put in or exchanged
@@ -80,15 +84,15 @@ CASES: dict[str, tuple[dict[str, Any], Any]] = {
     "width_m": (SLAB | PGV, 0.45),
     **{name: (ANGLES | PGV, value) for name, value in
        (("alpha1_deg", -14.0), ("alpha3_deg", 15.0), ("r3_m", 1.0))},
-    **{name: (JOINTS | PGV, value) for name, value in
-       (("s1_m", 1.0), ("s2_m", 1.5), ("gamma_deg", 80.0))},
+    **{name: (SLENDER, value) for name, value in
+       (("s1_m", 1.8), ("s2_m", 0.6), ("gamma_deg", 80.0))},
     "beta_deg": (SLAB | PGV, 5.0),
     "phi_deg": (SLIDE | PGV, 30.0),
     "phi_back_deg": ({"s1_m": 0.5, "s2_m": 0.15, "gamma_deg": 95.0, "beta_deg": 5.0,
                       "phi_deg": 25.0, **PGA}, 30.0),
-    "base": (PLANES | PGV, "29/200"),
-    "back": (PLANES | PGV, "60/215"),
-    "face": (PLANES | PGV, "74/195"),
+    "base": (STANDING, "2/150"),
+    "back": (STANDING, "80/095"),
+    "face": (STANDING, "80/085"),
     "water_m": (SLIDE | PGV, 0.3),
     "jrc": (SLIDE | {"jcs_mpa": 60.0, **PGV}, 8.0),
     "jcs_mpa": (SLIDE | {"jrc": 8.0, **PGV}, 60.0),
@@ -176,11 +180,15 @@ def test_every_field_of_a_question_has_a_case() -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_a_keyword_changes_the_answer_or_is_rejected(name: str) -> None:
     question = CASES[name][0]
-    before, after = from_python(question), from_python(changed(name))
     if name in ONLY_WITH_SITES:
         of = {"sites": 10}
         ends = [rbfrag.predict(**q, **of).event_high for q in (question, changed(name))]
         assert ends[0] != ends[1]
+        return
+    before, after = from_python(question), from_python(changed(name))
+    if before == after and isinstance(after, float):
+        told = rbfrag.predict(**changed(name)).warnings
+        assert any(name in text and "not used" in text for text in told), (name, told)
         return
     assert before != after, name
     for alias in {column_of(name), word_of(name), *declared()[name].others}:
@@ -261,23 +269,30 @@ def test_a_column_answers_as_the_keyword_by_each_of_its_names(name: str) -> None
         agree(found, expected, f"{alias}: {found}")
 
 
+def rows_of(table: str) -> list[dict[str, str]]:
+    """Return the rows of a table that the page offers, without its notes."""
+    rows = csv.DictReader(io.StringIO(table.partition("# note")[0]), delimiter="\t")
+    return [row for row in rows if any(row.values())]
+
+
 def test_pasted_text_answers_as_the_keyword(open_page: Any) -> None:
-    page = open_page("?height=1&width=1&pgv=0.6").page
+    opened = open_page("?height=1&width=1&pgv=0.6")
+    page = opened.page
     for name in [name for name in CASES if name in columns_declared()]:
         question, value = CASES[name]
         cell = "no" if name == "back_fracture" else value
         columns = one_row(question, column_of(name), cell, name)
         text = pd.DataFrame(columns).to_csv(index=False, sep="\t")
         page.fill("#table-text", text)
-        with page.expect_response(lambda r: "v1/table" in r.url) as waited:
+        with page.expect_response(lambda r: "v1/table" in r.url, timeout=90_000) as waited:
             page.click("#table-ask")
         document = waited.value.json()
         found: float | str = document.get("detail", "")
         if waited.value.ok:
-            table = document["table"].partition("# note,")[0]
-            row = next(csv.DictReader(io.StringIO(table)))
+            (row, *_) = rows_of(document["table"])
             found = float(row["probability"]) if row["probability"] else row["reason"]
         agree(found, from_python(changed(name)), name)
+    opened.complaints.clear()  # the browser reports requests that are rejected
 
 
 # --- the table of the issue: what was ignored ---
@@ -336,10 +351,9 @@ def test_what_is_pasted_on_the_page_is_used(open_page: Any) -> None:
         "210\t0.35\t38\t\t50\t\t5\n210\t0.35\t38\trocking\t50\t\t0\n100\t1.5\t33\t\t50\t0.1\t20\n"
     )
     page.fill("#table-text", text)
-    with page.expect_response(lambda r: "v1/table" in r.url) as waited:
+    with page.expect_response(lambda r: "v1/table" in r.url, timeout=90_000) as waited:
         page.click("#table-ask")
-    table = waited.value.json()["table"].partition("# note,")[0]
-    found = [float(row["probability"]) for row in csv.DictReader(io.StringIO(table)) if row["kind"]]
+    found = [float(row["probability"]) for row in rows_of(waited.value.json()["table"])]
     slab = {"height_m": 2.1, "width_m": 0.35, "phi_deg": 38.0, "pgv_m_s": 0.5}
     assert found == pytest.approx(
         [
@@ -422,7 +436,7 @@ def test_count_multiplies(shell: Shell) -> None:
 
 
 def test_blocks_elsewhere_are_not_answered_for_the_map(shell: Shell, formats_dir: Path) -> None:
-    grid = formats_dir / "shakemap_v4_grid_cropped.xml"
+    grid = formats_dir / "shakemap_v3_loma_prieta_grid.xml"
     Path("swiss.csv").write_text(
         "height_m,width_m,x,y,crs\n2,0.4,2600000,1200000,EPSG:2056\n3,0.5,2600100,1200000,EPSG:2056\n"
     )
@@ -439,7 +453,7 @@ def test_blocks_elsewhere_are_not_answered_for_the_map(shell: Shell, formats_dir
     missing = shell("shakemap", str(grid), "--blocks", "here.csv", "--out", "a.csv", expect=2)
     assert "x and y need a coordinate reference system" in missing.stderr
     shell("shakemap", str(grid), "--blocks", "here.csv", "--crs", zone, "--out", "a.csv")
-    row = next(csv.DictReader(Path("a.csv").open(encoding="utf-8")))
+    row = next(csv.DictReader(Path("a.csv").read_text("utf-8").splitlines()))
     assert float(row["lon"]) == pytest.approx(lon, abs=1e-6)
     assert float(row["probability"]) == pytest.approx(answer.columns["probability"][best], rel=1e-3)
 
@@ -580,9 +594,7 @@ def check_header(row: dict[str, str]) -> None:
 
 def check_not_an_input(header: str) -> None:
     """Every output names a column that is not an input, unless the table is rejected."""
-    frame = pd.DataFrame(
-        {**{column_of(name): [v] for name, v in USUAL.items()}, header: ["fresh"]}
-    )
+    frame = pd.DataFrame({**{column_of(name): [v] for name, v in USUAL.items()}, header: ["fresh"]})
     frame.to_csv("in.csv", index=False)
     try:
         told = predict_table("in.csv", "out.csv", given={})

@@ -47,6 +47,7 @@ from rbfrag.question.shapes import (
     check_size,
     numbers_of_shape,
     shape_among,
+    size_questions,
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
@@ -374,10 +375,7 @@ def one_block(
         block = block_of(given, kind)
         if kind in (None, block.kind):  # what another kind reads the choice of its model says
             check_numbers(block.kind, block, given)
-        listener = _One()
-        if isinstance(given.get("p2"), int | float):
-            check_size(given["p2"], listener)
-        return Blocks((Group(kind, given),), (*unread, *listener.remarks))
+        return Blocks((Group(kind, given),), (*unread, *size_questions(given.get("p2"))))
     from rbfrag.solver.stability.first_slip import after_first_slip
     from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged

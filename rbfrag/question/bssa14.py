@@ -90,7 +90,7 @@ class Ordinate(NamedTuple):
 
 
 def bssa14(
-    measure: str, magnitude: Any, rjb_km: Any, vs30_m_s: Any, mechanism: str, ns: Numbers
+    measure: str, magnitude: Any, rjb_km: Any, vs30_m_s: Any, mechanism: Any, ns: Numbers
 ) -> Ordinate:
     """Return a measure of the shaking.
 
@@ -99,7 +99,7 @@ def bssa14(
         magnitude: moment magnitude.
         rjb_km: distance from the surface projection of the rupture [km].
         vs30_m_s: mean velocity of shear waves in the upper 30 m [m/s].
-        mechanism: one of :data:`MECHANISMS`.
+        mechanism: index in :data:`MECHANISMS`, a number or an array.
         ns: functions for numbers or arrays.
     """
     of, rock = _OF[measure], _OF["pga_g"]
@@ -123,10 +123,11 @@ def bssa14(
     )  # fmt: skip
 
 
-def _on_rock(of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: str, ns: Numbers) -> Any:
+def _on_rock(of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: Any, ns: Numbers) -> Any:
     """Return the logarithm of a median at 760 m/s."""
     d = magnitude - of.mh
     below, above = ns.minimum(d, 0.0), ns.maximum(d, 0.0)
-    source = of.e0[MECHANISMS.index(mechanism)] + (of.e4 + of.e5 * below) * below + of.e6 * above
+    e0 = of.e0[mechanism] if isinstance(mechanism, int) else mechanism.choose(of.e0)
+    source = e0 + (of.e4 + of.e5 * below) * below + of.e6 * above
     r = ns.sqrt(rjb_km * rjb_km + of.h * of.h)
     return source + (of.c1 + of.c2 * (magnitude - 4.5)) * ns.log(r) + of.c3 * (r - 1.0)

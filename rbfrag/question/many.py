@@ -406,8 +406,7 @@ class _Sorted:
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
         text = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
         listener.remark(across_m < LEAST_M, text, value=across_m)
-        long = [stated[name] > MOST_M for name in LENGTHS if name in stated]
-        if not np.any(long):
+        if not any(np.any(stated[name] > MOST_M) for name in LENGTHS if name in stated):
             check_size(np.broadcast_to(blocks.p2, (n,)), listener)
         displacement = np.full(1, np.nan)
         if "displacement_m" in self.given:

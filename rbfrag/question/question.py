@@ -30,6 +30,7 @@ from rbfrag.question.fields import (
     keywords_in_words,
     names_of,
 )
+from rbfrag.question.shapes import size_questions
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import BY_MECHANICS, facts_of
 
@@ -274,7 +275,7 @@ def ask(
     nan: Literal["propagate", "raise"] = "propagate",
     interval: bool = True,
     weights: ArrayLike | None = None,
-    mechanism: str | None = None,
+    mechanism: str | Sequence[str | None] | None = None,
     gmm: str | PathLike[str] | None = None,
     component: str | Sequence[str | None] | None = None,
     rows: bool = False,
@@ -323,7 +324,7 @@ def ask(
         if not has_shape(given):
             given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-            remarks = (*unread, *unused_measures(chosen, given))
+            remarks = (*unread, *size_questions(given.get("p2")), *unused_measures(chosen, given))
             answer = answer_given(chosen, given, level, **how)
             return with_remarks(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):

@@ -7,7 +7,7 @@ no library.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from typing import Any, NamedTuple
 
@@ -44,7 +44,7 @@ class Source(NamedTuple):
         gmm: table of medians and sigmas of another ground-motion model.
     """
 
-    mechanism: str | None = None
+    mechanism: str | Sequence[str | None] | None = None
     gmm: str | PathLike[str] | None = None
 
 
@@ -133,19 +133,29 @@ def scenario(
             f"{missing[0]} is missing: a scenario is given by {', '.join(GROUND)} and mechanism",
             fields=(*GROUND, "mechanism"),
         )
-    mechanism = source.mechanism or MECHANISMS[0]
-    if mechanism not in MECHANISMS:
-        raise InputError(
-            f"mechanism = {mechanism[:40]!r}: write {' or '.join(MECHANISMS)}",
-            fields=("mechanism",),
-        )
-    ns = _numbers(given)
+    mechanism = _mechanism_index(source.mechanism)
+    ns = _numbers(given) if isinstance(mechanism, int) else arrays()
     values = {name: _checked(name, given[name], mechanism, ns) for name in GROUND}
     return {
         name: bssa14(name, values["magnitude"], values["rjb_km"], values["vs30_m_s"], mechanism, ns)
         for name in names
         if name in MEASURES
     }
+
+
+def _mechanism_index(mechanism: str | Sequence[str | None] | None) -> Any:
+    """Return where mechanisms stand among those of the ground-motion model."""
+    if isinstance(mechanism, Sequence) and not isinstance(mechanism, str):
+        import numpy as np
+
+        return np.array([_mechanism_index(name) for name in mechanism], dtype=np.intp)
+    name = mechanism or MECHANISMS[0]
+    if name not in MECHANISMS:
+        raise InputError(
+            f"mechanism = {name[:40]!r}: it must be {' or '.join(MECHANISMS)}",
+            fields=("mechanism",),
+        )
+    return MECHANISMS.index(name)
 
 
 def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, float]]:
@@ -184,9 +194,11 @@ def _term(model: Model, db: str | PathLike[str] | None) -> str:
     return model.term.name if isinstance(model, FragilityModel) else model.term
 
 
-def _checked(name: str, value: Any, mechanism: str, ns: Numbers) -> Any:
+def _checked(name: str, value: Any, mechanism: Any, ns: Numbers) -> Any:
     low, high = _RANGES[name]
-    if name == "magnitude" and mechanism == "normal":
+    # of several mechanisms the range that all have
+    is_normal = mechanism == MECHANISMS.index("normal")
+    if name == "magnitude" and (is_normal if isinstance(is_normal, bool) else is_normal.any()):
         high = _MOST_OF_NORMAL
     if ns is SINGLE:
         value = worst = single(name, value)

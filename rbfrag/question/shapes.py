@@ -281,11 +281,31 @@ def check_lengths(lengths: Mapping[str, Any], listener: Listener) -> None:
 
 def check_size(p2: Any, listener: Listener) -> None:
     """Question a p² [1/s²] that no block seen so far has."""
-    text = Diagnostic(
-        "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m", "check_unit"
-    )
+    text = Diagnostic(SMALL_P2, "check_unit")
     small = (p2 > 0.0) & (p2 < LEAST_P2)
     listener.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
+
+
+def size_questions(p2: Any) -> tuple[Diagnostic, ...]:
+    """Return the question about p² [1/s²] of blocks that are given by their numbers.
+
+    Args:
+        p2: a number, an array, or None.
+    """
+    if p2 is None or (isinstance(p2, int | float) and not 0.0 < p2 < LEAST_P2):
+        return ()
+    if not isinstance(p2, int | float):
+        import numpy as np
+
+        values = np.asarray(p2, dtype=np.float64)
+        small = values[(values > 0.0) & (values < LEAST_P2)]
+        if not small.size:
+            return ()
+        p2 = float(small.flat[0])
+    return (Diagnostic(SMALL_P2.format(value=p2, size=15.0 / p2), "check_unit"),)
+
+
+SMALL_P2 = "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m"
 
 
 def numbers_of_shape(

@@ -72,5 +72,8 @@ def codes_by_row(warnings: Iterable[str], size: int) -> Any:
     texts = np.full(size, "", dtype=object)
     for each in diagnostics(warnings):
         rows = np.unique(np.asarray(each.rows, dtype=np.intp))
-        texts[rows] = [f"{text} {each.code}".strip() for text in texts[rows].tolist()]
+        texts[rows] = [
+            text if each.code in text.split() else f"{text} {each.code}".strip()
+            for text in texts[rows].tolist()
+        ]
     return texts

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.tables.csv_file import NOTE
+from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
 from rbfrag.fragility.lookup import models_in_memory
 from rbfrag.question.document import answer_block
 from rbfrag.question.fields import ShakingFields, names_of
@@ -93,6 +93,8 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
     from rbfrag.exchange.block_table import opened_table
     from rbfrag.exchange.table_answers import predict_table
 
+    if not body.strip():
+        raise InputError("the table is empty: give the names of the columns and a row a block")
     inputs, how = query.question()
     kind = how.pop("kind", None)
     ignored = query.ignore_columns.split(",") if query.ignore_columns else ()
@@ -117,14 +119,14 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
                 "split it"
             )
         answers = target.read_text(encoding="utf-8-sig")
-    summary["notes"] = as_documents(summary["warnings"])
-    return json_text({**summary, "table": answers + notes_below(summary["warnings"])})
+        answers += notes_below(summary["warnings"], dialect_of(target).delimiter)
+    return json_text({**summary, "notes": as_documents(summary["warnings"]), "table": answers})
 
 
-def notes_below(warnings: Sequence[str]) -> str:
+def notes_below(warnings: Sequence[str], delimiter: str) -> str:
     """Return the warnings as lines below a CSV table, which is downloaded as one file."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(text, lineterminator="\n", delimiter=delimiter)
     if warnings:
         writer.writerow([])
     writer.writerows([NOTE, each.code, str(each)] for each in diagnostics(warnings))

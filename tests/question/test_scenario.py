@@ -12,7 +12,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError
 from rbfrag.fragility.method import SINGLE, arrays
 from rbfrag.fragility.prediction import Prediction
-from rbfrag.question.bssa14 import MEASURES, bssa14
+from rbfrag.question.bssa14 import MEASURES, MECHANISMS, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA
 from rbfrag.question.question import predict
 
@@ -41,15 +41,15 @@ def test_medians_and_deviations_of_the_ground_motion_model(
     measure: str, median: float, tau: float, phi: float
 ) -> None:
     # two libraries of ground-motion models give these
-    found = bssa14(measure, 6.8, 11.765, 760.0, "reverse", SINGLE)
+    found = bssa14(measure, 6.8, 11.765, 760.0, MECHANISMS.index("reverse"), SINGLE)
     assert found.median == pytest.approx(median, rel=2e-4)
     assert (found.tau, found.phi) == pytest.approx((tau, phi), rel=1e-12)
 
 
 def test_another_distance() -> None:
-    assert bssa14("pgv_m_s", 6.8, 12.0, 760.0, "reverse", SINGLE).median == pytest.approx(
-        0.16584, rel=2e-4
-    )
+    assert bssa14(
+        "pgv_m_s", 6.8, 12.0, 760.0, MECHANISMS.index("reverse"), SINGLE
+    ).median == pytest.approx(0.16584, rel=2e-4)
 
 
 def test_numbers_and_arrays_agree() -> None:
@@ -58,9 +58,9 @@ def test_numbers_and_arrays_agree() -> None:
         np.array([180.0, 250.0, 700.0, 1400.0]),
     )  # fmt: skip
     for measure in MEASURES:
-        many = bssa14(measure, magnitude, rjb, vs30, "normal", arrays())
+        many = bssa14(measure, magnitude, rjb, vs30, MECHANISMS.index("normal"), arrays())
         each = [
-            bssa14(measure, *values, "normal", SINGLE)
+            bssa14(measure, *values, MECHANISMS.index("normal"), SINGLE)
             for values in zip(magnitude.tolist(), rjb.tolist(), vs30.tolist(), strict=True)
         ]
         for name in ("median", "tau", "phi"):
@@ -70,16 +70,22 @@ def test_numbers_and_arrays_agree() -> None:
 
 def test_deviations_far_off_on_soft_ground_and_small() -> None:
     # phi grows beyond R1 by up to its whole amount at R2, falls to 225 m/s; both change with M
-    near, far = (bssa14("pgv_m_s", 6.0, r, 760.0, "normal", SINGLE).phi for r in (105.0, 272.0))
+    near, far = (
+        bssa14("pgv_m_s", 6.0, r, 760.0, MECHANISMS.index("normal"), SINGLE).phi
+        for r in (105.0, 272.0)
+    )
     assert far - near == pytest.approx(0.082)
-    soft = bssa14("pgv_m_s", 6.0, 20.0, 200.0, "normal", SINGLE).phi
+    soft = bssa14("pgv_m_s", 6.0, 20.0, 200.0, MECHANISMS.index("normal"), SINGLE).phi
     assert soft == pytest.approx(0.552 - 0.08)
-    middle = bssa14("pgv_m_s", 5.0, 20.0, 760.0, "normal", SINGLE)
+    middle = bssa14("pgv_m_s", 5.0, 20.0, 760.0, MECHANISMS.index("normal"), SINGLE)
     assert (middle.tau, middle.phi) == pytest.approx(((0.401 + 0.346) / 2, (0.644 + 0.552) / 2))
 
 
 def test_a_scenario_is_the_question_of_its_measures() -> None:
-    found, shaking = ask(**S1), bssa14("pgv_m_s", 6.8, 11.765, 760.0, "reverse", SINGLE)
+    found, shaking = (
+        ask(**S1),
+        bssa14("pgv_m_s", 6.8, 11.765, 760.0, MECHANISMS.index("reverse"), SINGLE),
+    )
     sigma = math.sqrt(shaking.tau**2 + shaking.phi**2)
     stated = ask(pgv_m_s=shaking.median, pgv_sigma=math.hypot(sigma, COMPONENT_SIGMA))
     assert found.probability == pytest.approx(stated.probability, rel=1e-12)
@@ -102,7 +108,9 @@ def test_a_model_reads_its_measures_of_the_scenario(model: str, names: tuple[str
     from rbfrag.fragility.shaking import correlation
 
     found = ask(**S3, model=model)
-    shaking = {n: bssa14(n, 7.5, 10.0, 500.0, "strike-slip", SINGLE) for n in names}
+    shaking = {
+        n: bssa14(n, 7.5, 10.0, 500.0, MECHANISMS.index("strike-slip"), SINGLE) for n in names
+    }
     sigma = {n: math.hypot(each.tau, each.phi) for n, each in shaking.items()}
     covariance = [
         [correlation(a, b) * sigma[a] * sigma[b] + COMPONENT_SIGMA**2 for b in names] for a in names
