@@ -320,9 +320,12 @@ def test_an_empty_dip_is_a_missing_value() -> None:
     assert second["probability"] is None
     assert second["reason"] == "dip_deg is empty: enter 0 for a level base"
     # but where planes, or numbers, give the block
-    rows = {"base": ["27/200", ""], "face": ["74/205", ""], "height_m": [1.0, np.nan],
-            "width_m": [1.0, np.nan], "p2_1_s2": [np.nan, 3.0], "kr": [np.nan, 0.1],
-            "dip": [np.nan, np.nan], "phi": [20.0, np.nan], "displacement": [0.1, np.nan]}  # fmt: skip
+    nothing = np.nan
+    rows = {
+        "base": ["27/200", ""], "face": ["74/205", ""], "height_m": [1.0, nothing],
+        "width_m": [1.0, nothing], "p2_1_s2": [nothing, 3.0], "kr": [nothing, 0.1],
+        "dip": [nothing, nothing], "phi": [20.0, nothing], "displacement": [0.1, nothing],
+    }  # fmt: skip
     pd.DataFrame(rows).to_csv("planes.csv", index=False)
     assert predict_table("planes.csv", given={"pgv_m_s": 0.6})["answered"] == 2
 
@@ -475,7 +478,7 @@ def test_a_block_that_is_unstable_at_rest_is_first_in_a_report(shell: Shell, suf
     )
     out = f"a.{suffix}"
     told = shell.json("report", "a.csv", "--pgv", "0.6", "--hazard", "curve.csv", "--out", out)
-    assert [(block["block_id"], block["probability"]) for block in told["blocks"]][0] == ("B", 1.0)
+    assert (told["blocks"][0]["block_id"], told["blocks"][0]["probability"]) == ("B", 1.0)
     assert told["blocks_unstable"] == 1
     assert told["expected_failures"] == pytest.approx(1.0 + told["blocks"][1]["probability"])
     text = words_of(Path(out), pages=2)
@@ -599,8 +602,7 @@ def check_not_an_input(header: str) -> None:
     try:
         told = predict_table("in.csv", "out.csv", given={})
     except InputError as error:
-        assert header in str(error)
-        return
+        told = {"warnings": [f"ignored or rejected: {error}"]}
     said = [text for text in told["warnings"] if header in text and "ignored" in text]
     reason = [text for text in told["warnings"] if "could not be used" in text and header in text]
     assert said or reason, told["warnings"]
@@ -608,7 +610,8 @@ def check_not_an_input(header: str) -> None:
 
 def test_every_output_has_the_notes(shell: Shell) -> None:
     Path("in.csv").write_text(
-        "block_id,Höhe [cm],width_m,dip,phi,Colour,Water (m)\nA,200,0.4,3,,grey,\nB,210,0.4,3,38,,0\n"
+        "block_id,Höhe [cm],width_m,dip,phi,Colour,Water (m)\n"
+        "A,200,0.4,3,,grey,\nB,210,0.4,3,38,,0\n"
     )
     texts = (
         "column Höhe [cm]: converted from cm to m", "column ignored: Colour",

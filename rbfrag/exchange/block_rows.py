@@ -180,7 +180,7 @@ def read_blocks(
     need_kind: str = "",
     for_all: Mapping[str, Any] | None = None,
     sheet: str | None = None,
-    ignored: Sequence[str] = (),
+    ignore_columns: Sequence[str] = (),
     crs: str | None = None,
 ) -> BlockRows:
     """Return the blocks of a table, and its rows that cannot be used, each with its reason.
@@ -198,7 +198,7 @@ def read_blocks(
         need_kind: why a row without a kind cannot be used; empty where it can.
         for_all: fields that are given for all blocks; a cell goes before.
         sheet: of a workbook, the name of the sheet; None for the first.
-        ignored: columns to ignore, whatever they are called.
+        ignore_columns: columns to ignore, whatever they are called.
         crs: coordinate reference system of x and y of rows that name none, such as EPSG:2056.
 
     Returns:
@@ -219,7 +219,7 @@ def read_blocks(
     fields = (*names_of(BlockFields), *BY_ROW)
     of_place = ("x", "y") if {*PLACE} <= {*reads} else ()
     with opened_table(
-        source, (*fields, *reads, *of_place), TEXTS, sheet=sheet, ignored=ignored
+        source, (*fields, *reads, *of_place), TEXTS, sheet=sheet, ignore_columns=ignore_columns
     ) as table:
         table.check(for_all, kind)
         columns, faults, lines = table.whole()
@@ -291,7 +291,7 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
     if (placed & (systems == "")).any():
         raise InputError(
             f"{source}: x and y need a coordinate reference system: add a column crs, or pass "
-            "--crs EPSG:2056, for example",
+            "crs EPSG:2056, for example",
             fields=("crs",),
         )
     try:

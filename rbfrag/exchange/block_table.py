@@ -36,6 +36,7 @@ from rbfrag.question.table import (
     yes_or_no,
 )
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.solver.kinds import FREE_STANDING
 
 TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *SPACE)
 """Columns of texts."""
@@ -176,7 +177,9 @@ class BlockTable:
             raise InputError(f"{self.name}: {next(iter(faults.values()))}")
         self.filled.add("free_standing")
         kinds = kinds or [""] * len(part.lines)
-        return ["rocking" if v == 1.0 else k for k, v in zip(kinds, values.tolist(), strict=True)]
+        return [
+            FREE_STANDING if v == 1.0 else k for k, v in zip(kinds, values.tolist(), strict=True)
+        ]
 
     def warnings(self, used: Collection[str]) -> tuple[Diagnostic, ...]:
         """Return what to know about its columns.
@@ -308,7 +311,7 @@ def opened_table(
     texts: Collection[str] = TEXTS,
     *,
     sheet: str | None = None,
-    ignored: Sequence[str] = (),
+    ignore_columns: Sequence[str] = (),
 ) -> Iterator[BlockTable]:
     """Open a table of blocks.
 
@@ -318,7 +321,7 @@ def opened_table(
         read: fields of numbers, and other columns by their own names, that may be used.
         texts: the same of texts.
         sheet: of a workbook, the name of the sheet; None for the first.
-        ignored: columns to ignore, whatever they are called.
+        ignore_columns: columns to ignore, whatever they are called.
 
     Raises:
         InputError: the file cannot be read, or a column cannot be meant as it is called.
@@ -327,7 +330,7 @@ def opened_table(
     with ExitStack() as stack:
         file = open_table(source, stack, sheet=sheet)
         name = str(source) if isinstance(source, str | os.PathLike) else "blocks"
-        header = columns_in(file.header, name, (*read, *texts), ignored)
+        header = columns_in(file.header, name, (*read, *texts), ignore_columns)
         yield BlockTable(name, file, header, texts)
 
 
@@ -336,7 +339,7 @@ def read_rows(
     given: Mapping[str, Any],
     *,
     sheet: str | None = None,
-    ignored: Sequence[str] = (),
+    ignore_columns: Sequence[str] = (),
 ) -> tuple[list[dict[str, Any]], tuple[Diagnostic, ...]]:
     """Return the inputs of each row of a table, for answers row by row, and its warnings.
 
@@ -344,14 +347,14 @@ def read_rows(
         source: the table.
         given: fields that hold for rows whose cell is empty.
         sheet: of a workbook, the name of the sheet; None for the first.
-        ignored: columns to ignore.
+        ignore_columns: columns to ignore.
 
     Returns:
         Fields by name, with ``block_id``, ``count`` and, of a row that cannot be used, ``reason``.
     """
     read = (*names_of(BlockFields, ShakingFields, *BY_ROW), "count")
     texts = (*TEXTS, *SHAKING_TEXTS)
-    with opened_table(source, read, texts, sheet=sheet, ignored=ignored) as table:
+    with opened_table(source, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table:
         table.check(given, given.get("kind"))
         columns, faults, _ = table.whole()
     rows = []

@@ -65,7 +65,7 @@ def predict_table(
     given: Mapping[str, float],
     kind: str | None = None,
     sheet: str | None = None,
-    ignored: Sequence[str] = (),
+    ignore_columns: Sequence[str] = (),
     excel_text: bool = False,
     remarks: Sequence[str] = (),
     **question: Any,
@@ -83,7 +83,7 @@ def predict_table(
         given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
         kind: how the blocks fail; None for what they are given by.
         sheet: of a workbook, the name of the sheet; None for the first.
-        ignored: columns to ignore, whatever they are called.
+        ignore_columns: columns to ignore, whatever they are called.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
         remarks: warnings about the options, which go before those of the answer.
         question: ``rotation_deg``, ``component``, ``mechanism``, ``model``, ``level`` and ``db`` of
@@ -120,7 +120,7 @@ def predict_table(
     by_row: dict[str, Diagnostic] = {}
     texts = (*TEXTS, *SHAKING_TEXTS)
     with (
-        opened_table(origin, read, texts, sheet=sheet, ignored=ignored) as table,
+        opened_table(origin, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table,
         ExitStack() as stack,
     ):
         table.check(given, kind)

@@ -61,10 +61,10 @@ def answer_block(
         return prediction_document(numbers, kind=group.kind, **how), numbers
     # what is wrong with the shaking is found as for a block that stands
     motion = how.pop("motion", None)
-    asked = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
+    shaking = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
     names = ("kind", "model", "level", "db", "mechanism", "gmm", "rotation_deg", "sites")
     options = {name: how[name] for name in names if how.get(name) is not None}
-    answer = with_remarks(ask_at_rest(asked, blocks, **options), remarks)
+    answer = with_remarks(ask_at_rest(shaking, blocks, **options), remarks)
     return _document([answer], [], how.get("sites")), numbers
 
 

@@ -32,7 +32,7 @@ from rbfrag.question.fields import (
 )
 from rbfrag.question.shapes import size_questions
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.kinds import BY_MECHANICS, facts_of
+from rbfrag.solver.kinds import BY_MECHANICS, FREE_STANDING, facts_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -163,7 +163,7 @@ def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[s
             if match.column == "no_back" and value is not None:
                 value = not value
             elif match.column == "free_standing":
-                value = "rocking" if value else None
+                value = FREE_STANDING if value else None
         if field in result:
             both = (names[field], name)
             raise InputError(f"{name} and {names[field]} are the same field: give one", fields=both)

@@ -160,7 +160,7 @@ def _vocabulary() -> _Vocabulary:
     )
 
 
-def plain_words(text: str) -> list[str]:
+def normalized_words(text: str) -> list[str]:
     """Return the words of a text without case, accents and punctuation."""
     letters = unicodedata.normalize("NFD", text.casefold().replace("ϕ", "φ"))
     bare = "".join(c for c in letters if not unicodedata.combining(c))
@@ -200,7 +200,7 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
     name = _names().get(_as_name(text))
     if name is not None:
         return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
-    known, words = _vocabulary(), plain_words(text)
+    known, words = _vocabulary(), normalized_words(text)
     column = known.phrases.get(" ".join(words))
     default = None
     if column is None:
@@ -228,12 +228,12 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
 
 def kind_named(text: str) -> str | None:
     """Return the kind of failure that a word names, in any of five languages; None for no kind."""
-    return _vocabulary().kinds.get(" ".join(plain_words(text)))
+    return _vocabulary().kinds.get(" ".join(normalized_words(text)))
 
 
 def yes_or_no(text: str) -> bool | None:
     """Return whether a cell says yes; None where it says neither yes nor no."""
-    return _vocabulary().answers.get(" ".join(plain_words(text)))
+    return _vocabulary().answers.get(" ".join(normalized_words(text)))
 
 
 def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | None:
@@ -363,7 +363,8 @@ class Header(NamedTuple):
             if multiplier in MULTIPLIERS:
                 raise InputError(
                     f"{source}: the column {text!r} is not used by this answer: take it out, or "
-                    f"pass --ignore-columns {text!r}"
+                    f"pass ignore_columns {text!r}",
+                    fields=("ignore_columns",),
                 )
         for text in self.unknown:
             field = sounds_like(text)
@@ -372,13 +373,14 @@ class Header(NamedTuple):
             raise InputError(
                 f"{source}: the column {text[:60]!r} is not understood and may be the "
                 f"{declared()[field].what}: call it {column_of(field)!r}, or pass "
-                f"--ignore-columns {text[:60]!r}"
+                f"ignore_columns {text[:60]!r}",
+                fields=("ignore_columns",),
             )
 
 
 def sounds_like(header: str) -> str | None:
     """Return the field that would change the answer and that a header sounds like."""
-    known, words = _vocabulary(), plain_words(header)
+    known, words = _vocabulary(), normalized_words(header)
     if any(word.startswith(known.quiet) for word in words):
         return None
     for word in words:
@@ -392,7 +394,7 @@ def columns_in(
     header: Sequence[str],
     source: object,
     read: Collection[str],
-    ignored: Collection[str] = (),
+    ignore_columns: Collection[str] = (),
 ) -> Header:
     """Return which columns of a table are which fields.
 
@@ -401,13 +403,13 @@ def columns_in(
         source: the table, for messages.
         read: the fields that the answer may use, and other columns by their own names; what is
             wrong with others is no concern.
-        ignored: columns that the caller wants to be ignored.
+        ignore_columns: columns that the caller wants to be ignored.
 
     Raises:
         InputError: two columns of one field, a unit that does not belong to the field, a name that
             misses a field's by one letter, or a column to be ignored that the table does not have.
     """
-    for text in ignored:
+    for text in ignore_columns:
         if text not in header:
             have = ", ".join(header)
             raise InputError(f"{source}: there is no column {text!r} to ignore; there are {have}")
@@ -415,8 +417,8 @@ def columns_in(
     unknown, warnings = [], []
     unused: dict[str, str] = {}
     for text in header:
-        match = None if text in ignored else field_of(text)
-        if text in ignored:
+        match = None if text in ignore_columns else field_of(text)
+        if text in ignore_columns:
             continue
         if match is None:
             if text in read:

@@ -103,12 +103,12 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
         source.write_bytes(body)
         try:
             with opened_table(
-                source, names_of(ShakingFields), sheet=query.sheet, ignored=ignored
+                source, names_of(ShakingFields), sheet=query.sheet, ignore_columns=ignored
             ) as table:
                 if not {*names_of(ShakingFields)}.isdisjoint(table.stated.columns):
                     inputs = {}
             summary = predict_table(
-                source, target, given=inputs, kind=kind, sheet=query.sheet, ignored=ignored,
+                source, target, given=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,
                 excel_text=True, db=db, **how,
             )  # fmt: skip
         except InputError as error:

@@ -26,6 +26,7 @@ from rbfrag.service.problem import (
     refusal,
 )
 from rbfrag.service.settings import ServiceSettings
+from rbfrag.solver.kinds import FREE_STANDING
 
 MULTIPART = "multipart/form-data"
 
@@ -202,7 +203,7 @@ def by_parameter(values: dict[str, Any], known: Collection[str]) -> dict[str, An
         word = name if match is None else parameter_of(match.field)
         if match is not None and word in known and match.unit is None:
             if match.column == "free_standing":
-                value = "rocking" if _is_true(value) else None
+                value = FREE_STANDING if _is_true(value) else None
             elif match.column == "back_fracture":  # its parameter is no_back
                 value = not _is_true(value)
         else:

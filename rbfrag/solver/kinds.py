@@ -76,6 +76,10 @@ KINDS = {
 """All kinds by name, in alphabetical order."""
 
 
+FREE_STANDING = next(facts.kind for facts in KINDS.values() if facts.free_standing)
+"""The kind of blocks without a rock face behind them."""
+
+
 def facts_of(kind: str) -> KindFacts:
     """Return the facts of the kind of that name."""
     if kind not in KINDS:

@@ -137,7 +137,7 @@ def test_bad_rows_leave_the_others_as_they_are(
 def test_predictions_name_the_same_row(tmp_path: Path, form: str, kind: str) -> None:
     source = table(tmp_path, form, [SOUND, SOUND, BAD[kind][0], SOUND])
     target = tmp_path / f"out{source.suffix}"
-    told: Any = predict_table(source, target, given={"pgv_m_s": 0.6}, ignored=("weight",))
+    told: Any = predict_table(source, target, given={"pgv_m_s": 0.6}, ignore_columns=("weight",))
     place = f"{WORDS.get(form, 'row')} {FIRST.get(form, 1) + 2}"
     (said,) = (text for text in told["warnings"] if "could not be used" in text)
     assert said.startswith("1 of 4 blocks could not be used; the reasons stand in the column")

@@ -93,7 +93,8 @@ def test_columns_of_an_earlier_answer_are_named_as_ignored(tmp_path: Path) -> No
     assert predict_table(source, target, given={}, component="single")["warnings"] == []
     assert read_blocks(target).remarks == (
         "column ignored: pgv_m_s",
-        "columns of an earlier answer ignored: probability, ci_low, ci_high, in_domain, how",
+        "columns of an earlier answer ignored: probability, ci_low, ci_high, event_low, "
+        "event_high, in_domain, how, warnings, reason",
     )
 
 

@@ -153,7 +153,7 @@ def losses(
     check_files(table=out, plot=plot, excel_text=excel_text)
     rows = read_blocks(
         table.blocks, meaning.kind, reads=(*PLACE, *PORTFOLIO), sheet=table.sheet,
-        ignored=options.column_names(table.ignore_columns), crs=table.crs,
+        ignore_columns=options.column_names(table.ignore_columns), crs=table.crs,
     )  # fmt: skip
     with ProgressBar("losses", "events") as bar:
         answer = answered(

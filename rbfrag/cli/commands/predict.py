@@ -102,7 +102,7 @@ def predict(
         kind = for_all.pop("kind", None)
         summary = predict_table(
             table.blocks, table.out, given=for_all, kind=kind,
-            sheet=table.sheet, ignored=options.column_names(table.ignore_columns),
+            sheet=table.sheet, ignore_columns=options.column_names(table.ignore_columns),
             excel_text=table.excel_text, remarks=(*given.notes, *measures.notes), **request,
         )  # fmt: skip
         _show_table(summary, json=printing.json)

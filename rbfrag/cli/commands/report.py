@@ -83,7 +83,7 @@ def report(
     rows, remarks = [inputs], (*given.notes, *shaking.notes)
     if blocks:
         names = options.column_names(ignore_columns)
-        rows, of_table = read_rows(blocks, inputs, sheet=sheet, ignored=names)
+        rows, of_table = read_rows(blocks, inputs, sheet=sheet, ignore_columns=names)
         remarks += of_table
     title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
     question = RateQuestion(rate.hazard, rate.years, vars(meaning), rate.weights)

@@ -79,7 +79,7 @@ class TableOptions:
             table: Any = self.blocks
             rows = read_blocks(
                 table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet,
-                ignored=column_names(self.ignore_columns), crs=self.crs, need_kind=need_kind,
+                ignore_columns=column_names(self.ignore_columns), crs=self.crs, need_kind=need_kind,
             )  # fmt: skip
             return GivenBlocks(rows.blocks, False, given.notes, rows)
         kind, numbers, remarks = numbers_of(given)

@@ -301,9 +301,9 @@ def _totals(
     parts += [f"{unstable:,} unstable without shaking (P = 1)"] if unstable else []
     rejected = totals["rows_rejected"]
     parts += [f"{rejected:,} rows rejected"] if rejected else []
-    asked = [{n: v for n, v in row.items() if n in OF_REQUEST} for row in rows]
-    same = all(shaking == asked[0] for shaking in asked)
-    shaking = ", ".join(f"{name} {value}" for name, value in shaking_rows(asked[0]))
+    shaking_by_row = [{n: v for n, v in row.items() if n in OF_REQUEST} for row in rows]
+    same = all(shaking == shaking_by_row[0] for shaking in shaking_by_row)
+    shaking = ", ".join(f"{name} {value}" for name, value in shaking_rows(shaking_by_row[0]))
     summary = [
         ("Blocks", "; ".join(parts)),
         ("Shaking", shaking if same else "given row by row"),

@@ -103,23 +103,23 @@ Line = tuple[tuple[float, str], ...]
 def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
     """Return the lines of the summary with their style: head, table of blocks, notes, versions."""
     heading: dict[str, Any] = {"fontsize": 8.2, "fontweight": "bold", "color": BLUE}
-    plain: dict[str, Any] = {"fontsize": 8.2}
+    normal: dict[str, Any] = {"fontsize": 8.2}
     lines: list[tuple[Line, dict[str, Any]]] = [
-        (((_LEFT, name), (_VALUE, _cut(value, _NARROW))), plain) for name, value in report.summary
+        (((_LEFT, name), (_VALUE, _cut(value, _NARROW))), normal) for name, value in report.summary
     ]
-    lines += [((), plain), (tuple(zip(_SUMMARY, COLUMNS, strict=True)), heading)]
+    lines += [((), normal), (tuple(zip(_SUMMARY, COLUMNS, strict=True)), heading)]
     for entry in report.entries:
         cells = [*zip(_SUMMARY, (_cut(cell, _CELL) for cell in entry.cells), strict=False)]
         reasons = _wrapped(entry.reason, 84) if entry.reason else []
         cells += [(_SUMMARY[1], text) for text in reasons[:1]]
-        lines.append((tuple(cells), plain))
-        lines += [(((_SUMMARY[1], text),), plain) for text in reasons[1:]]
+        lines.append((tuple(cells), normal))
+        lines += [(((_SUMMARY[1], text),), normal) for text in reasons[1:]]
     notes = sentences_of(report.warnings)
     if notes:
-        lines += [((), plain), (((_LEFT, "Notes"),), heading)]
+        lines += [((), normal), (((_LEFT, "Notes"),), heading)]
         lines += [(((_LEFT, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
     versions = dict.fromkeys(v for e in report.entries if e.contents for v in e.contents.versions)
-    lines += [((), plain)]
+    lines += [((), normal)]
     lines += [(((_LEFT, text),), {"fontsize": 6.8}) for text in _wrapped_all(versions)]
     return lines
 
@@ -164,8 +164,8 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     foot_in = versions_in + _NOTE_STEP_IN * (len(notes) + 1)
     panels = panels_of(contents)
     rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
-    room_in = (_HEIGHT_IN - head_in - tables_in - foot_in) / max(len(rows), 1)
-    row_in = min(room_in, _TALLEST_ROW_IN)
+    free_height_in = (_HEIGHT_IN - head_in - tables_in - foot_in) / max(len(rows), 1)
+    row_in = min(free_height_in, _TALLEST_ROW_IN)
     heights = [head_in, tables_in, *[row_in] * len(rows)]
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
