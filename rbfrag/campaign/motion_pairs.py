@@ -12,7 +12,8 @@ from itertools import pairwise
 
 from sqlalchemy import Connection
 
-from rbfrag.db.motions import motion_rows, times_of_earthquakes
+from rbfrag.campaign.horizontal_motions import horizontal_motions
+from rbfrag.db.motions import times_of_earthquakes
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.shock_pairs import Pairing
 from rbfrag.errors import InputError
@@ -32,18 +33,26 @@ class MotionPair:
 
 
 def motion_pairs(
-    connection: Connection, *, suite: str | None, seed: int, draws: int
-) -> tuple[MotionPair, ...]:
-    """Return the pairs of a campaign, the longest first.
+    connection: Connection,
+    *,
+    suite: str | None,
+    seed: int,
+    draws: int,
+    include_structures: bool = False,
+) -> tuple[tuple[MotionPair, ...], list[str]]:
+    """Return the pairs of a campaign, the longest first, and warnings about their sensors.
 
     Args:
         suite: only the horizontal motions of this suite.
+        include_structures: use motions of sensors on structures, too.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:
         InputError: no such suite, or no two earthquakes.
     """
-    rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
+    rows, warnings = horizontal_motions(
+        connection, suite=suite, include_structures=include_structures
+    )
     real = shocks_of_stations(rows, times_of_earthquakes(connection))
     pairs = (*real, *drawn_pairs(rows, {pair.second.id for pair in real}, seed, draws))
     if not pairs:
@@ -57,7 +66,7 @@ def motion_pairs(
         npts = pair.first.npts + pair.second.npts
         return -npts, pair.second.sha256, pair.first.sha256
 
-    return tuple(sorted(pairs, key=longest_first))
+    return tuple(sorted(pairs, key=longest_first)), warnings
 
 
 def shocks_of_stations(

@@ -88,6 +88,7 @@ def simulate_sequences(
     *,
     db: str | os.PathLike[str] | None,
     suite: str | None,
+    include_structures: bool,
     seed: int,
     draws: int,
     workforce: Workforce,
@@ -105,7 +106,10 @@ def simulate_sequences(
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            pairs = motion_pairs(connection, suite=suite, seed=seed, draws=draws)
+            pairs, warnings = motion_pairs(
+                connection, suite=suite, seed=seed, draws=draws,
+                include_structures=include_structures,
+            )  # fmt: skip
             plan = [(pair, _tasks(pair, kind, blocks)) for pair in pairs]
             keys = [task.natural_key for _, tasks in plan for task in tasks]
             known = known_shock_pairs(connection, keys)
@@ -145,7 +149,7 @@ def simulate_sequences(
         runs=runs,
         seconds=time.perf_counter() - started,
         resumed=len(known),
-        warnings=(warning,) if drawn else (),
+        warnings=(*warnings, *([warning] if drawn else ())),
         sequence=SequenceReport(
             seed=seed,
             station_pairs=of_station,

@@ -331,6 +331,8 @@ def _fit_line(row: ModelRow) -> str:
         words.append(f"--vertical {selection['vertical']}")
     if selection.get("doubtful_pgd"):
         words.append("--doubtful-pgd")
+    if selection.get("include_structures"):
+        words.append("--include-structures")
     try:
         exponent = method_named(row.method).exponent
     except InputError:

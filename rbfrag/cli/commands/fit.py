@@ -29,6 +29,7 @@ class Data:
     """What is fitted."""
 
     suite: options.Suite = None
+    include_structures: options.IncludeStructures = False
     vertical: str = option("Combinations without vertical motion, with it, or both.", "without")
     doubtful_pgd: bool = option(
         "Let pgd_tm read the PGD of records flagged final_velocity or "
@@ -96,6 +97,7 @@ def fit(
         term=term,
         method=method,
         suite=data.suite,
+        include_structures=data.include_structures,
         vertical=data.vertical,  # type: ignore[arg-type]
         name=stored.name,
         seed=stored.seed,

@@ -180,6 +180,12 @@ def fit_source(
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"
+    warnings = [
+        *_older(table),
+        *_data_warnings(data, source.structures),
+        *result.warnings,
+        *unknown,
+    ]
     row = ModelRow(
         name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,
@@ -197,7 +203,7 @@ def fit_source(
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
             "scores": result.scores,
-            "warnings": [*_older(table), *_data_warnings(data), *result.warnings, *unknown],
+            "warnings": warnings,
             "n_total": data.n_total,
             "n_found": int((table.status == "found").sum()),
             "n_below_limit": int((table.status == "below_limit").sum()),
@@ -210,6 +216,7 @@ def fit_source(
             "term_rank": list(correlations),
             "suite": chosen.get("suite"),
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
+            "include_structures": chosen.get("include_structures", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
             **({"why_method": why} if why else {}),
@@ -300,8 +307,12 @@ def _older(table: CombinationTable) -> list[str]:
     ]
 
 
-def _data_warnings(data: FitData) -> list[str]:
+def _data_warnings(data: FitData, structures: int) -> list[str]:
     result = []
+    if structures:
+        result.append(
+            f"{structures} motions recorded on structures are excluded: they are not ground motion"
+        )
     if data.guessed_events:
         result.append(
             f"{data.guessed_events} of {data.events} earthquakes are guessed from file "

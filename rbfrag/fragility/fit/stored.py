@@ -32,6 +32,7 @@ def fit(
         method: one of those of the kind (docs/theory/fragility.md); None for the one that predicts
             earthquakes left out best with this term: ``details["why_method"]`` says why.
         suite: suite of motions to fit; None for all motions.
+        include_structures: read motions of sensors on structures, too.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
             such as ``sliding-pgv``.

@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.ground_motion import LOCATION
 from rbfrag.motions.text.file import field_layout, finite_number
 from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
@@ -34,6 +35,7 @@ _EVENT = re.compile(r"^\s*Record of\s+(\S.*)", re.IGNORECASE)
 _START = re.compile(r"^\s*Rcrd start time:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^\s*Statn No:.*\bCode:\s*(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*Sta Chan\s+[^:]*:\s*([^(]*)", re.IGNORECASE)
+_LOCATION = re.compile(r"^\s*Sta Chan\s+[^:]*:.*\bLocation:\s*(\S.*)", re.IGNORECASE)
 _SCNL = re.compile(r"<SCNL>\s*[^.\s]+\.([^.\s]+)\.")
 _PEAK = re.compile(r"^Processed:.*\bMax\s*=\s*(\S+\s+[^\s,]+)", re.IGNORECASE)
 _RECORD = re.compile(r"^\|.*\bRcrdId:\s*(\S+)", re.IGNORECASE)
@@ -71,6 +73,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
     if vertical is None:
         vertical = is_vertical_name(component)
     record = file.label(header, _RECORD)
+    location = file.label(header, _LOCATION)
     return ParsedTrace(
         values,
         dt,
@@ -85,6 +88,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         else None,
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
+        remarks=(LOCATION + location,) if location else (),
         labels={"orientation_deg": azimuth, "is_vertical": vertical},
         durations=(file.optional(here, _SECONDS),),
         peak=peak_of(file.optional(header, _PEAK)),

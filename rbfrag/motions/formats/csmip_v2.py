@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from rbfrag.motions.ground_motion import LOCATION
 from rbfrag.motions.text.file import field_layout
 from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
@@ -85,7 +86,7 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
     # the line after it names the event, unless it gives no more than the time of the record
     event = file.lines[channel.line].strip() if channel.line < header.stop else ""
     if location := file.label(range(channel.line - 1, channel.line), _LOCATION):
-        remarks = (*remarks, f"the sensor's location by the header: {location}")
+        remarks = (*remarks, LOCATION + location)
     return ParsedTrace(
         values,
         dt,
