@@ -59,6 +59,12 @@ class Answer(NamedTuple):
     outside: Any = None
 
 
+SYNTHETIC = (
+    "the model is fitted to synthetic pulses, without any recorded earthquake: its probabilities "
+    "do not hold for earthquakes"
+)
+
+
 @dataclass(frozen=True)
 class FragilityModel:
     """One fitted fragility model: a stored row in the form that answers.
@@ -147,6 +153,8 @@ class FragilityModel:
             )
         term = TERMS[row.term]
         notes = (form.advice,) if form.advice else ()
+        if row.diagnostics.get("recorded_events") == 0:
+            notes = (*notes, SYNTHETIC)
         return cls(
             row=row,
             term=term,

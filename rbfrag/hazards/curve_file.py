@@ -1,10 +1,10 @@
-"""Hazard curves out of a file: OpenQuake CSV, USGS NSHM JSON, or two columns."""
+"""Hazard curves out of a file: OpenQuake CSV, JSON of the USGS, two columns, or a row a site."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Unpack
@@ -22,7 +22,7 @@ from rbfrag.hazards.curve import (
     hazard_curve,
     rates_from_probabilities,
 )
-from rbfrag.hazards.measure_type import openquake_type
+from rbfrag.hazards.measure_type import IntensityType, openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 CurveLike = HazardCurve | str | os.PathLike[str]
@@ -109,7 +109,7 @@ def hazard_curves_in(
     elif first.startswith("{"):
         curves = nshm_curves(text, source)
     else:
-        curves = table_curves(text, source)
+        curves = table_curves(text, source, imt)
     if imt is not None:
         curves = _of_imt(curves, imt, source)
     if site is not None:
@@ -191,7 +191,40 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
         raise InputError(f"{source}: {error}") from None
     if not isinstance(document, dict) or not document:
         raise InputError(f"{source}: a JSON object with one member a measure is wanted")
+    if "response" in document:
+        try:
+            return list(_service_curves(document, source))
+        except (AttributeError, KeyError, TypeError):
+            raise InputError(
+                f"{source}: no hazard curves as the USGS services answer; download the curve again"
+            ) from None
     return [_curve(name, member, f"{source}, {name!r}") for name, member in document.items()]
+
+
+def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCurve]:
+    """Yield the total curves of an answer of the Unified Hazard Tool or of nshmp-ws.
+
+    The former has ``metadata`` with ``imt`` and ``xvals`` (or ``xvalues``) and ``yvals`` for each
+    site or kind of source, the latter ``xs`` and ``ys``; levels in g (PGV: cm/s), annual rates.
+    """
+    response = document["response"]
+    for member in response["hazardCurves"] if isinstance(response, dict) else response:
+        about = {**document.get("request", {}), **member, **member.get("metadata", {})}
+        name = about["imt"]["value"]
+        where = f"{source}, {name}"
+        kind = openquake_type(re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", name), where)
+        for data in member["data"] if isinstance(member["data"], list) else [member["data"]]:
+            if data.get("component", "Total") != "Total":
+                continue  # of one kind of source
+            known = {**about, **data, **data.get("values", {})}
+            x, y = (
+                _numbers(next((known[key] for key in keys if key in known), None), keys[0], where)
+                for keys in (("xs", "xvalues", "xvals"), ("ys", "yvalues", "yvals"))
+            )
+            yield hazard_curve(
+                kind.measure, kind.factor * x, y, source=where, period_s=kind.period_s,
+                lon=known.get("longitude"), lat=known.get("latitude"),
+            )  # fmt: skip
 
 
 def _curve(name: str, member: Any, where: str) -> HazardCurve:
@@ -356,14 +389,19 @@ HEADER_HELP = (
 )
 
 
-def table_curves(text: str, source: str) -> list[HazardCurve]:
-    """Return the curve of a two-column CSV file, as a list of one.
+def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardCurve]:
+    """Return the curve of a two-column CSV file as a list of one, or those of a row a site.
 
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
     ``pgv_cm_s`` or ``sa(0.5)_g``, also with the unit in brackets; and ``annual_rate`` [1/a],
     ``return_period_years`` or ``poe_50_years``, the probability of exceedance in 50 years. Between
     semicolons numbers may have decimal commas. Levels may fall from row to row, as those of return
-    periods that do.
+    periods that do. Of ``Ground Motion (g), Annual Frequency of Exceedance`` `imt` states the
+    measure, as of a table with a row of annual rates for each site, ``name,lon,lat`` and below the
+    levels (in g, of PGV in cm/s) as nshmp-haz writes it.
+
+    Args:
+        imt: intensity measure of levels whose header does not name it.
     """
     rows = [
         (number, [cell.strip() for cell in row])
@@ -378,9 +416,11 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
             for number, row in rows
         ]
     line, header = rows[0]
+    if len(header) > 2 and sum(map(_is_level, header)) > 1:
+        return list(_site_rows(rows, source, imt))
     if len(header) != 2:
         raise InputError(f"{source}, line {line}: {len(header)} columns, not two: {HEADER_HELP}")
-    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}")
+    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}", imt)
     of_periods = _with_unit(header[1]) in _RETURN_PERIODS
     years = None if of_periods else _years(_with_unit(header[1]), f"{source}, line {line}")
     levels, values = [], []
@@ -415,6 +455,40 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     return [hazard_curve(measure, levels, rates, source=source, period_s=period)]
 
 
+def _is_level(name: str) -> bool:
+    return re.fullmatch(rf"{_DECIMAL}(?:[eE][+-]?\d+)?", name) is not None
+
+
+def _site_rows(
+    rows: Sequence[tuple[int, list[str]]], source: str, imt: str | None
+) -> Iterator[HazardCurve]:
+    """Yield the curve of each row below a header of site columns and levels."""
+    line, header = rows[0]
+    kind = _stated_type(imt, f"{source}, line {line}: levels of shaking")
+    levels = [kind.factor * float(name) for name in header if _is_level(name)]
+    for number, row in rows[1:]:
+        where = f"{source}, line {number}"
+        if len(row) != len(header):
+            raise InputError(f"{where}: {len(row)} cells under {len(header)} columns")
+        cells = {name.lower(): cell for name, cell in zip(header, row, strict=True)}
+        rates = [number_at(cells[name.lower()], where) for name in header if _is_level(name)]
+        yield hazard_curve(
+            kind.measure, levels, rates, source=where, period_s=kind.period_s,
+            site=next((cells[name] for name in ("name", "site_id", "site") if name in cells), ""),
+            lon=_coordinate(cells, "lon", 180.0, where), lat=_coordinate(cells, "lat", 90.0, where),
+        )  # fmt: skip
+
+
+def _stated_type(imt: str | None, what: str) -> IntensityType:
+    if imt is None:
+        raise InputError(
+            f"{what} in g: the header does not say whether of PGA or SA; state it as imt PGA or "
+            "SA(1.0)",
+            fields=("imt",),
+        )
+    return openquake_type(imt, "imt")
+
+
 _RETURN_PERIODS = frozenset(
     {"return_period", "return_period_years", "return_period_a", "return_period_yr"}
 )
@@ -430,7 +504,10 @@ def _with_unit(name: str) -> str:
     return f"{text[: unit.start()].strip()}_{spelled}".replace(" ", "_")
 
 
-def _levels(name: str, where: str) -> tuple[str, float, float | None]:
+def _levels(name: str, where: str, imt: str | None) -> tuple[str, float, float | None]:
+    if name == "ground_motion_g":
+        kind = _stated_type(imt, f"{where}: ground motion")
+        return kind.measure, 1.0, kind.period_s
     if name in _LEVELS:
         return *_LEVELS[name], None
     match = _SPECTRAL_COLUMN.fullmatch(name)
@@ -440,7 +517,7 @@ def _levels(name: str, where: str) -> tuple[str, float, float | None]:
 
 
 def _years(name: str, where: str) -> float | None:
-    if name == "annual_rate":
+    if name == "annual_rate" or re.fullmatch("annual_frequency_of_exceed[ae]nce", name):
         return None
     match = _POE.fullmatch(name)
     if match and float(match.group(1)) > 0.0:

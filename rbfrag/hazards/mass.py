@@ -231,7 +231,7 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
         points = ((edges[:-1] + half)[:, None] + half[:, None] * _GAUSS).ravel()
         rates = np.stack([curves[i].annual_rate for i in places.tolist()], axis=1)
         cubic = grid.spread(points)
-        change, touched = grid.spread(points, linear=True) - cubic, (cubic != 0.0).T
+        change, touched = grid.spread(points, linear=True) - cubic, abs(cubic).T
         last = grid.spread(u[-1:], linear=True).toarray()
         for start in range(0, places.size, _SITES_AT_ONCE):
             some = slice(start, start + _SITES_AT_ONCE)
@@ -239,7 +239,7 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
             density = np.maximum(-log_rate(points, 1), 0.0) * np.exp(log_rate(points))
             density *= np.repeat(half, 2)[:, None]
             own, near = cubic @ density, np.zeros(density.shape, dtype=np.bool_)
-            while (new := (touched @ (own < 0.0)) & ~near).any():
+            while (new := (touched @ (own < 0.0) > 0.0) & ~near).any():
                 near |= new
                 points_near = np.flatnonzero(new.any(axis=1))
                 own += change[:, points_near] @ (density * new)[points_near]

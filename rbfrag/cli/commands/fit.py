@@ -86,7 +86,8 @@ def fit(
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
-    The model is stored. The one of the best score on earthquakes left out is the default of its
+    The model is stored in the database; without one the built-in data are fitted and nothing is
+    stored. The one of the best score on earthquakes left out is the default of its
     kind, unless  rbfrag models default NAME  has chosen another.
     """
     from rbfrag.fragility.fit.stored import fit as run
@@ -137,7 +138,9 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
     if why := report.details.get("why_method"):
         yield f"No method was named: {why}."
     what = f"{report.n:,} critical values" if outcomes is None else f"{outcomes:,} outcomes"
-    data = f"It is fitted on {what} of {report.events:,} earthquakes"
+    recorded = report.details.get("recorded_events") != 0
+    events = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
+    data = f"It is fitted on {what} of {report.events:,} {events}"
     score = report.scores.get("log_loss_held_out")
     around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
     if score is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Required, Unpack
 import numpy as np
 
 from rbfrag.db.model_file import ModelRow
+from rbfrag.db.models import refuse_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
@@ -23,6 +24,7 @@ from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.method import Method
 from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.motions.pulses import PULSE
 from rbfrag.solver.results import NUMERICS_VERSION
 
 if TYPE_CHECKING:
@@ -62,6 +64,7 @@ def fit(
     name: str | None = None,
     seed: int = 0,
     estimate_m: bool = False,
+    taken: Collection[str] = (),
     **selection: Unpack[Selection],
 ) -> FitReport:
     """Fit a fragility model as :func:`rbfrag.fit` does, but store nothing.
@@ -70,6 +73,7 @@ def fit(
         source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
             the current folder), or the data themselves (critical values alone carry ``wls`` and
             ``lognormal``), of which the selection chooses nothing.
+        taken: names that the model must not have; rejected before anything is computed.
 
     Returns:
         The report; ``report.model.row`` is what the database stores.
@@ -85,6 +89,8 @@ def fit(
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
+    if name or method:
+        refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif source is None or isinstance(source, str | PathLike):
@@ -97,6 +103,7 @@ def fit(
         source = read_source(source, chosen.block, kind=kind, **selection)
     if method is None and not np.isfinite(source.failed).any():
         chosen = method_of_kind(kind, None, term, estimate_m=estimate_m, reads="critical")
+    refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     return fit_source(
         source, of_term, chosen, kind=kind, name=name, seed=seed, estimate_m=estimate_m,
         selection=selection, why=None if method else _why(chosen, of_term, kind),
@@ -211,6 +218,7 @@ def fit_source(
             "n_excluded_undefined_term": data.n_excluded,
             "n_outside_model": data.n_outside_model,
             "guessed_events": data.guessed_events,
+            "recorded_events": sum(not name.startswith(PULSE) for name in data.event_names),
             "power_law": asdict(law) if law is not None else None,
             "log_correlations": correlations,
             "term_rank": list(correlations),
