@@ -17,6 +17,7 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.sentences import rounded
+from rbfrag.fragility.words import fitted_in_words
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport
@@ -134,13 +135,9 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
         f"Model {report.name} ({report.method} on {report.term}{default}) says the "
         f"{report.model.meaning}."
     )
-    outcomes: Any = report.details.get("n_outcomes")
     if why := report.details.get("why_method"):
         yield f"No method was named: {why}."
-    what = f"{report.n:,} critical values" if outcomes is None else f"{outcomes:,} outcomes"
-    recorded = report.details.get("recorded_events") != 0
-    events = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
-    data = f"It is fitted on {what} of {report.events:,} {events}"
+    data = f"It is {fitted_in_words(report.model.row.diagnostics)}"
     score = report.scores.get("log_loss_held_out")
     around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
     if score is None:

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import rbfrag
-import rbfrag.cli.commands.models
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.errors import DatabaseReadOnlyError, SchemaVersionError
+from rbfrag.errors import SchemaVersionError
 from rbfrag.fragility.fit import fitting
 from rbfrag.fragility.fit.fitting import fit as fit_only
 from rbfrag.fragility.fit.stored import NOT_STORED
@@ -72,8 +71,8 @@ def test_the_built_in_data_are_fitted_where_there_is_no_database(
     assert not Path("rbfrag.db").exists()
     assert (tmp_path / "built-in.db").read_bytes() == before
     assert rbfrag.read_table("motion").equals(rbfrag.read_table("motion", db="built-in.db"))
-    with pytest.raises(DatabaseReadOnlyError, match="the built-in data set is read only"):
-        rbfrag.cli.commands.models.set_default_model("wls-pgv")
+    said = shell("models", "default", "wls-pgv", expect=2).stderr
+    assert "the built-in data set is read only: name the model with --model wls-pgv" in said
 
 
 def test_schema_and_name_are_checked_before_anything_is_computed(
