@@ -110,8 +110,8 @@ def reading(source: Path, what: str) -> Iterator[None]:
         raise InputError(f"{source}: no such file; name a file with {what}") from None
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{source}: not a text file (byte {error.start} is not UTF-8): name {what}, saved as "
-            "UTF-8 (in Excel: CSV UTF-8)"
+            f"{source}: not a text file (byte {error.start} is not {error.encoding.upper()}): name "
+            f"{what}, saved as UTF-8 (in Excel: CSV UTF-8)"
         ) from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypedDict
+
 from sqlalchemy import Connection
 
 from rbfrag.db.motions import motion_rows
@@ -10,8 +12,15 @@ from rbfrag.errors import InputError
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE
 
 
+class MotionChoice(TypedDict):
+    """Which motions a campaign is of."""
+
+    suite: str | None
+    include_structures: bool
+
+
 def horizontal_motions(
-    connection: Connection, *, suite: str | None, include_structures: bool
+    connection: Connection, *, suite: str | None = None, include_structures: bool = False
 ) -> tuple[list[MotionRow], list[str]]:
     """Return the horizontal motions of a campaign by id, and warnings about their sensors.
 
@@ -31,8 +40,8 @@ def horizontal_motions(
     rows = [row for row in every if include_structures or STRUCTURE not in row.flags]
     if not rows:
         raise InputError(
-            f"all {len(every)} horizontal motions in {where} were recorded on structures: set "
-            "include_structures to simulate them, or add others",
+            f"all {len(every)} horizontal motions in {where} were recorded on structures: add "
+            "others, or set include_structures",
             fields=("include_structures",),
         )
     warnings = []

@@ -12,7 +12,6 @@ from itertools import pairwise
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.horizontal_motions import horizontal_motions
 from rbfrag.db.motions import times_of_earthquakes
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.shock_pairs import Pairing
@@ -33,40 +32,30 @@ class MotionPair:
 
 
 def motion_pairs(
-    connection: Connection,
-    *,
-    suite: str | None,
-    seed: int,
-    draws: int,
-    include_structures: bool = False,
-) -> tuple[tuple[MotionPair, ...], list[str]]:
-    """Return the pairs of a campaign, the longest first, and warnings about their sensors.
+    connection: Connection, rows: Sequence[MotionRow], *, seed: int, draws: int
+) -> tuple[MotionPair, ...]:
+    """Return the pairs of a campaign, the longest first.
 
     Args:
-        suite: only the horizontal motions of this suite.
-        include_structures: use motions of sensors on structures, too.
+        rows: its horizontal motions.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:
-        InputError: no such suite, or no two earthquakes.
+        InputError: there are no two earthquakes.
     """
-    rows, warnings = horizontal_motions(
-        connection, suite=suite, include_structures=include_structures
-    )
     real = shocks_of_stations(rows, times_of_earthquakes(connection))
     pairs = (*real, *drawn_pairs(rows, {pair.second.id for pair in real}, seed, draws))
     if not pairs:
-        where = "the database" if suite is None else f"suite {suite!r}"
         raise InputError(
-            f"there are no motions of two earthquakes in {where}: "
-            "add some with a table of metadata that says which they are"
+            "there are no motions of two earthquakes: add some with a table of metadata that says "
+            "which they are"
         )
 
     def longest_first(pair: MotionPair) -> tuple[int, str, str]:
         npts = pair.first.npts + pair.second.npts
         return -npts, pair.second.sha256, pair.first.sha256
 
-    return tuple(sorted(pairs, key=longest_first)), warnings
+    return tuple(sorted(pairs, key=longest_first))
 
 
 def shocks_of_stations(

@@ -12,6 +12,7 @@ from sqlalchemy import Engine
 
 from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.executors.local import check_workers
+from rbfrag.campaign.horizontal_motions import MotionChoice
 from rbfrag.campaign.interrupt import Stopped, never
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
@@ -136,7 +137,9 @@ def simulate(
     check_workers(jobs, scheduler)
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
     suite, vertical = request.get("suite"), request.get("vertical", "without")
-    structures = request.get("include_structures", False)
+    motions: MotionChoice = {
+        "suite": suite, "include_structures": request.get("include_structures", False)
+    }  # fmt: skip
     full_map, histories = request.get("full_map", False), request.get("store_responses")
     given: dict[str, Any] = {
         name: each for name, each in request.items() if each is not None and each is not False
@@ -157,8 +160,7 @@ def simulate(
             sequences_of_kind(kind),
             cases,
             db=db,
-            suite=suite,
-            include_structures=structures,
+            motions=motions,
             seed=seed,
             draws=draws,
             workforce=workforce,
@@ -166,10 +168,7 @@ def simulate(
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            plan = plan_campaign(
-                connection, kind, cases, suite=suite, vertical=vertical,
-                include_structures=structures,
-            )  # fmt: skip
+            plan = plan_campaign(connection, kind, cases, vertical=vertical, **motions)
             todo = remaining_work(connection, plan, wanted)
         settings = {
             "kind": kind,

@@ -212,7 +212,7 @@ def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCur
         about = {**document.get("request", {}), **member, **member.get("metadata", {})}
         name = about["imt"]["value"]
         where = f"{source}, {name}"
-        kind = openquake_type(re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", name), where)
+        kind = _usgs_type(name, where)
         for data in member["data"] if isinstance(member["data"], list) else [member["data"]]:
             if data.get("component", "Total") != "Total":
                 continue  # of one kind of source
@@ -228,27 +228,22 @@ def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCur
 
 
 def _curve(name: str, member: Any, where: str) -> HazardCurve:
-    measure, factor, period = _meaning(name, where)
+    kind = _usgs_type(name, where)
     if not isinstance(member, dict):
         raise InputError(f"{where}: an object with xs and ys is wanted")
     x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
     with np.errstate(over="ignore"):
-        levels = factor * np.exp(x)
-    return hazard_curve(measure, levels, y, source=where, period_s=period)
+        levels = kind.factor * np.exp(x)
+    return hazard_curve(kind.measure, levels, y, source=where, period_s=kind.period_s)
 
 
-def _meaning(name: str, where: str) -> tuple[str, float, float | None]:
-    if name.lower() == "peak ground acceleration":
-        return "pga_g", 1.0, None
-    if name.lower() == "peak ground velocity":
-        return "pgv_m_s", 0.01, None
-    match = _SPECTRAL.fullmatch(name)
-    if match:
-        return "sa_g", 1.0, float(match.group(1))
-    raise InputError(
-        f"{where}: the measure is not known: Peak Ground Acceleration, Peak Ground Velocity and "
-        f"'T Second Spectral Acceleration' are; answered are {ANSWERED}"
+def _usgs_type(name: str, where: str) -> IntensityType:
+    """Return what Peak Ground Acceleration, 1.00 Second Spectral Acceleration or SA1P0 means."""
+    name = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}.get(
+        name.lower(), name
     )
+    name = re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", _SPECTRAL.sub(r"SA(\1)", name))
+    return openquake_type(name, where)
 
 
 def _numbers(value: Any, key: str, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -328,10 +323,8 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 rates,
                 source=where,
                 period_s=kind.period_s,
-                site=place_of.get("custom_site_id", place_of.get("site_id", "")),
-                lon=_coordinate(place_of, "lon", 180.0, where),
-                lat=_coordinate(place_of, "lat", 90.0, where),
                 statistic=statistic,
+                **_site_of(place_of, where),
             )
         )
     if not curves:
@@ -359,6 +352,13 @@ def _stated(name: str, head: str, source: str, default: str | None = None) -> st
             return default
         raise InputError(f"{source}, line 1: {name} is not stated")
     return next(group for group in match.groups() if group is not None)
+
+
+def _site_of(cells: dict[str, str], where: str) -> dict[str, Any]:
+    """Return name and coordinates of a row's site."""
+    named = (cells[name] for name in ("custom_site_id", "site_id", "name", "site") if name in cells)
+    lon, lat = (_coordinate(cells, *each, where) for each in (("lon", 180.0), ("lat", 90.0)))
+    return {"site": next(named, ""), "lon": lon, "lat": lat}
 
 
 def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> float | None:
@@ -470,12 +470,11 @@ def _site_rows(
         where = f"{source}, line {number}"
         if len(row) != len(header):
             raise InputError(f"{where}: {len(row)} cells under {len(header)} columns")
-        cells = {name.lower(): cell for name, cell in zip(header, row, strict=True)}
-        rates = [number_at(cells[name.lower()], where) for name in header if _is_level(name)]
+        cells = dict(zip(header, row, strict=True))
+        rates = [number_at(cells[name], where) for name in header if _is_level(name)]
         yield hazard_curve(
             kind.measure, levels, rates, source=where, period_s=kind.period_s,
-            site=next((cells[name] for name in ("name", "site_id", "site") if name in cells), ""),
-            lon=_coordinate(cells, "lon", 180.0, where), lat=_coordinate(cells, "lat", 90.0, where),
+            **_site_of(cells, where),
         )  # fmt: skip
 
 

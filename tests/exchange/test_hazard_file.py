@@ -135,7 +135,7 @@ def test_two_columns_as_people_write_them(
         ("{}", "one member a measure"),
         ('{"Peak Ground Acceleration": {"xs": [0.0, "a"], "ys": [1, 2]}}', r"xs\[1\] = 'a'"),
         ('{"Peak Ground Acceleration": {"xs": [0.0, 1.0], "ys": [1]}}', "2 levels and 1 rates"),
-        ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "the measure is not known"),
+        ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "measure 'Arias' is not known"),
     ],
 )  # fmt: skip
 def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
@@ -148,7 +148,7 @@ def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
 def test_no_such_file_and_no_text(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_hazard_curves(tmp_path / "none.csv")
-    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfd\x00")
     with pytest.raises(InputError, match="byte 0 is not UTF-8"):
         read_hazard_curves(tmp_path / "b.csv")
     with pytest.raises(InputError, match="folder"):

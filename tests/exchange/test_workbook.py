@@ -236,7 +236,10 @@ def test_an_open_document_spreadsheet_is_answered_as_a_workbook_is(tmp_path: Pat
     assert (
         (told["rows"], told["without_answer"]) == (same["rows"], same["without_answer"]) == (3, 1)
     )
-    first, second = (read_columns(tmp_path / name) for name in ("a.csv", "b.csv"))
+    first, second = (
+        read_columns(tmp_path / name, ("probability",), texts=("block_id",))
+        for name in ("a.csv", "b.csv")
+    )
     assert [*first["block_id"]] == [*second["block_id"]]
     np.testing.assert_array_equal(
         np.asarray(first["probability"]), np.asarray(second["probability"])

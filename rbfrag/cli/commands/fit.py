@@ -30,7 +30,7 @@ class Data:
     """What is fitted."""
 
     suite: options.Suite = None
-    include_structures: options.IncludeStructures = False
+    include_structures: bool = option(options.INCLUDE_STRUCTURES, False)
     vertical: str = option("Combinations without vertical motion, with it, or both.", "without")
     doubtful_pgd: bool = option(
         "Let pgd_tm read the PGD of records flagged final_velocity or "

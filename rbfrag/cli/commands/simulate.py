@@ -141,7 +141,7 @@ def simulate(
     *,
     workers: WorkerOptions,
     suite: options.Suite = None,
-    include_structures: options.IncludeStructures = False,
+    include_structures: bool = option(options.INCLUDE_STRUCTURES, False),
     kind: str = option(
         "What the blocks do: toppling, rocking, slumping, confined_toppling or sliding.", "toppling"
     ),

@@ -77,13 +77,7 @@ AllowPartial = Annotated[
     ),
 ]
 
-IncludeStructures = Annotated[
-    bool,
-    typer.Option(
-        "--include-structures",
-        help="Use records of sensors on structures (flag structure), excluded by default.",
-    ),
-]
+INCLUDE_STRUCTURES = "Use records of sensors on structures (flag structure), excluded by default."
 Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
 
 Block = Annotated[

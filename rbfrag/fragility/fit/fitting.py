@@ -89,8 +89,7 @@ def fit(
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
-    if name or method:
-        refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
+    refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif source is None or isinstance(source, str | PathLike):
@@ -103,7 +102,6 @@ def fit(
         source = read_source(source, chosen.block, kind=kind, **selection)
     if method is None and not np.isfinite(source.failed).any():
         chosen = method_of_kind(kind, None, term, estimate_m=estimate_m, reads="critical")
-    refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     return fit_source(
         source, of_term, chosen, kind=kind, name=name, seed=seed, estimate_m=estimate_m,
         selection=selection, why=None if method else _why(chosen, of_term, kind),
