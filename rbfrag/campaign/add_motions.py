@@ -38,13 +38,11 @@ from rbfrag.motions.text.header_check import doubts
 AS_SUPPLIED = "as supplied"
 
 _GUESSED = (
-    f"are assumed horizontal though their names state no direction (flag "
-    f"{DIRECTION_GUESSED}), so that a vertical one would be simulated as a horizontal; give "
-    "is_vertical in a table of metadata"
+    f"are assumed horizontal though their names state no direction (flag {DIRECTION_GUESSED}): a "
+    "vertical one would be simulated as a horizontal; give is_vertical in a table of metadata"
 )
 _ON_STRUCTURE = (
-    f"were recorded on a structure (flag {STRUCTURE}) and are excluded from campaigns and fits by "
-    "default"
+    f"were recorded on a structure (flag {STRUCTURE}) and stay out of campaigns and fits"
 )
 
 

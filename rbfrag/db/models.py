@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any
 
 from sqlalchemy import Connection, Select, and_, select
@@ -15,11 +14,12 @@ from rbfrag.db.model_file import (
     decode_model,
     encode_model,
     recommended,
+    refuse_taken,
     unknown_model,
     with_defaults,
 )
 from rbfrag.db.schema import fragility_model
-from rbfrag.errors import DatabaseError, InputError, UnknownModelError
+from rbfrag.errors import DatabaseError, UnknownModelError
 
 
 def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) -> ModelRow:
@@ -50,15 +50,6 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
         _clear_default(connection, row.kind)
     insert_row(connection, fragility_model, values)
     return load_model(connection, row.name)
-
-
-def refuse_taken(name: str, taken: Collection[str]) -> None:
-    """Reject a name that a stored model has."""
-    if name in taken:
-        raise InputError(
-            f"there is a model {name!r} already: give it another name, or set replace",
-            fields=("replace",),
-        )
 
 
 def names_of_models(connection: Connection) -> list[str]:

@@ -239,9 +239,8 @@ def _curve(name: str, member: Any, where: str) -> HazardCurve:
 
 def _usgs_type(name: str, where: str) -> IntensityType:
     """Return what Peak Ground Acceleration, 1.00 Second Spectral Acceleration or SA1P0 means."""
-    name = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}.get(
-        name.lower(), name
-    )
+    peaks = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}
+    name = peaks.get(name.lower(), name)
     name = re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", _SPECTRAL.sub(r"SA(\1)", name))
     return openquake_type(name, where)
 
@@ -480,11 +479,8 @@ def _site_rows(
 
 def _stated_type(imt: str | None, what: str) -> IntensityType:
     if imt is None:
-        raise InputError(
-            f"{what} in g: the header does not say whether of PGA or SA; state it as imt PGA or "
-            "SA(1.0)",
-            fields=("imt",),
-        )
+        text = f"{what} in g: the header does not say whether of PGA or SA; state it as imt PGA"
+        raise InputError(f"{text} or SA(1.0)", fields=("imt",))
     return openquake_type(imt, "imt")
 
 

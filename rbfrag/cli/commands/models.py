@@ -88,11 +88,11 @@ def set_default_model(name: Name, db: options.Db = None) -> None:
     from rbfrag.db.engine import opened_database
     from rbfrag.db.location import data_place
     from rbfrag.db.models import set_default
-    from rbfrag.errors import DatabaseReadOnlyError
+    from rbfrag.errors import InputError
 
     place, built_in = data_place(db)
     if built_in:
-        raise DatabaseReadOnlyError(
+        raise InputError(
             f"the built-in data set is read only: name the model with --model {name}, or copy "
             f"{place} to rbfrag.db, run  rbfrag db upgrade  and choose the default of that"
         )

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Required, Unpack
 
 import numpy as np
 
-from rbfrag.db.model_file import ModelRow
-from rbfrag.db.models import refuse_taken
+from rbfrag.db.model_file import ModelRow, refuse_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
@@ -185,12 +184,8 @@ def fit_source(
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"
-    warnings = [
-        *_older(table),
-        *_data_warnings(data, source.structures),
-        *result.warnings,
-        *unknown,
-    ]
+    of_data = _data_warnings(data, source.structures)
+    warnings = [*_older(table), *of_data, *result.warnings, *unknown]
     row = ModelRow(
         name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,

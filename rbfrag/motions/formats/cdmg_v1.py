@@ -14,7 +14,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.ground_motion import LOCATION
 from rbfrag.motions.text.file import field_layout
 from rbfrag.motions.text.record_file import (
     Count,
@@ -38,7 +37,6 @@ LAST_DIGIT_S = 1.000001e-3
 
 _BLOCK = re.compile(r"uncorrected accelerogram data", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S+)", re.IGNORECASE)
-_LOCATION = re.compile(r"^\s*chan\s*\d+\s*:.*\blocation:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^(station\s+no\..*)", re.IGNORECASE)
 _POINTS = re.compile(r"no\.\s*of points\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"record length\s*=\s*(\S+)\s*sec", re.IGNORECASE)
@@ -98,7 +96,6 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
     if not values.any():
         file.missing_samples(count, values.size)
     station = file.optional(span, _STATION)
-    location = file.label(span, _LOCATION)
     return ParsedTrace(
         values,
         dt,
@@ -110,7 +107,7 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
         event=file.lines[span.start + 1].strip() if len(span) > 1 else "",
         start=file.label(span, _TRIGGER),
         is_corrected=False,
-        remarks=(LOCATION + location,) if location else (),
+        remarks=file.location(span),
         durations=(duration,),
         peak=peak_of(file.optional(span, _PEAK)),
     )

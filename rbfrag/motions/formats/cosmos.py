@@ -14,8 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.ground_motion import LOCATION
+from rbfrag.motions.direction import is_vertical_name
 from rbfrag.motions.text.file import field_layout, finite_number
 from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
@@ -35,7 +34,6 @@ _EVENT = re.compile(r"^\s*Record of\s+(\S.*)", re.IGNORECASE)
 _START = re.compile(r"^\s*Rcrd start time:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^\s*Statn No:.*\bCode:\s*(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*Sta Chan\s+[^:]*:\s*([^(]*)", re.IGNORECASE)
-_LOCATION = re.compile(r"^\s*Sta Chan\s+[^:]*:.*\bLocation:\s*(\S.*)", re.IGNORECASE)
 _SCNL = re.compile(r"<SCNL>\s*[^.\s]+\.([^.\s]+)\.")
 _PEAK = re.compile(r"^Processed:.*\bMax\s*=\s*(\S+\s+[^\s,]+)", re.IGNORECASE)
 _RECORD = re.compile(r"^\|.*\bRcrdId:\s*(\S+)", re.IGNORECASE)
@@ -69,17 +67,14 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
     values = file.fixed_width(data, series.line + 1, _layout(file, series), "acceleration")
     direction = file.label(header, _CHANNEL)
     component = file.label(header, _SCNL) or direction
-    azimuth, vertical = azimuth_deg(direction or component), is_vertical_name(direction)
-    if vertical is None:
-        vertical = is_vertical_name(component)
     record = file.label(header, _RECORD)
-    location = file.label(header, _LOCATION)
     return ParsedTrace(
         values,
         dt,
         unit,
         count,
         component,
+        axis=component if is_vertical_name(direction) is None else direction,
         station=file.label(header, _STATION),
         event=file.label(header, _EVENT),
         # NN.00725272.CI.MLAC.HNE.-- names one of three channels
@@ -88,8 +83,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         else None,
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
-        remarks=(LOCATION + location,) if location else (),
-        labels={"orientation_deg": azimuth, "is_vertical": vertical},
+        remarks=file.location(header),
         durations=(file.optional(here, _SECONDS),),
         peak=peak_of(file.optional(header, _PEAK)),
     )
