@@ -246,7 +246,7 @@ def test_an_open_document_spreadsheet_is_answered_as_a_workbook_is(tmp_path: Pat
     )
     with pytest.raises(InputError, match="there is no sheet 'third'; the sheets are blocks, other"):
         read_blocks(source, sheet="third")
-    with pytest.raises(InputError, match="the suffix '.ods' is none of"):
+    with pytest.raises(InputError, match=r"the suffix '\.ods' is none of"):
         write_block_table({"kr": np.ones(1)}, tmp_path / "out.ods")
     source.write_bytes(b"PK\x03\x04 no archive")
     with pytest.raises(InputError, match=r"spreadsheet \(.ods\), or a damaged one"):
