@@ -141,8 +141,8 @@ def plan_campaign(
     rows, warnings = horizontal_motions(
         connection, suite=suite, include_structures=include_structures
     )
-    found = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
-    pairs = [found[row.id] for row in rows if row.id in found]
+    companions = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
+    pairs = [companions[row.id] for row in rows if row.id in companions]
     fitting = {each.motion_id: each for each in pairs if each.vertical_id is not None}
     lacking = [each.reason for each in pairs if each.vertical_id is None]
     if vertical != "without" and not fitting:
