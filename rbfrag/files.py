@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import json
@@ -33,8 +34,14 @@ _ARCHIVES = (
 )  # fmt: skip
 """How packed files begin."""
 
-WORKBOOK = ".xlsx"
-"""What Excel workbooks end in: these are zip files."""
+WORKBOOKS = (".xlsx", ".ods")
+"""What workbooks end in: these are zip files."""
+
+
+def encoding_of(start: bytes) -> str:
+    """Return the encoding of a text by its first bytes: UTF-16 with its mark, or UTF-8."""
+    marked = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return "utf-16" if marked else "utf-8-sig"
 
 
 def packed_as(start: bytes) -> str | None:
@@ -95,7 +102,7 @@ def reading(source: Path, what: str) -> Iterator[None]:
             raise InputError(f"{source} is {NO_FILE}: save {what} to a file, and name that")
         with source.open("rb") as file:
             packed = packed_as(file.read(6))
-        workbook = source.suffix.lower() == WORKBOOK
+        workbook = source.suffix.lower() in WORKBOOKS
         if packed is not None and not (workbook and packed == "zip"):
             raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
         yield
@@ -103,8 +110,8 @@ def reading(source: Path, what: str) -> Iterator[None]:
         raise InputError(f"{source}: no such file; name a file with {what}") from None
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{source}: not a text file (byte {error.start} is not UTF-8): name {what}, saved as "
-            "UTF-8 (in Excel: CSV UTF-8)"
+            f"{source}: not a text file (byte {error.start} is not {error.encoding.upper()}): name "
+            f"{what}, saved as UTF-8 (in Excel: CSV UTF-8)"
         ) from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None
@@ -128,7 +135,7 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
             raise InputError(
                 f"{source} is larger than {most_bytes} bytes: {what} cannot be so long"
             )
-        text = content.decode("utf-8-sig")
+        text = content.decode(encoding_of(content))
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
         raise InputError(f"{source} is empty: name a file with {what}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
@@ -31,10 +32,18 @@ from rbfrag.motions.processing import (
     processed,
     says_corrected,
 )
-from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE, is_on_structure, quality_flags
 from rbfrag.motions.text.header_check import doubts
 
 AS_SUPPLIED = "as supplied"
+
+_GUESSED = (
+    f"are assumed horizontal though their names state no direction (flag {DIRECTION_GUESSED}): a "
+    "vertical one would be simulated as a horizontal; give is_vertical in a table of metadata"
+)
+_ON_STRUCTURE = (
+    f"were recorded on a structure (flag {STRUCTURE}) and stay out of campaigns and fits"
+)
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,8 @@ class AddReport(Tabular):
         failed: files that were left out, each with its reason.
         warnings: sentences about what was added: the same samples in two files, one trace
             stored with two kinds of processing, a recording with several sampling intervals, a
-            header that disagrees with its samples.
+            header that disagrees with its samples, a direction that is guessed, a sensor on a
+            structure.
         not_read: columns of the metadata that nothing is read from.
     """
 
@@ -101,6 +111,7 @@ class _Additions:
     failed: list[FailedFile] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     place: dict[int, str] = field(default_factory=dict)
+    doubts: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
 
 @dataclass(frozen=True)
@@ -203,6 +214,7 @@ def add_motions(
                 run.failed.append(FailedFile(str(file), _reason(error)))
             else:
                 _take_note(run, stored)
+                _take_note_of_sensors(run, file, traces)
                 remarks = [each for trace in traces for each in trace.motion.remarks]
                 run.warnings += dict.fromkeys(f"{file}: {each}" for each in doubts(remarks))
             if on_file is not None:
@@ -210,6 +222,10 @@ def add_motions(
         if engine is not None:
             with engine.connect() as connection:
                 run.warnings += _mixed_intervals(connection, run.place)
+    run.warnings += [
+        f"{len(names)} traces {doubt}: {', '.join(names[:5])}{', …' if len(names) > 5 else ''}"
+        for doubt, names in run.doubts.items()
+    ]
     return AddReport(*(tuple(getattr(run, each.name)) for each in fields(AddReport)))
 
 
@@ -226,6 +242,18 @@ def _take_note(run: _Additions, stored: list[_Stored]) -> None:
             )
         elif one.doubt:
             run.warnings.append(one.doubt)
+
+
+def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> None:
+    for trace in traces:
+        motion = trace.motion
+        name = f"{file.name}#{motion.trace_index} {motion.component}".rstrip()
+        if trace.other_direction:
+            run.warnings.append(f"{file}: {trace.other_direction}: the metadata are used")
+        if trace.is_vertical is None:
+            run.doubts[_GUESSED].append(name)
+        if is_on_structure(motion):
+            run.doubts[_ON_STRUCTURE].append(f"{name} at {motion.location}")
 
 
 def _take_note_of_units(
@@ -309,7 +337,7 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
         earthquake = EarthquakeInfo(event_id=motion.event, name=motion.event)
         flags.append("event_guessed")
     if trace.is_vertical is None:
-        flags.append("direction_guessed")
+        flags.append(DIRECTION_GUESSED)
     words = (
         stated.processing
         or run.processing

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from sqlalchemy import Connection
 
-from rbfrag.db.motions import motion_rows, times_of_earthquakes
+from rbfrag.db.motions import times_of_earthquakes
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.shock_pairs import Pairing
 from rbfrag.errors import InputError
@@ -32,25 +32,23 @@ class MotionPair:
 
 
 def motion_pairs(
-    connection: Connection, *, suite: str | None, seed: int, draws: int
+    connection: Connection, rows: Sequence[MotionRow], *, seed: int, draws: int
 ) -> tuple[MotionPair, ...]:
     """Return the pairs of a campaign, the longest first.
 
     Args:
-        suite: only the horizontal motions of this suite.
+        rows: its horizontal motions.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:
-        InputError: no such suite, or no two earthquakes.
+        InputError: there are no two earthquakes.
     """
-    rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     real = shocks_of_stations(rows, times_of_earthquakes(connection))
     pairs = (*real, *drawn_pairs(rows, {pair.second.id for pair in real}, seed, draws))
     if not pairs:
-        where = "the database" if suite is None else f"suite {suite!r}"
         raise InputError(
-            f"there are no motions of two earthquakes in {where}: "
-            "add some with a table of metadata that says which they are"
+            "there are no motions of two earthquakes: add some with a table of metadata that says "
+            "which they are"
         )
 
     def longest_first(pair: MotionPair) -> tuple[int, str, str]:

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 from sqlalchemy import Connection
 
+from rbfrag.campaign.horizontal_motions import horizontal_motions
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.worker import PlannedCase, Task
 from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
 from rbfrag.db.keys import combination_key
-from rbfrag.db.motions import motion_rows
 from rbfrag.db.responses import known_responses
 from rbfrag.db.rows import MotionRow, Vertical
 from rbfrag.db.spectra import SpectrumKey, spectrum_values
@@ -67,7 +67,7 @@ class CampaignPlan:
     Args:
         motions: the longest records first, so that no worker is left with one at the end.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
-        warnings: sentences about these.
+        warnings: sentences about these and about sensors.
     """
 
     kind: str
@@ -120,6 +120,7 @@ def plan_campaign(
     *,
     suite: str | None,
     vertical: Vertical = "without",
+    include_structures: bool = False,
 ) -> CampaignPlan:
     """Return every combination: horizontal motions x vertical or not x polarity x cases.
 
@@ -127,6 +128,7 @@ def plan_campaign(
         cases: the blocks and what counts as failure, from the kind.
         suite: only the horizontal motions of this suite; their verticals need not be in it.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
+        include_structures: use motions of sensors on structures, too.
 
     Raises:
         InputError: no such suite, no horizontal motion, none with a vertical one where it is
@@ -136,21 +138,18 @@ def plan_campaign(
         raise InputError(
             f"vertical must be without, with or both, not {vertical!r}", fields=("vertical",)
         )
-    rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
-    if not rows:
-        where = "the database" if suite is None else f"suite {suite!r}"
-        raise InputError(
-            f"there is no horizontal motion in {where}: rbfrag motions add PATH  brings some"
-        )
-    pairs = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
-    fitting = {each.motion_id: each for each in pairs.values() if each.vertical_id is not None}
-    lacking = [each.reason for each in pairs.values() if each.vertical_id is None]
+    rows, warnings = horizontal_motions(
+        connection, suite=suite, include_structures=include_structures
+    )
+    companions = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
+    pairs = [companions[row.id] for row in rows if row.id in companions]
+    fitting = {each.motion_id: each for each in pairs if each.vertical_id is not None}
+    lacking = [each.reason for each in pairs if each.vertical_id is None]
     if vertical != "without" and not fitting:
         raise InputError(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
             f"{_first(lacking)}; add the vertical components, or leave them out"
         )
-    warnings = []
     if lacking:
         left = "left out" if vertical == "with" else "shaken without one only"
         warnings.append(

@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import Engine
 
 from rbfrag.campaign.carry_out import Workforce
+from rbfrag.campaign.horizontal_motions import MotionChoice, horizontal_motions
 from rbfrag.campaign.kind import Case, Sequences
 from rbfrag.campaign.kinds import campaign_of_kind
 from rbfrag.campaign.motion_pairs import MotionPair, motion_pairs
@@ -87,7 +88,7 @@ def simulate_sequences(
     cases: Sequence[Case],
     *,
     db: str | os.PathLike[str] | None,
-    suite: str | None,
+    motions: MotionChoice,
     seed: int,
     draws: int,
     workforce: Workforce,
@@ -96,6 +97,7 @@ def simulate_sequences(
 
     Args:
         cases: what the campaign is asked for: the blocks of slumps, and what counts as failure.
+        motions: which motions it is of.
         seed: of the pairs that are drawn.
         draws: first motions that are drawn for each second one.
     """
@@ -105,7 +107,8 @@ def simulate_sequences(
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            pairs = motion_pairs(connection, suite=suite, seed=seed, draws=draws)
+            rows, warnings = horizontal_motions(connection, **motions)
+            pairs = motion_pairs(connection, rows, seed=seed, draws=draws)
             plan = [(pair, _tasks(pair, kind, blocks)) for pair in pairs]
             keys = [task.natural_key for _, tasks in plan for task in tasks]
             known = known_shock_pairs(connection, keys)
@@ -124,14 +127,15 @@ def simulate_sequences(
             return len(results.records)
 
         settings = {
-            "kind": kind.kind, "suite": suite, "sequence": True, "seed": seed, "draws": draws,
+            "kind": kind.kind, "suite": motions["suite"], "sequence": True, "seed": seed,
+            "draws": draws,
         }  # fmt: skip
         workforce.carry_out(
             engine, settings, run_pair, _work(engine, kind.kind, todo), len(todo), store,
             total=len(keys), resumed=len(known), started=started,
         )  # fmt: skip
         with engine.connect() as connection:
-            rows = stored_shock_pairs(connection, keys)
+            answers = stored_shock_pairs(connection, keys)
     of_station = sum(pair.pairing == "station" for pair in pairs)
     drawn = len(pairs) - of_station
     warning = (
@@ -145,12 +149,12 @@ def simulate_sequences(
         runs=runs,
         seconds=time.perf_counter() - started,
         resumed=len(known),
-        warnings=(warning,) if drawn else (),
+        warnings=(*warnings, *([warning] if drawn else ())),
         sequence=SequenceReport(
             seed=seed,
             station_pairs=of_station,
             drawn_pairs=drawn,
-            conditional=conditional_shares(rows, kind.measure, limits),
+            conditional=conditional_shares(answers, kind.measure, limits),
         ),
     )
 

@@ -12,6 +12,7 @@ from sqlalchemy import Engine
 
 from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.executors.local import check_workers
+from rbfrag.campaign.horizontal_motions import MotionChoice
 from rbfrag.campaign.interrupt import Stopped, never
 from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
@@ -64,6 +65,7 @@ class CampaignOptions(TypedDict, total=False):
     family: Sequence[Any] | None
     restitution_factors: Sequence[float] | None
     vertical: Vertical
+    include_structures: bool
     grid: int | Sequence[float] | None
     store_responses: Sequence[float | Literal["critical"]] | None
     full_map: bool
@@ -107,6 +109,7 @@ def simulate(
             (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
         vertical: ``without`` vertical motion (if left out), ``with`` that of the same recording,
             or ``both``.
+        include_structures: use motions of sensors on structures, which are excluded by default.
         grid: toppling: run more blocks for themselves: at these k_r/PGA, or at that many from
             0.99 down to 0.01, equally spaced in the logarithm.
         store_responses: toppling: keep the motion in time of blocks of these k_r/PGA;
@@ -134,6 +137,9 @@ def simulate(
     check_workers(jobs, scheduler)
     workforce = Workforce(jobs, scheduler, on_progress, stopped)
     suite, vertical = request.get("suite"), request.get("vertical", "without")
+    motions: MotionChoice = {
+        "suite": suite, "include_structures": request.get("include_structures", False)
+    }  # fmt: skip
     full_map, histories = request.get("full_map", False), request.get("store_responses")
     given: dict[str, Any] = {
         name: each for name, each in request.items() if each is not None and each is not False
@@ -154,7 +160,7 @@ def simulate(
             sequences_of_kind(kind),
             cases,
             db=db,
-            suite=suite,
+            motions=motions,
             seed=seed,
             draws=draws,
             workforce=workforce,
@@ -162,7 +168,7 @@ def simulate(
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            plan = plan_campaign(connection, kind, cases, suite=suite, vertical=vertical)
+            plan = plan_campaign(connection, kind, cases, vertical=vertical, **motions)
             todo = remaining_work(connection, plan, wanted)
         settings = {
             "kind": kind,

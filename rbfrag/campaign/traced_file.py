@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.archive import is_there
+from rbfrag.motions.direction import is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata
 from rbfrag.motions.recognise import read_motions
@@ -32,9 +33,25 @@ class Trace:
 
     @property
     def is_vertical(self) -> bool | None:
-        """Whether it is a vertical component; None when neither file nor metadata say."""
-        stated = self.stated.is_vertical
-        return self.motion.is_vertical if stated is None else stated
+        """Whether it is a vertical component; None when neither file nor metadata say.
+
+        Metadata take precedence: what they state, then the name that they give the component.
+        """
+        stated, named = self.stated.is_vertical, is_vertical_name(self.stated.component)
+        by_metadata = named if stated is None else stated
+        return self.motion.is_vertical if by_metadata is None else by_metadata
+
+    @property
+    def other_direction(self) -> str:
+        """Warning that metadata and file disagree on the direction; empty where they do not."""
+        if self.motion.is_vertical in (None, self.is_vertical):
+            return ""
+        return (
+            f"line {self.stated.line} of the metadata says "
+            f"{'vertical' if self.is_vertical else 'horizontal'} of trace "
+            f"{self.motion.trace_index} ({self.motion.component}), which the file's own header "
+            "does not"
+        )
 
 
 def read_traces(
@@ -97,7 +114,9 @@ def read_traces(
         for motion in motions
     ]
     for trace in traces:
-        _refuse_other_direction(file, trace)
+        if trace.stated.trace_index is None and len(traces) > 1 and trace.other_direction:
+            # a row about a whole file says nothing about the direction of one of its traces
+            raise MotionFileError(file, f"{trace.other_direction}: give each trace a row")
     return traces
 
 
@@ -156,17 +175,6 @@ def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
                 f"lines {lines} of the metadata state {name} {shown} for this one file: correct "
                 "the metadata",
             )
-
-
-def _refuse_other_direction(file: Path, trace: Trace) -> None:
-    stated, in_file = trace.stated.is_vertical, trace.motion.is_vertical
-    if stated is not None and in_file is not None and stated != in_file:
-        says = {True: "vertical", False: "horizontal"}
-        raise MotionFileError(
-            file,
-            f"trace {trace.motion.trace_index} ({trace.motion.component}) is {says[in_file]}, but "
-            f"line {trace.stated.line} of the metadata says {says[stated]}: correct the metadata",
-        )
 
 
 def _known_unit(text: str | None) -> str | None:

@@ -83,6 +83,24 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     return Path(name)
 
 
+def is_unnamed(db: str | PathLike[str] | None) -> bool:
+    """Return whether no database is named, by `db` or by the environment."""
+    return db is None and not os.environ.get("RBFRAG_DB")
+
+
+def data_place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
+    """Return where the data to read are, and whether these are the built-in data, read only.
+
+    Args:
+        db: as for :func:`locate`; the built-in data answer where none is named and the current
+            folder holds none.
+    """
+    place, built_in = locate(db), reference_file()
+    if built_in is not None and is_unnamed(db) and not Path(place).exists():
+        return built_in, True
+    return place, False
+
+
 def reference_file() -> Path | None:
     """Return the shipped reference database, or None where none is shipped."""
     return REFERENCE if REFERENCE.is_file() else None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
@@ -73,6 +73,15 @@ _SELECT = f"SELECT {', '.join(STORED)} FROM fragility_model"
 
 _TYPES: Mapping[str, ValueType] = {"is_default": "boolean", "form": "integer"}
 """Types of the columns for the digest; all others are texts."""
+
+
+def refuse_taken(name: str, taken: Collection[str]) -> None:
+    """Reject a name that a stored model has."""
+    if name in taken:
+        raise InputError(
+            f"there is a model {name!r} already: give it another name, or set replace",
+            fields=("replace",),
+        )
 
 
 def encode_model(row: ModelRow) -> dict[str, Any]:

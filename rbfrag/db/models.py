@@ -14,11 +14,12 @@ from rbfrag.db.model_file import (
     decode_model,
     encode_model,
     recommended,
+    refuse_taken,
     unknown_model,
     with_defaults,
 )
 from rbfrag.db.schema import fragility_model
-from rbfrag.errors import DatabaseError, InputError, UnknownModelError
+from rbfrag.errors import DatabaseError, UnknownModelError
 
 
 def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) -> ModelRow:
@@ -40,11 +41,8 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     values["created"] = row.created or utc_now()
     query = select(fragility_model.c.name, fragility_model.c.is_default)
     chosen = {other.name: bool(other.is_default) for other in connection.execute(query)}
-    if row.name in chosen and not replace:
-        raise InputError(
-            f"there is a model {row.name!r} already: give it another name, or set replace",
-            fields=("replace",),
-        )
+    if not replace:
+        refuse_taken(row.name, chosen)
     values["is_default"] = row.is_default or chosen.get(row.name, False)
     # first of all: a damaged model may be replaced, but not changed
     delete_rows(connection, fragility_model, fragility_model.c.name == row.name)
@@ -52,6 +50,11 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
         _clear_default(connection, row.kind)
     insert_row(connection, fragility_model, values)
     return load_model(connection, row.name)
+
+
+def names_of_models(connection: Connection) -> list[str]:
+    """Return the names of the stored models, sorted."""
+    return sorted(connection.scalars(select(fragility_model.c.name)))
 
 
 def model_rows(connection: Connection) -> list[ModelRow]:
@@ -76,7 +79,7 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
         stored = connection.execute(query).one_or_none()
         default = None if stored is None else _with_default(connection, decode_model(stored))
     if default is None:
-        known = sorted(connection.scalars(select(fragility_model.c.name)))
+        known = names_of_models(connection)
         place = database_label(connection.engine.url)
         raise UnknownModelError(unknown_model(name, known, place))
     return default

@@ -27,8 +27,10 @@ from rbfrag.db.schema import (
 from rbfrag.db.schema import suite as suite_table
 from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
-from rbfrag.motions.quality import PGD_IN_DOUBT
+from rbfrag.motions.quality import PGD_IN_DOUBT, STRUCTURE
 from rbfrag.solver.results import NUMERICS_VERSION
+
+_ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ def combination_table(
     rotation_deg: float | None = None,
     numerics_version: str | None = None,
     doubtful_pgd: bool = False,
+    include_structures: bool = False,
 ) -> CombinationTable:
     """Return the combinations of a kind, with critical values and their motions' intensity.
 
@@ -111,6 +114,8 @@ def combination_table(
     if vertical != "both":
         column = combination.c.vertical_motion_id
         query = query.where(column.is_(None) if vertical == "without" else column.is_not(None))
+    if not include_structures:
+        query = query.where(~_ON_STRUCTURE)
     if suite is not None:
         suite_id = require_suite(connection, suite)
         query = query.join(
@@ -192,6 +197,16 @@ class OutcomeGrid:
     theta_n: NDArray[np.float64]
     displacement_m: NDArray[np.float64]
     sensitive: NDArray[np.float64]
+
+
+def motions_on_structures(connection: Connection, kind: str) -> int:
+    """Return the number of motions recorded on structures that a kind's combinations have."""
+    query = (
+        select(func.count(combination.c.motion_id.distinct()))
+        .join(motion, motion.c.id == combination.c.motion_id)
+        .where(combination.c.kind == kind, _ON_STRUCTURE)
+    )
+    return int(connection.scalar(query) or 0)
 
 
 def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGrid:

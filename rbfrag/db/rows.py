@@ -22,12 +22,14 @@ class Selection(TypedDict, total=False):
             and of kinds that know none.
         doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
             final velocity or displacement; by default it is NaN, so that no fit reads it.
+        include_structures: True to read motions of sensors on structures, too.
     """
 
     suite: str | None
     vertical: Vertical
     rotation_deg: float | None
     doubtful_pgd: bool
+    include_structures: bool
 
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ from rbfrag.db.data_dictionary import (
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.frames import TABLES, chosen_columns, frames
+from rbfrag.db.location import data_place
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
 from rbfrag.exchange.tables.parts import pyarrow
@@ -237,7 +238,7 @@ def read_table(
         table: ``earthquake``, ``recording``, ``motion``, ``suite``, ``suite_motion``,
             ``toppling_spectrum``, ``campaign``, ``combination``, ``outcome_interval``,
             ``simulation``, ``response``, ``shock_pair`` or ``fragility_model``.
-        db: the database (path, URL, or None for the default).
+        db: the database (path, URL, or None for the default, else the built-in data).
         columns: only these columns.
         arrays: include samples [g] and histories, as one float64 array a row.
 
@@ -248,5 +249,6 @@ def read_table(
     import pandas as pd
 
     chosen = chosen_columns(table, columns, arrays=arrays)
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+    place, _ = data_place(db)
+    with opened_database(place, read_only=True) as engine, engine.connect() as connection:
         return pd.concat(frames(connection, table, chosen), ignore_index=True)

@@ -204,7 +204,8 @@ class _Request(NamedTuple):
         )
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
         rows = given_blocks(given, blocks)
-        table, (measure, _) = rows.whole(EACH_NEEDED), requested_measure(request.get("imt", "PGV"))
+        table = rows.whole(EACH_NEEDED)
+        measure, _ = requested_measure(request.get("imt", "PGV"), alone=True)
         kind, read, medians = read_by_models(rows)
         names = [str(each) for each in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):

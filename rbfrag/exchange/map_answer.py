@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Unpack
@@ -89,6 +89,7 @@ def shakemap(
     allow_partial: bool = False,
     draws: int | None = None,
     seed: int = 0,
+    on_progress: Callable[[int, int], None] | None = None,
     **question: Unpack[MapKeywords[ArrayLike | None]],
 ) -> ShakeMapAnswer:
     """Return the probability that blocks fail across a ShakeMap.
@@ -108,6 +109,7 @@ def shakemap(
         draws: draws of shaking and blocks for the number of failures; None for 100, more where
             blocks are few.
         seed: of these draws.
+        on_progress: called with (draws done, draws in all).
         question: fields of the blocks, each a number or of shape (m,), with ``kind``, and
             ``model``, ``level`` and ``db``, as :func:`rbfrag.predict` has them.
 
@@ -174,7 +176,9 @@ def shakemap(
         answer = replace(
             answer, site=answer.site[pairs], block=answer.block[pairs], each=answer.each[pairs]
         )
-    failures = map_failures(answer, read, places, weight=weight, draws=draws, seed=seed)
+    failures = map_failures(
+        answer, read, places, weight=weight, draws=draws, seed=seed, on_progress=on_progress
+    )
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
     if outside:

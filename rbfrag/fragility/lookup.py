@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
+from rbfrag.db.location import DEFAULT_NAME, REFERENCE, data_place, is_unnamed, reference_file
 from rbfrag.db.model_file import (
     ModelRow,
     answers_special_questions,
@@ -341,16 +341,6 @@ def _of_row(row: ModelRow) -> FragilityModel:
     return model
 
 
-def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
-    """Return where the models are, and whether that is the shipped reference."""
-    place = locate(db)
-    if _unnamed(db) and not Path(place).exists():
-        shipped = reference_file()
-        if shipped is not None:
-            return shipped, True
-    return place, False
-
-
 def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
     """Return a model of a database as it is stored.
 
@@ -381,13 +371,13 @@ def _store(db: str | PathLike[str] | None) -> _Store:
     if store is not None:
         return store
     store = _read(db)
-    if not store.rows and _unnamed(db) and reference_file() is not None:
+    if not store.rows and is_unnamed(db) and reference_file() is not None:
         return _unchanged(_SHIPPED, True) or _read_again(REFERENCE, True)
     return store
 
 
 def _read(db: str | PathLike[str] | None) -> _Store:
-    place, shipped = _place(db)
+    place, shipped = data_place(db)
     if isinstance(place, Path):
         return _unchanged(str(place), shipped) or _read_again(place, shipped)
     from rbfrag.db.engine import opened_database
@@ -403,7 +393,7 @@ def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
 
 
 def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
-    if not _unnamed(db):
+    if not is_unnamed(db):
         try:
             named = os.environ["RBFRAG_DB"] if db is None else os.fspath(db)
         except TypeError:
@@ -413,11 +403,6 @@ def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
         return _unchanged(_SHIPPED, True)
     here = _unchanged(DEFAULT_NAME, False)
     return here if here is None or here.rows else _unchanged(_SHIPPED, True)
-
-
-def _unnamed(db: str | PathLike[str] | None) -> bool:
-    """Return whether the database is the one of the current folder, or the reference."""
-    return db is None and not os.environ.get("RBFRAG_DB")
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:

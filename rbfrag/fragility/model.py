@@ -59,6 +59,12 @@ class Answer(NamedTuple):
     outside: Any = None
 
 
+SYNTHETIC = (
+    "the model is fitted to synthetic pulses, without any recorded earthquake: its probabilities "
+    "do not hold for earthquakes"
+)
+
+
 @dataclass(frozen=True)
 class FragilityModel:
     """One fitted fragility model: a stored row in the form that answers.
@@ -147,6 +153,8 @@ class FragilityModel:
             )
         term = TERMS[row.term]
         notes = (form.advice,) if form.advice else ()
+        if row.diagnostics.get("recorded_events") == 0:
+            notes = (*notes, SYNTHETIC)
         return cls(
             row=row,
             term=term,
@@ -331,6 +339,8 @@ def _fit_line(row: ModelRow) -> str:
         words.append(f"--vertical {selection['vertical']}")
     if selection.get("doubtful_pgd"):
         words.append("--doubtful-pgd")
+    if selection.get("include_structures"):
+        words.append("--include-structures")
     try:
         exponent = method_named(row.method).exponent
     except InputError:

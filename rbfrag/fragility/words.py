@@ -18,7 +18,7 @@ def percent(share: float) -> str:
         return "below 0.01 %"
     if 0.9995 <= share < 1.0:
         return "above 99.9 %"
-    digits = 0 if share in (0.0, 1.0) or 0.0995 <= share <= 0.995 else 1 if share >= 0.001 else 2
+    digits = 0 if share in (0.0, 1.0) or 0.0995 <= share < 0.995 else 1 if share >= 0.001 else 2
     return f"{100.0 * share:.{digits}f} %"
 
 
@@ -178,6 +178,17 @@ def measures_in_words(names: Sequence[str]) -> str:
 
 def _measure(name: str) -> str:
     return _MEASURES.get(name) or name.partition("_")[0].upper()
+
+
+def fitted_in_words(diagnostics: Mapping[str, Any]) -> str:
+    """Return what a model is fitted on: outcomes, or critical values; empty where not stored."""
+    outcomes, events = diagnostics.get("n_outcomes"), diagnostics.get("events")
+    if not ((number := outcomes or diagnostics.get("n")) and events):
+        return ""
+    what = "outcomes" if outcomes else "critical values"
+    recorded = diagnostics.get("recorded_events") != 0
+    of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
+    return f"fitted on {number:,} {what} of {events:,} {of}"
 
 
 _MEASURES = {

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
     FROM_SUMS,
@@ -303,10 +304,12 @@ def hazard_at_sites(
     by_law = reading.magnitudes_from_g is not None
     alone = (between_measures.PGA_ALONE,) if reading.name == "pga_g" else ()
     if alone and answering.get("model") is None:
+        named = [row.name for row in stored_rows(answering.get("db")) if row.term == "pga"]
+        by_model = f", or accept the bias with model {named[0]}" if named else ""
         raise InputError(
-            f"{first[0].source}: {alone[0]}; give a curve of PGV or SA(1.0), or the "
-            "disaggregation by magnitude, or name a model of PGA",
-            fields=("curve", "imt", "model", "disaggregation"),
+            f"{first[0].source}: {alone[0].partition(':')[0]}; give a curve of PGV or SA(1.0), or "
+            f"the disaggregation by magnitude{by_model}",
+            fields=("model", "disaggregation"),
         )
     parts, remarks, reason = parts_by_model(given, reading, answering)
     refuse_elements(reason, fields=BlockFields.__optional_keys__)
@@ -341,7 +344,7 @@ def hazard_at_sites(
             FROM_MEAN if one_class else FROM_SUMS,
         ),
         *reading.warnings, *alone,
-        *_of_curves(sites), *(part.model.form.advice for part in parts if part.model.form.advice),
+        *_of_curves(sites), *(note for part in parts for note in part.model.notes),
         *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
         *_numbers_in_words(result), *of_joints,
     ]  # fmt: skip

@@ -24,8 +24,8 @@ PREFERRED = ("pgv_m_s", "sa10_g")
 """The measures that answer by themselves, the better first."""
 
 PGA_ALONE = (
-    "a rate from PGA alone is biased: the model averages over the PGV that went with such a PGA in "
-    "its reference of strong earthquakes, and smaller ones of the same PGA have less"
+    "a rate from PGA alone is biased: the fit averages over the PGV that goes with a PGA in strong "
+    "earthquakes, and smaller earthquakes of the same PGA have less PGV"
 )
 
 _CONSTANT, _SLOPE, _BY_MAGNITUDE, _SCATTER, _SATURATION = -0.623, 0.873, 0.472, 0.434, 7.6

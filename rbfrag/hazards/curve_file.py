@@ -1,10 +1,10 @@
-"""Hazard curves out of a file: OpenQuake CSV, USGS NSHM JSON, or two columns."""
+"""Hazard curves out of a file: OpenQuake CSV, JSON of the USGS, two columns, or a row a site."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Unpack
@@ -22,7 +22,7 @@ from rbfrag.hazards.curve import (
     hazard_curve,
     rates_from_probabilities,
 )
-from rbfrag.hazards.measure_type import openquake_type
+from rbfrag.hazards.measure_type import IntensityType, openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENTS
 
@@ -110,7 +110,7 @@ def hazard_curves_in(
     elif first.startswith("{"):
         curves = nshm_curves(text, source)
     else:
-        curves = table_curves(text, source)
+        curves = table_curves(text, source, imt)
     if imt is not None:
         curves = _of_imt(curves, imt, source)
     if site is not None:
@@ -192,31 +192,58 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
         raise InputError(f"{source}: {error}") from None
     if not isinstance(document, dict) or not document:
         raise InputError(f"{source}: a JSON object with one member a measure is wanted")
+    if "response" in document:
+        try:
+            return list(_service_curves(document, source))
+        except (AttributeError, KeyError, TypeError):
+            raise InputError(
+                f"{source}: no hazard curves as the USGS services answer; download the curve again"
+            ) from None
     return [_curve(name, member, f"{source}, {name!r}") for name, member in document.items()]
 
 
+def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCurve]:
+    """Yield the total curves of an answer of the Unified Hazard Tool or of nshmp-ws.
+
+    The former has ``metadata`` with ``imt`` and ``xvals`` (or ``xvalues``) and ``yvals`` for each
+    site or kind of source, the latter ``xs`` and ``ys``; levels in g (PGV: cm/s), annual rates.
+    """
+    response = document["response"]
+    for member in response["hazardCurves"] if isinstance(response, dict) else response:
+        about = {**document.get("request", {}), **member, **member.get("metadata", {})}
+        name = about["imt"]["value"]
+        where = f"{source}, {name}"
+        kind = _usgs_type(name, where)
+        for data in member["data"] if isinstance(member["data"], list) else [member["data"]]:
+            if data.get("component", "Total") != "Total":
+                continue  # of one kind of source
+            known = {**about, **data, **data.get("values", {})}
+            x, y = (
+                _numbers(next((known[key] for key in keys if key in known), None), keys[0], where)
+                for keys in (("xs", "xvalues", "xvals"), ("ys", "yvalues", "yvals"))
+            )
+            yield hazard_curve(
+                kind.measure, kind.factor * x, y, source=where, period_s=kind.period_s,
+                lon=known.get("longitude"), lat=known.get("latitude"),
+            )  # fmt: skip
+
+
 def _curve(name: str, member: Any, where: str) -> HazardCurve:
-    measure, factor, period = _meaning(name, where)
+    kind = _usgs_type(name, where)
     if not isinstance(member, dict):
         raise InputError(f"{where}: an object with xs and ys is wanted")
     x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
     with np.errstate(over="ignore"):
-        levels = factor * np.exp(x)
-    return hazard_curve(measure, levels, y, source=where, period_s=period)
+        levels = kind.factor * np.exp(x)
+    return hazard_curve(kind.measure, levels, y, source=where, period_s=kind.period_s)
 
 
-def _meaning(name: str, where: str) -> tuple[str, float, float | None]:
-    if name.lower() == "peak ground acceleration":
-        return "pga_g", 1.0, None
-    if name.lower() == "peak ground velocity":
-        return "pgv_m_s", 0.01, None
-    match = _SPECTRAL.fullmatch(name)
-    if match:
-        return "sa_g", 1.0, float(match.group(1))
-    raise InputError(
-        f"{where}: the measure is not known: Peak Ground Acceleration, Peak Ground Velocity and "
-        f"'T Second Spectral Acceleration' are; answered are {ANSWERED}"
-    )
+def _usgs_type(name: str, where: str) -> IntensityType:
+    """Return what Peak Ground Acceleration, 1.00 Second Spectral Acceleration or SA1P0 means."""
+    peaks = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}
+    name = peaks.get(name.lower(), name)
+    name = re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", _SPECTRAL.sub(r"SA(\1)", name))
+    return openquake_type(name, where)
 
 
 def _numbers(value: Any, key: str, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -296,11 +323,9 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 rates,
                 source=where,
                 period_s=kind.period_s,
-                site=place_of.get("custom_site_id", place_of.get("site_id", "")),
-                lon=_coordinate(place_of, "lon", 180.0, where),
-                lat=_coordinate(place_of, "lat", 90.0, where),
                 statistic=statistic,
                 component=component,
+                **_site_of(place_of, where),
             )
         )
     if not curves:
@@ -328,6 +353,13 @@ def _stated(name: str, head: str, source: str, default: str | None = None) -> st
             return default
         raise InputError(f"{source}, line 1: {name} is not stated")
     return next(group for group in match.groups() if group is not None)
+
+
+def _site_of(cells: dict[str, str], where: str) -> dict[str, Any]:
+    """Return name and coordinates of a row's site."""
+    named = (cells[name] for name in ("custom_site_id", "site_id", "name", "site") if name in cells)
+    lon, lat = (_coordinate(cells, *each, where) for each in (("lon", 180.0), ("lat", 90.0)))
+    return {"site": next(named, ""), "lon": lon, "lat": lat}
 
 
 def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> float | None:
@@ -358,14 +390,19 @@ HEADER_HELP = (
 )
 
 
-def table_curves(text: str, source: str) -> list[HazardCurve]:
-    """Return the curve of a two-column CSV file, as a list of one.
+def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardCurve]:
+    """Return the curve of a two-column CSV file as a list of one, or those of a row a site.
 
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
     ``pgv_cm_s`` or ``sa(0.5)_g``, also with the unit in brackets; and ``annual_rate`` [1/a],
     ``return_period_years`` or ``poe_50_years``, the probability of exceedance in 50 years. Between
     semicolons numbers may have decimal commas. Levels may fall from row to row, as those of return
-    periods that do.
+    periods that do. Of ``Ground Motion (g), Annual Frequency of Exceedance`` `imt` states the
+    measure, as of a table with a row of annual rates for each site, ``name,lon,lat`` and below the
+    levels (in g, of PGV in cm/s) as nshmp-haz writes it.
+
+    Args:
+        imt: intensity measure of levels whose header does not name it.
     """
     rows = [
         (number, [cell.strip() for cell in row])
@@ -380,9 +417,11 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
             for number, row in rows
         ]
     line, header = rows[0]
+    if len(header) > 2 and sum(map(_is_level, header)) > 1:
+        return list(_site_rows(rows, source, imt))
     if len(header) != 2:
         raise InputError(f"{source}, line {line}: {len(header)} columns, not two: {HEADER_HELP}")
-    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}")
+    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}", imt)
     of_periods = _with_unit(header[1]) in _RETURN_PERIODS
     years = None if of_periods else _years(_with_unit(header[1]), f"{source}, line {line}")
     levels, values = [], []
@@ -433,6 +472,36 @@ def _component_in(text: str) -> str:
     return name if name in COMPONENTS else ""
 
 
+def _is_level(name: str) -> bool:
+    return re.fullmatch(rf"{_DECIMAL}(?:[eE][+-]?\d+)?", name) is not None
+
+
+def _site_rows(
+    rows: Sequence[tuple[int, list[str]]], source: str, imt: str | None
+) -> Iterator[HazardCurve]:
+    """Yield the curve of each row below a header of site columns and levels."""
+    line, header = rows[0]
+    kind = _stated_type(imt, f"{source}, line {line}: levels of shaking")
+    levels = [kind.factor * float(name) for name in header if _is_level(name)]
+    for number, row in rows[1:]:
+        where = f"{source}, line {number}"
+        if len(row) != len(header):
+            raise InputError(f"{where}: {len(row)} cells under {len(header)} columns")
+        cells = dict(zip(header, row, strict=True))
+        rates = [number_at(cells[name], where) for name in header if _is_level(name)]
+        yield hazard_curve(
+            kind.measure, levels, rates, source=where, period_s=kind.period_s,
+            **_site_of(cells, where),
+        )  # fmt: skip
+
+
+def _stated_type(imt: str | None, what: str) -> IntensityType:
+    if imt is None:
+        text = f"{what} in g: the header does not say whether of PGA or SA; state it as imt PGA"
+        raise InputError(f"{text} or SA(1.0)", fields=("imt",))
+    return openquake_type(imt, "imt")
+
+
 _RETURN_PERIODS = frozenset(
     {"return_period", "return_period_years", "return_period_a", "return_period_yr"}
 )
@@ -448,7 +517,10 @@ def _with_unit(name: str) -> str:
     return f"{text[: unit.start()].strip()}_{spelled}".replace(" ", "_")
 
 
-def _levels(name: str, where: str) -> tuple[str, float, float | None]:
+def _levels(name: str, where: str, imt: str | None) -> tuple[str, float, float | None]:
+    if name == "ground_motion_g":
+        kind = _stated_type(imt, f"{where}: ground motion")
+        return kind.measure, 1.0, kind.period_s
     if name in _LEVELS:
         return *_LEVELS[name], None
     match = _SPECTRAL_COLUMN.fullmatch(name)
@@ -458,7 +530,7 @@ def _levels(name: str, where: str) -> tuple[str, float, float | None]:
 
 
 def _years(name: str, where: str) -> float | None:
-    if name == "annual_rate":
+    if name == "annual_rate" or re.fullmatch("annual_frequency_of_exceed[ae]nce", name):
         return None
     match = _POE.fullmatch(name)
     if match and float(match.group(1)) > 0.0:

@@ -410,7 +410,8 @@ def sums_of(blocks: KernelBlocks, table: NodeTable, mass: SiteMass, first: int) 
             return np.asarray(values @ own[0])
         return np.asarray(np.einsum("mn,mn->m", values, own[blocks.site]))
 
-    rate = against(mass.mass, table.probability)
+    # the mass of single events has negative parts, by cubic interpolation between nodes
+    rate = np.maximum(against(mass.mass, table.probability), 0.0)
     assert table.slopes is not None
     off = against(mass.mass, _off_by(table.probability))
     ends = []

@@ -68,11 +68,17 @@ class Grid(NamedTuple):
         weights = np.stack([-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0])
         return start, weights
 
-    def spread(self, u: FloatArray) -> csr_array:
+    def linear(self, u: FloatArray) -> tuple[Indices, FloatArray]:
+        """Return the first of two nodes about each u and their weights, shape (2, …)."""
+        x = np.clip(u / self.step - self.first, 0.0, self.size - 1.0)
+        start = np.minimum(np.floor(x).astype(np.intp), self.size - 2)
+        return start, np.stack([1.0 - (x - start), x - start])
+
+    def spread(self, u: FloatArray, *, linear: bool = False) -> csr_array:
         """Return the matrix that puts masses at u on the nodes, shape (size, number of u)."""
-        start, weights = self.cubic(u)
-        rows = (start + np.arange(4)[:, None]).ravel()
-        columns = np.tile(np.arange(u.size), 4)
+        start, weights = self.linear(u) if linear else self.cubic(u)
+        rows = (start + np.arange(weights.shape[0])[:, None]).ravel()
+        columns = np.tile(np.arange(u.size), weights.shape[0])
         return csr_array((weights.ravel(), (rows, columns)), shape=(self.size, u.size))
 
 
@@ -208,7 +214,10 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
     """Return the mass under the curves, without scatter, sites x nodes.
 
     Two points of Gauss to each step of the grid: a rule that is alike in each step leaves a mass as
-    smooth as the curve.
+    smooth as the curve. Cardinal functions of cubic interpolation are negative beyond the nodes
+    next to their own. Where that would make a mass negative, at the ends of the curve and at its
+    kinks, mass is put on the two nodes about it by linear interpolation, to the second order. A
+    rate is then never negative, falls where P falls, and never exceeds that of the first level.
 
     Args:
         beyond: count shaking beyond the last level as that level.
@@ -221,17 +230,31 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
         half = 0.5 * np.diff(edges)
         points = ((edges[:-1] + half)[:, None] + half[:, None] * _GAUSS).ravel()
         rates = np.stack([curves[i].annual_rate for i in places.tolist()], axis=1)
-        spread = grid.spread(np.append(points, u[-1]))
+        cubic = grid.spread(points)
+        change, touched = grid.spread(points, linear=True) - cubic, abs(cubic).T
+        last = grid.spread(u[-1:], linear=True).toarray()
         for start in range(0, places.size, _SITES_AT_ONCE):
             some = slice(start, start + _SITES_AT_ONCE)
             log_rate = PchipInterpolator(u, np.log(rates[:, some]))
             density = np.maximum(-log_rate(points, 1), 0.0) * np.exp(log_rate(points))
             density *= np.repeat(half, 2)[:, None]
-            mass[places[some]] = (spread @ np.vstack([density, float(beyond) * rates[-1:, some]])).T
+            own, near = cubic @ density, np.zeros(density.shape, dtype=np.bool_)
+            while (new := (touched @ (own < 0.0) > 0.0) & ~near).any():
+                near |= new
+                points_near = np.flatnonzero(new.any(axis=1))
+                own += change[:, points_near] @ (density * new)[points_near]
+            own = np.maximum(own, 0.0) + float(beyond) * last * rates[-1:, some]
+            total = rates[:1, some] - float(not beyond) * rates[-1:, some]
+            # neither the rule of Gauss nor rounding may make the whole exceed the first level
+            sums = np.maximum(own.sum(axis=0), TINY)
+            mass[places[some]] = (own * (total * (1.0 - ROUNDING) / sums)).T
     return mass
 
 
 _SITES_AT_ONCE = 512
+
+TINY = float(np.finfo(np.float64).tiny)
+ROUNDING = 1e-12
 
 
 def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> CurveEnds:
@@ -242,7 +265,7 @@ def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> Cu
 
     def unit(levels: Sequence[float | None]) -> FloatArray:
         known = np.array([1.0 if level is None else level for level in levels])
-        rows = grid.spread(np.log(known)).toarray().T
+        rows = grid.spread(np.log(known), linear=True).toarray().T
         rows[[level is None for level in levels]] = 0.0
         return smoothing.of(rows)
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.fragility.measures import ALONE, SPECTRAL
 
 _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
@@ -53,13 +53,18 @@ def openquake_type(imt: str, where: str) -> IntensityType:
     )
 
 
-def requested_measure(imt: str) -> tuple[str, IntensityType]:
-    """Return the measure that is asked for, as `predict` calls it, and its meaning."""
+def requested_measure(imt: str, *, alone: bool = False) -> tuple[str, IntensityType]:
+    """Return the measure that is asked for, as `predict` calls it, and its meaning.
+
+    Args:
+        alone: accept only what a model reads alone.
+    """
     kind = openquake_type(imt, "imt")
     name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
-    if name is None:
-        known = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
-        text = f"imt = {imt}: no model reads it: use one of {known}"
+    if name is None or (alone and name not in ALONE):
+        periods = (each for each in SPECTRAL if not alone or SPECTRAL[each] in ALONE)
+        known = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in periods)])
+        text = f"imt = {imt}: no model reads it{' alone' if alone else ''}: use one of {known}"
         raise InputError(text, fields=("imt",))
     return name, kind
 

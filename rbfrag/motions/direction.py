@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
@@ -11,43 +12,70 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
 VERTICAL_NAMES = frozenset(
-    {"UP", "DOWN", "DWN", "DN", "VER", "VRT", "VERT", "VERTICAL", "V", "Z", "U", "UD", "U-D"}
-)
+    {"UP", "DOWN", "DWN", "DN", "VER", "VR", "VRT", "VERT", "VERTICAL", "VERTICALE", "VERTIKAL",
+     "V", "Z", "U", "UD", "DU", "UPDO", "UPDN", "UPDOWN", "UPWARD", "DOWNWARD", "ARRIBA", "ABAJO",
+     "DUSEY", "上下", "鉛直", "垂直"}
+)  # fmt: skip
+"""Names of vertical components without separators and accents, upper case."""
 
-_DOWNWARD_NAMES = frozenset({"DOWN", "DWN", "DN"})
+_DOWNWARD_NAMES = frozenset({"DOWN", "DOWNWARD", "DWN", "DN", "ABAJO"})
 
+# English, Spanish, Portuguese, Italian, French, German, Turkish
 _COMPASS = {
-    "N": 0.0, "NORTH": 0.0, "NS": 0.0, "N-S": 0.0,
-    "E": 90.0, "EAST": 90.0, "EW": 90.0, "E-W": 90.0,
-    "S": 180.0, "SOUTH": 180.0,
-    "W": 270.0, "WEST": 270.0,
-}  # fmt: skip
+    **dict.fromkeys(("N", "NORTH", "NORTE", "NORD", "KUZEY", "南北"), 0.0),
+    **dict.fromkeys(("NS", "SN", "KG", "GK", "NORTHSOUTH", "NORTESUR", "NORTESUL"), 0.0),
+    **dict.fromkeys(("NORDSUD", "KUZEYGUNEY"), 0.0),
+    **dict.fromkeys(("E", "EAST", "ESTE", "LESTE", "EST", "OST", "DOGU", "東西", "东西"), 90.0),
+    **dict.fromkeys(("EW", "WE", "EO", "OE", "DB", "BD", "EASTWEST", "ESTEOESTE"), 90.0),
+    **dict.fromkeys(("LESTEOESTE", "ESTOVEST", "ESTOUEST", "OSTWEST", "DOGUBATI"), 90.0),
+    **dict.fromkeys(("S", "SOUTH", "SUR", "SUL", "SUD", "GUNEY"), 180.0),
+    **dict.fromkeys(("W", "WEST", "OESTE", "OVEST", "OUEST", "BATI"), 270.0),
+}
+"""Azimuth [deg] of words, and of axes, whose positive end is taken to be north or east."""
 
 HORIZONTAL_NAMES = frozenset(
-    {"H1", "H2", "L", "T", "LONG", "TRAN", "TRANS", "LONGITUDINAL", "TRANSVERSE"}
-)
+    {"H1", "H2", "L", "T", "X", "Y", "LN", "TR", "LONG", "LONGITUDINAL", "TRAN", "TRANS",
+     "TRANSV", "TRANSVERSE", "TRANSVERSAL", "TRASVERSALE", "LONGITUDINALE", "RADIAL",
+     "HORIZONTAL", "HORIZONTAL1", "HORIZONTAL2", "HOR1", "HOR2"}
+)  # fmt: skip
 """Axes of an instrument, whose azimuth the name does not tell."""
 
-_BEARING = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d+)?)\s*([EW])")
+_SIGNS = "+-\u2212\u2013"
+_PARENTHESIS = re.compile(r"\s*\([^()]*\)?\s*$")
+_COMPONENT = re.compile(r"^COMP(?:ONENTE?)?\b[\s.:]*|[\s.:]*\bCOMP(?:ONENTE?)?\.?$")
+_SEPARATORS = re.compile(r"[\s/_.\-]+")
+_BEARING = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d+)?)\s*([EWO])")
 # SEED channel names of seismometers and accelerometers: band, instrument, orientation
 _SEED = re.compile(r"[A-Z][HLNG]([ZNE12])")
-_AZIMUTH = re.compile(r"(\d{1,3}(?:\.\d+)?)(?:\s*DEG\.?)?", re.ASCII)
+# a single digit may as well be the number of a channel
+_AZIMUTH = re.compile(
+    r"((?:0|[1-9]\d|\d{3}|\d{1,3}(?=\s*D|\.\d))(?:\.\d+)?)(?:\s*DEG(?:REES?)?\.?)?", re.ASCII
+)
+# L1, V2, T3, UD2: the digit counts the channels or the sensors of a borehole
+_NUMBERED = re.compile(r"(NS|EW|UD|UP|L|T|V|Z)\d")
+# what follows a station: CHY101-E, CI.PAS..HNZ, HMCDWN, AMBCN86E, NIGH01EW
+_AFTER_STATION = re.compile(
+    r"[\w.:-]{3,}?(DWN|[NS]\d\d[EW])|[A-Z]\w*\d(NS|EW|UD)|.*[-.:_](?=[^\d.])(.+)", re.ASCII
+)
+
+
+def bare_name(component: str) -> str:
+    """Return a component's name without sign and trailing parenthesis.
+
+    Args:
+        component: as a file has it: ``+V``, ``UP       (STA CHN:  1)``.
+    """
+    name = _PARENTHESIS.sub("", component).strip().strip(_SIGNS).strip()
+    return name or component.strip(" ()")
 
 
 def is_vertical_name(component: str) -> bool | None:
     """Return whether a component is vertical; None when its name does not say.
 
     Args:
-        component: as the file names it: ``UP``, ``-UP``, ``HNZ``, ``360``, ``N10E``.
+        component: as the file names it: ``UP``, ``+V``, ``HNZ``, ``360``, ``N10E``, ``NORTE``.
     """
-    # file names join station and component by a dash, which some headers keep
-    name = component.strip().upper().lstrip("-")
-    seed = _SEED.fullmatch(name)
-    if name in VERTICAL_NAMES or (seed and seed[1] == "Z"):
-        return True
-    if seed or name in HORIZONTAL_NAMES or azimuth_deg(component) is not None:
-        return False
-    return None
+    return _direction(_spelling(component))[0]
 
 
 def is_downward_name(component: str) -> bool:
@@ -56,30 +84,57 @@ def is_downward_name(component: str) -> bool:
     Args:
         component: as the file names it: ``DOWN``, ``DWN``, ``DN``.
     """
-    return component.strip().upper().lstrip("-") in _DOWNWARD_NAMES
+    name = _spelling(component)
+    return name in _DOWNWARD_NAMES or _after_station(name) in _DOWNWARD_NAMES
 
 
 def azimuth_deg(component: str) -> float | None:
     """Return the azimuth of a component [deg], clockwise from north; None if not stated.
 
     Args:
-        component: as the file names it: ``360``, ``90 Deg``, ``N10E``, ``S62W``, ``EAST``, or a
-            SEED channel such as ``HNE``.
+        component: as the file names it: ``360``, ``90°``, ``N10E``, ``S62W``, ``EAST``, ``E-O``,
+            or a SEED channel such as ``HNE``.
     """
-    name = component.strip().upper()
-    if (seed := _SEED.fullmatch(name)) and seed[1] in "NE":
-        return _COMPASS[seed[1]]
-    if name in _COMPASS:
-        return _COMPASS[name]
-    if bearing := _BEARING.fullmatch(name):
+    return _direction(_spelling(component))[1]
+
+
+def _spelling(component: str) -> str:
+    """Return a name in upper case without sign, parenthesis, accents and degree signs."""
+    # a degree sign, and the ordinal sign that keyboards have in its place
+    name = re.sub(r"\s*[°º˚]", " DEG", bare_name(component)).upper()
+    letters = unicodedata.normalize("NFKD", name)
+    name = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    return _COMPONENT.sub("", name).strip(" .")
+
+
+def _direction(name: str) -> tuple[bool | None, float | None]:
+    """Return whether a name is that of a vertical component, and its azimuth [deg]."""
+    if azimuth := _AZIMUTH.fullmatch(name):
+        degrees = float(azimuth[1])
+        return (False, degrees % 360.0) if degrees <= 360.0 else (None, None)
+    if bearing := _BEARING.fullmatch(name.replace("DEG", "").strip()):
         angle = float(bearing[2])
         if angle > 90.0:
-            return None
+            return None, None
         turned = angle if bearing[3] == "E" else -angle
-        return (turned if bearing[1] == "N" else 180.0 - turned) % 360.0
-    if (azimuth := _AZIMUTH.fullmatch(name)) and float(azimuth[1]) <= 360.0:
-        return float(azimuth[1]) % 360.0
-    return None
+        return False, (turned if bearing[1] == "N" else 180.0 - turned) % 360.0
+    word = _SEPARATORS.sub("", name)
+    if numbered := _NUMBERED.fullmatch(word):
+        word = numbered[1]
+    if seed := _SEED.fullmatch(word):
+        word = seed[1] if seed[1] in "ZNE" else "H1"
+    if word in VERTICAL_NAMES:
+        return True, None
+    if word in _COMPASS or word in HORIZONTAL_NAMES:
+        return False, _COMPASS.get(word)
+    after = _after_station(name)
+    return _direction(after) if after else (None, None)
+
+
+def _after_station(name: str) -> str:
+    """Return what follows the code of a station in a name; empty where there is none."""
+    after = _AFTER_STATION.fullmatch(name)
+    return next(filter(None, after.groups())) if after else ""
 
 
 SAME_START = 0.5

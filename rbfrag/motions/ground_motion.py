@@ -19,6 +19,9 @@ from rbfrag.motions.polarity import FloatArray
 LONGEST_S = 1e100
 """Beyond this nothing can be integrated."""
 
+LOCATION = "the sensor's location by the header: "
+"""Begin of the remark that states where a sensor stands; remarks go with a motion everywhere."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GroundMotion:
@@ -201,6 +204,12 @@ class GroundMotion:
     def tm_s(self) -> float | None:
         """Mean period of Rathje, Abrahamson & Bray (1998) [s]; None where it is not defined."""
         return self.measures.tm_s
+
+    @property
+    def location(self) -> str:
+        """Place of the sensor as the file's header names it; empty where it does not."""
+        stated = (each for each in self.remarks if each.startswith(LOCATION))
+        return next(stated, "").removeprefix(LOCATION)
 
     def scaled(self, factor: float) -> GroundMotion:
         """Return the motion with every sample multiplied by `factor`."""

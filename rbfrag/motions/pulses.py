@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
+PULSE = "reversal pulse"
+"""Begin of the event of analytic pulses, by which fits tell them from recorded earthquakes."""
+
 MOST_SAMPLES = 50_000_000
 
 
@@ -30,7 +33,7 @@ def reversal_pulse(amplitude_g: float, ratio: float, period_s: float, dt_s: floa
         raise InputError(f"the ratio must not be negative, and is {ratio:g}: it sets the size only")
     lobe, interval = _sine_lobe(0.5 * _positive("period", period_s), dt_s)
     samples = np.concatenate([a * lobe, (-r * a) * lobe[1:]])
-    return GroundMotion(samples, interval, event="reversal pulse")
+    return GroundMotion(samples, interval, event=PULSE)
 
 
 def _sine_lobe(duration_s: float, dt_s: float) -> tuple[NDArray[np.float64], float]:

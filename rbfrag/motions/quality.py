@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,15 @@ EDGE_RATIO = 0.1
 
 FEW_SAMPLES = 100
 
+STRUCTURE = "structure"
+"""Flag of records that a sensor on a structure made."""
+
+DIRECTION_GUESSED = "direction_guessed"
+"""Flag of records taken as horizontal though neither file nor metadata say so."""
+
+# a ground floor is within a building, whose base does not move as the ground beside it
+_ON_THE_GROUND = re.compile(r"free[\s-]*field|(?:ground|grnd)(?![\s-]*(?:fl|stor))", re.IGNORECASE)
+
 
 PGD_IN_DOUBT = frozenset({"final_velocity", "final_displacement"})
 """Flags of records whose displacement is that of a drifting baseline."""
@@ -42,6 +52,11 @@ class QualityFlag:
 
     code: str
     sentence: str
+
+
+def is_on_structure(motion: GroundMotion) -> bool:
+    """Return whether the header names a place other than the ground and the free field."""
+    return bool(motion.location) and not _ON_THE_GROUND.match(motion.location)
 
 
 def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
@@ -71,6 +86,12 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
             "pgv_suspicious",
             f"PGV of {measures.pgv_m_s:.3g} m/s is above {LARGEST_PGV_M_S:g} m/s, more than was "
             "ever recorded: check unit, dt and baseline",
+        )
+    if is_on_structure(motion):
+        doubt(
+            STRUCTURE,
+            f"the sensor stands at {motion.location!r}, neither on the ground nor in the free "
+            "field: the record holds the response of a structure",
         )
     if motion.is_partial:
         doubt("partial", "the header states another number of samples than the file holds")

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from rbfrag.errors import InputError, MissingExtraError, MotionFileError, UnknownFormatError
 from rbfrag.files import as_path
 from rbfrag.motions.archive import archive_of, is_archive, member_bytes, members_of
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.direction import azimuth_deg, bare_name, is_vertical_name
 from rbfrag.motions.formats import (
     bhrc_v1,
     cdmg_v1,
@@ -219,7 +219,7 @@ def _motion(file: Path, trace: ParsedTrace, **place: Any) -> GroundMotion:
     labels: dict[str, Any] = {
         "station": trace.station,
         "event": trace.event,
-        "component": trace.component,
+        "component": bare_name(trace.component),
         "recording": recording,
         "orientation_deg": azimuth_deg(name),
         "is_vertical": is_vertical_name(name),

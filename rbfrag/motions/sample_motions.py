@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import csv
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
-from rbfrag.motions.pulses import reversal_pulse
+from rbfrag.motions.formats import rbfrag_csv
+from rbfrag.motions.pulses import PULSE, reversal_pulse
 
 SAMPLES_PACKAGE = "pyslammer"
 SAMPLES_FOLDER = "sample_ground_motions"
@@ -34,8 +35,8 @@ def demo_motions(folder: Path) -> tuple[list[Path], str]:
     files = _write_pulses(pulses)
     return files, (
         "The sample records are not installed (pip install 'rbfrag[samples]'): the "
-        f"demonstration uses {len(files)} analytic pulses instead, which are no earthquakes; "
-        "its fit means nothing beyond showing the steps."
+        f"demonstration fits {len(files)} synthetic pulses, which are not earthquakes; the model "
+        "shows the steps and predicts nothing."
     )
 
 
@@ -53,12 +54,9 @@ def _write_pulses(folder: Path) -> list[Path]:
     files = []
     for period_s in (0.2, 0.5, 1.0, 2.0):
         for ratio in (0.35, 0.65, 1.0):
+            event = f"{PULSE} T={period_s:g} r={ratio:g}"
             pulse = reversal_pulse(0.4, ratio, period_s, 0.005)
-            name = f"Pulse T={period_s:g} r={ratio:g}"
             files.append(folder / f"pulse_{period_s:g}s_{ratio:g}.csv")
-            with files[-1].open("w", newline="", encoding="utf-8") as file:
-                file.write(f"# {name}\n# Time (s),Acceleration (g's)\n")
-                writer = csv.writer(file)
-                for i, value in enumerate(pulse.acceleration_g.tolist()):
-                    writer.writerow((f"{i * 0.005:.3f}", repr(value)))
+            lines = rbfrag_csv.write([replace(pulse, event=event, is_vertical=False)])
+            files[-1].write_text("\n".join(lines) + "\n", encoding="utf-8")
     return files

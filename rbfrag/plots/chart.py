@@ -11,6 +11,7 @@ import numpy as np
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
+from rbfrag.fragility.words import fitted_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
@@ -236,11 +237,9 @@ def _is_fitted(
 
 
 def _caption(model: FragilityModel, held: HeldMeasures) -> str:
-    about = model.row.diagnostics
-    n, events = about.get("n"), about.get("events")
-    counts = f"fitted on {n} critical blocks of {events} earthquakes; " if n and events else ""
+    fitted = fitted_in_words(model.row.diagnostics)
     return (
         f"{as_written(f'Probability that the block topples: model {model.name}', 85)}\n"
         f"{held.words + chr(10) if held.words else ''}"
-        f"{counts}shaded: outside the fitted range"
+        f"{fitted + '; ' if fitted else ''}shaded: outside the fitted range"
     )

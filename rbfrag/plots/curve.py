@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.words import at_sites, row_in_words
+from rbfrag.fragility.words import at_sites, fitted_in_words, row_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -132,16 +132,11 @@ def plot_curve(
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
     conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
-    about = model.row.diagnostics
-    counts = (
-        f", fitted on {about['n']} critical blocks of {about['events']} earthquakes"
-        if about.get("n") and about.get("events")
-        else ""
-    )
+    fitted = fitted_in_words(model.row.diagnostics)
     axes.set_title(
         "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
         + "\n"
-        + as_written(f"model {row_in_words(model.row)}{counts}", 85),
+        + as_written(", ".join(filter(None, (f"model {row_in_words(model.row)}", fitted))), 85),
         fontsize=10,
     )
     legend_below(figure, 2)

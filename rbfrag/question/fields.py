@@ -161,7 +161,7 @@ class NumberFields(TypedDict, Generic[V], total=False):
     p2: Annotated[
         V,
         Field(
-            "Frequency parameter p² of the block, with {kr}",
+            "Frequency parameter p² of the block",
             "1/s²",
             ("p²", "p^2"),
             "p2_1_s2",

@@ -142,7 +142,7 @@ def scenario(
     recovery, unless its base has cohesion: that bond breaks at the first slip, as uplift by water
     and roughness end. Where the rock mass states a residual friction, blocks are answered for as
     they are after it. All others have no answer and are left out of every average; the answer says
-    how many they are.
+    how many they are, as of modes whose models need other measures.
 
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
@@ -193,8 +193,16 @@ def scenario(
         in_domain[blocks], how[blocks] = answers.in_domain, answers.how
 
     answer: PredictionArray | None = None
+    lacking: dict[ModeName, InputError] = {}
+    chosen = None
     if topples.any():
-        chosen = find_model(model, measures, db)
+        try:
+            chosen = find_model(model, measures, db)
+        except InputError as error:
+            if model is not None:
+                raise
+            lacking["topple"] = error
+    if chosen is not None:
         toppling = {"p2": after.stability.p2[topples], "kr": after.kr_at_rest[topples]}
         predicted = answer_given(chosen, {**toppling, **measures}, level)
         assert isinstance(predicted, PredictionArray)
@@ -204,9 +212,15 @@ def scenario(
     modelled: set[ModeName] = set(MODELLED)
     others: dict[ModeName, str] = {}
     if displacement_m is not None:
-        for mode, blocks, answers in _other_modes(
-            after, described, measures, displacement_m, rotation_deg, level, db
+        for mode, blocks, question in _other_modes(
+            after, described, measures, displacement_m, rotation_deg
         ):
+            try:
+                answers = predict(**question, level=level, db=db)
+            except InputError as error:
+                lacking[mode], reason[blocks] = error, str(error)
+                continue
+            assert isinstance(answers, PredictionArray)
             modelled.add(mode)
             others[mode] = answers.model
             fill(blocks, answers)
@@ -214,6 +228,8 @@ def scenario(
         ended = np.isin(reason, (BONDED, ENDS, SLIPS_ON))
         modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & ended)}
 
+    if lacking and answer is None and not others:
+        raise next(iter(lacking.values()))
     covered = np.isfinite(probability)
     modes = []
     for mode in MODES:
@@ -233,7 +249,8 @@ def scenario(
             )
     missing = {m.mode: (m.count - m.covered.count) / realisations.n_blocks for m in modes}
     missing = {mode: share for mode, share in missing.items() if share > 0.0}
-    warnings = _warnings(missing, reason[topples], modelled)
+    why = {**UNANSWERED, **{mode: f": {error}" for mode, error in lacking.items()}}
+    warnings = _warnings(missing, reason[topples], modelled - {*lacking}, why)
     for text in (BONDED, ENDS, SLIPS_ON):
         if count := int(np.count_nonzero(reason == text)):
             warnings.append(f"{count} blocks without an answer: {text}")
@@ -266,15 +283,9 @@ def _other_modes(
     measures: Mapping[str, float],
     displacement_m: float,
     rotation_deg: float | None,
-    level: float,
-    db: str | PathLike[str] | None,
-) -> Iterator[tuple[ModeName, NDArray[np.bool_], PredictionArray]]:
-    """Yield, for all modes but toppling, which blocks a model answers for, and its answers."""
+) -> Iterator[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]]:
+    """Yield, for all modes but toppling, which blocks a model answers for, and what it is asked."""
     distance = positive(displacement_m, "displacement_m", "m")
-    if "pgv_m_s" not in measures:
-        raise InputError(
-            "models of other modes than toppling read PGV: give pgv_m_s too", fields=("pgv_m_s",)
-        )
     motion: dict[str, Any] = {
         name: measures[name]
         for name in ("pgv_m_s", "pga_g", "arias_m_s", "magnitude")
@@ -301,9 +312,7 @@ def _other_modes(
         questions.append((mode, moves, {**dict(numbers), **criterion}))
     for mode, chosen, block in questions:
         if chosen.any():
-            answers = predict(**block, **motion, level=level, db=db)
-            assert isinstance(answers, PredictionArray)
-            yield mode, chosen, answers
+            yield mode, chosen, {**block, **motion}
 
 
 def _average(
@@ -326,6 +335,7 @@ def _average(
 _FOR_SLIDES = ": displacement_m, how far is too far for slides [m], gives them one"
 
 UNANSWERED: Mapping[ModeName, str] = {
+    "topple": "",
     "slide": ": displacement_m, how far is too far [m], gives them one",
     "slump": _FOR_SLIDES,
     "confined_topple": f"{_FOR_SLIDES}, of failure past recovery alone",
@@ -334,11 +344,14 @@ UNANSWERED: Mapping[ModeName, str] = {
 
 
 def _warnings(
-    missing: Mapping[ModeName, float], reason: NDArray[np.object_], modelled: set[ModeName]
+    missing: Mapping[ModeName, float],
+    reason: NDArray[np.object_],
+    modelled: set[ModeName],
+    why: Mapping[ModeName, str],
 ) -> list[str]:
     warnings = [
         f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
-        + ("" if mode in modelled else UNANSWERED[mode])
+        + ("" if mode in modelled else why[mode])
         for mode, share in missing.items()
     ]
     texts, counts = np.unique(reason.astype(str), return_counts=True)

@@ -10,11 +10,17 @@ import numpy as np
 import pytest
 
 from rbfrag.campaign.add_motions import AddReport, add_motions
+from rbfrag.campaign.simulate import simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion, motion_row, motion_rows
+from rbfrag.db.queries import combination_table, motions_on_structures
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pair, vertical_pairs
+from rbfrag.errors import InputError
+from rbfrag.fragility.fit.data import read_source
+from rbfrag.motions.ground_motion import LOCATION, GroundMotion
 from rbfrag.motions.processing import HighPass, processed
+from rbfrag.motions.quality import is_on_structure, quality_flags
 from rbfrag.motions.recognise import read_motion, read_motions
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking, write_at2
@@ -251,8 +257,7 @@ def test_a_file_that_the_metadata_name_is_missing(tmp_path: Path, db: Path) -> N
         ("file,trace_index,units\na.V1,0,g\na.V1,1,m/s2\n", "lines 2, 3 of the metadata"),
         ("file,trace_index,dt_s\na.V1,0,0.02\na.V1,1,0.01\n", "state dt_s 0.01 and 0.02"),
         ("file,trace_index,dt_s\na.V1,0,0.01\n", "not 0.01"),
-        ("file,trace_index,is_vertical\na.V1,0,1\n", "line 2 of the metadata says vertical"),
-        ("file,is_vertical\na.V1,0\n", "line 2 of the metadata says horizontal"),
+        ("file,is_vertical\na.V1,0\n", "line 2 of the metadata says horizontal of trace 1"),
         ("file,component\na.V1,N\n", "calls all 2 traces of the file N: give each a row"),
     ],
 )  # fmt: skip
@@ -422,3 +427,97 @@ def test_real_verticals_go_with_their_horizontals(everything: tuple[Path, AddRep
             assert stored[pair.vertical_id].recording == stored[i].recording
     helena = [row for row in stored.values() if row.recording == "RSN1" and row.is_vertical]
     assert [row.component for row in helena] == ["UP"]
+
+
+def test_metadata_take_precedence_over_a_name_of_the_file(tmp_path: Path, db: Path) -> None:
+    volume_1(tmp_path / "a.V1", "L1", "V2")
+    (tmp_path / "meta.csv").write_text(
+        "file,trace_index,is_vertical,component\na.V1,0,1,\na.V1,1,,N\n"
+    )
+    report = add_motions([tmp_path / "a.V1"], db=db, metadata=tmp_path / "meta.csv")
+    assert [row.is_vertical for row in rows(db)] == [True, False]
+    first, second, _ = report.warnings
+    assert "line 2 of the metadata says vertical of trace 0 (L1)" in first
+    assert first.endswith("the metadata are used")
+    assert "line 3 of the metadata says horizontal of trace 1 (V2)" in second
+
+
+def test_a_direction_that_is_guessed_is_a_warning(tmp_path: Path, db: Path) -> None:
+    write_at2(tmp_path / "a.AT2", shaking(1), event="E", station="S", component="INTC")
+    write_at2(tmp_path / "b.AT2", shaking(2), event="E", station="S", component="+V")
+    (warning,) = add_motions([tmp_path / "a.AT2", tmp_path / "b.AT2"], db=db).warnings
+    assert warning.startswith("1 traces are assumed horizontal though")
+    assert warning.endswith("a.AT2#0 INTC")
+    guessed, vertical = rows(db)
+    assert (guessed.is_vertical, "direction_guessed" in guessed.flags) == (False, True)
+    assert vertical.is_vertical
+    (told,) = simulate(db, p2=[3.0], jobs=1).warnings
+    assert told.startswith("the direction of 1 of 1 motions is guessed")
+
+
+SAMPLE = Path(__file__).parents[3] / "shared" / "cases4" / "records" / "csmip_sta_chn.v2"
+
+
+@pytest.mark.skipif(not SAMPLE.exists(), reason="no shared samples")
+def test_a_sensor_on_a_structure_is_excluded_by_default(tmp_path: Path, db: Path) -> None:
+    report = add_motions([SAMPLE], db=db)
+    told = [(row.is_vertical, row.orientation_deg, "structure" in row.flags) for row in rows(db)]
+    assert told == [
+        (True, None, False), (False, 0.0, False), (False, 270.0, True),
+    ]  # fmt: skip
+    (warning,) = report.warnings
+    assert "1 traces were recorded on a structure" in warning
+    assert warning.endswith("csmip_sta_chn.v2#2 270 DEG at ROOF")
+    with opened_database(db) as engine, engine.connect() as connection:
+        assert "'ROOF'" in quality_flags(load_motion(connection, 3))[0].sentence
+    default = simulate(db, p2=[3.0], jobs=1)
+    assert default.combinations == 2
+    assert default.warnings[0].startswith("1 of 2 horizontal motions were recorded on structures")
+    assert simulate(db, p2=[3.0], jobs=1, include_structures=True).combinations == 4
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        assert (
+            combination_table(connection).p2.size,
+            motions_on_structures(connection, "toppling"),
+        ) == (2, 1)
+        assert combination_table(connection, include_structures=True).p2.size == 4
+        assert (
+            read_source(connection).structures,
+            read_source(connection, include_structures=True).structures,
+        ) == (1, 0)
+
+
+def test_only_records_of_structures(tmp_path: Path, db: Path) -> None:
+    text = SAMPLE.read_text() if SAMPLE.exists() else ""
+    if not text:
+        pytest.skip("no shared samples")
+    (tmp_path / "roof.v2").write_text(text.replace("FREEFIELD", "DECK     "))
+    add_motions([tmp_path / "roof.v2"], db=db)
+    with pytest.raises(
+        InputError, match="all 2 horizontal motions in the database were recorded on"
+    ):
+        simulate(db, p2=[3.0], jobs=1)
+
+
+@pytest.mark.parametrize(
+    ("location", "on_structure"),
+    [
+        ("FREEFIELD", False), ("Free-field", False), ("Ground Level", False), ("", False),
+        ("Ground Floor", True), ("Bent 3: South Column, Grnd Level", True), ("Roof: Center", True),
+    ],
+)  # fmt: skip
+def test_locations(location: str, on_structure: bool) -> None:
+    remarks = (LOCATION + location,) if location else ()
+    assert is_on_structure(GroundMotion(np.ones(3), 0.01, remarks=remarks)) is on_structure
+
+
+def test_locations_of_every_format_that_states_them(tmp_path: Path) -> None:
+    channels = [("UP", [f"{value:.4f}" for value in shaking(1)]), ("90 DEG", tokens(2))]
+    channels[1] = ("90 DEG", channels[0][1])
+    text = written.cdmg_v1(channels, 0.02)
+    text = text.replace("(STA CHN:  2)       ", "(STA CHN:  2)  LOCATION: ROOF")
+    (tmp_path / "a.v1").write_text(text)
+    assert [motion.location for motion in read_motions(tmp_path / "a.v1")] == ["", "ROOF"]
+    text = written.cosmos([f"{value:.6E}" for value in shaking(1)], 0.02)
+    (tmp_path / "b.V1c").write_text(text.replace("Location:", "Location:Roof Center"))
+    (motion,) = read_motions(tmp_path / "b.V1c")
+    assert (motion.location, motion.orientation_deg) == ("Roof Center", 90.0)

@@ -49,15 +49,18 @@ def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
     for command in (
         ("motions", "list"),
         ("simulate",),
-        ("fit", "--term", "pgv"),
         ("models", "check"),
         ("db", "info"),
         ("db", "check"),
         ("db", "upgrade"),
     ):
         assert "rbfrag.db" in refuses(*command)
-    asked = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
-    assert "none.db" in refuses(*asked, "--db", "none.db")
+    # without a name the built-in data answer these
+    for asked in (
+        ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"),
+        ("fit", "--term", "pgv"),
+    ):
+        assert "none.db" in refuses(*asked, "--db", "none.db")
     assert not list(tmp_path.glob("*.db"))
 
 

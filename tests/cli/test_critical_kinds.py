@@ -97,3 +97,7 @@ def test_a_sentence_and_four_numbers_unless_more_is_asked_for(shell: Shell, reco
     assert names == ["kr", "kr_over_pga", "y_m_s", "pga_g"]
     every = shell("critical", record, "--p2", "3", "--verbose").stdout
     assert all(f"\n{name} " in every for name in answer if name != "warnings")
+
+
+def test_the_help_names_no_option_of_other_commands(shell: Shell) -> None:
+    assert "--kr" not in shell("critical", "--help").stdout

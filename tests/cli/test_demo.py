@@ -7,6 +7,8 @@ import shlex
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from rbfrag.cli.commands.demo import NEXT
 from tests.cli.conftest import Shell, shell
 
@@ -34,3 +36,17 @@ def test_the_first_six_options_are_those_of_a_beginner(shell: Shell) -> None:
         "--height", "--width", "--dip", "--phi", "--kind", "--pgv",
     ]  # fmt: skip
     assert len(re.findall(r"^  --pgv ", text, re.M)) == 1
+
+
+def test_the_demo_says_at_its_end_that_it_fitted_synthetic_pulses(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rbfrag.cli.commands.demo._run", lambda context, arguments: None)
+    for package, told in ((None, True), ("rbfrag", False)):
+        # a base install has no sample records
+        monkeypatch.setattr(
+            "rbfrag.motions.sample_motions.sample_folder", lambda p=package: p and Path()
+        )
+        monkeypatch.setattr("rbfrag.motions.sample_motions.find_spec", lambda name: None)
+        end = shell("demo").stdout.partition("written:")[2]
+        assert ("12 synthetic pulses" in end) is told

@@ -15,7 +15,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
-from tests.cli.conftest import Shell
+from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 from tests.hazards.conftest import measure_row
 
@@ -208,3 +208,11 @@ def test_refusals(refuses: Callable[..., str], options: tuple[str, ...], words: 
 @pytest.mark.usefixtures("database")
 def test_the_suffix_is_checked_first(refuses: Callable[..., str]) -> None:
     assert "none of .xml" in refuses("export", "nrml", "--p2", "3", "--kr", "1", "--out", "a.csv")
+
+
+def test_the_measures_that_work_are_named_and_no_others(refuses: Refuses) -> None:
+    for imt in ("SA(0.3)", "SA(2.0)", "SA(3.0)"):
+        message = refuses(
+            "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
+        )
+        assert message.endswith(f"{imt}: no model reads it alone: use one of PGV, PGA, SA(1)")

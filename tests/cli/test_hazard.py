@@ -285,7 +285,7 @@ def test_plot(shell: Shell, curve: Path) -> None:
         ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
          "no model reads SA(0.75) alone: give a curve of one of PGV, SA(1), PGA"),
         ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
-         "PGA alone is biased"),
+         "PGA alone is biased; give a curve of PGV or SA(1.0), or the --disaggregation by"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert-sigma", "0.5"),
          "--convert-sigma belongs to --convert"),
         ("sa(1)_g,annual_rate\n0.1,0.01\n0.5,0.001\n",

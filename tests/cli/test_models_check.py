@@ -95,3 +95,17 @@ def test_a_campaign_of_two_sizes_ends_in_one_sentence(
     shell("simulate", "--p2", "10,1", "--jobs", "1")
     message = refuses("fit", "--term", "pga", "--method", "bounded")
     assert "do not tell the 5 parameters of method bounded apart" in message
+
+
+def test_a_default_is_chosen_in_a_copy_of_the_built_in_data(
+    shell: Shell, refuses: Refuses, tmp_path: Path
+) -> None:
+    said = refuses("models", "default", "logistic-sa10")
+    assert "copy" in said
+    assert str(REFERENCE) in said
+    assert "rbfrag db upgrade" in said
+    shutil.copy(REFERENCE, tmp_path / "rbfrag.db")
+    shell("db", "upgrade")
+    shell("models", "default", "logistic-sa10")
+    defaults = [each["name"] for each in shell.json("models", "list") if each["is_default"]]
+    assert "logistic-sa10" in defaults

@@ -77,6 +77,7 @@ def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
     [
         (0.0, "0 %"), (1e-9, "below 0.01 %"), (3e-4, "0.03 %"), (0.0123, "1.2 %"),
         (0.1161, "12 %"), (0.996, "99.6 %"), (0.9999, "above 99.9 %"), (1.0, "100 %"),
+        (199 / 200, "99.5 %"), (0.9949, "99 %"),
     ],
 )  # fmt: skip
 def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:

@@ -269,3 +269,9 @@ def test_free_standing_blocks_with_their_restitution(
     assert told["model"] == "rocking-pgv_pga"
     message = refuses("shakemap", grid, *one, *SINGLE, "--kind", "toppling")
     assert "--restitution does not go with kind toppling" in message
+
+
+def test_progress_is_shown(shell: Shell, grid: Path) -> None:
+    said = shell("shakemap", grid, *ONE, "--out", "a.csv", *SINGLE, "--draws", "100")
+    assert "shakemap: 100/100 draws" in said.stderr
+    assert "draws" not in said.stdout

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,7 @@ def test_two_columns_as_people_write_them(
         ("{}", "one member a measure"),
         ('{"Peak Ground Acceleration": {"xs": [0.0, "a"], "ys": [1, 2]}}', r"xs\[1\] = 'a'"),
         ('{"Peak Ground Acceleration": {"xs": [0.0, 1.0], "ys": [1]}}', "2 levels and 1 rates"),
-        ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "the measure is not known"),
+        ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "measure 'Arias' is not known"),
     ],
 )  # fmt: skip
 def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
@@ -147,7 +148,7 @@ def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
 def test_no_such_file_and_no_text(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_hazard_curves(tmp_path / "none.csv")
-    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfd\x00")
     with pytest.raises(InputError, match="byte 0 is not UTF-8"):
         read_hazard_curves(tmp_path / "b.csv")
     with pytest.raises(InputError, match="folder"):
@@ -175,3 +176,90 @@ def test_arrays_of_curves_are_refused(tmp_path: Path) -> None:
     np.savez(path, investigation_time=50.0)
     with pytest.raises(InputError, match=r"oq export hcurves CALC_ID -e csv"):
         read_hazard_curves(path)
+
+
+UNIFIED_HAZARD_TOOL = {
+    "status": "success",
+    "response": [
+        {
+            "metadata": {
+                "latitude": 34, "longitude": -118,
+                "imt": {"value": value, "display": display},
+                "xlabel": "Ground Motion (g)", "ylabel": "Annual Frequency of Exceedence",
+                levels: [0.005, 0.05, 0.5],
+            },
+            "data": data,
+        }
+        for value, display, levels, data in (
+            ("PGA", "Peak Ground Acceleration", "xvals", [{"yvals": [0.4, 0.05, 0.001]}]),
+            ("SA1P0", "1.00 Second Spectral Acceleration", "xvalues",
+             [{"component": "Total", "yvalues": [0.5, 0.03, 0.002]},
+              {"component": "Fault", "yvalues": [0.3, 0.02, 0.001]}]),
+        )
+    ],
+}  # fmt: skip
+"""As the Unified Hazard Tool answers, its static service and its dynamic one."""
+
+NSHMP_WS = {
+    "request": {"longitude": -118.0, "latitude": 34.0, "vs30": 760},
+    "response": {
+        "hazardCurves": [
+            {
+                "imt": {"value": "PGV", "display": "Peak Ground Velocity"},
+                "data": [
+                    {"component": "Total", "values": {"xs": [1.0, 10.0], "ys": [0.1, 0.01]}},
+                    {"component": "Grid", "values": {"xs": [1.0, 10.0], "ys": [0.05, 0.005]}},
+                ],
+            }
+        ]
+    },
+}
+
+
+def test_answers_of_the_usgs_services(tmp_path: Path) -> None:
+    path = tmp_path / "uht.json"
+    path.write_text(json.dumps(UNIFIED_HAZARD_TOOL))
+    pga, sa = read_hazard_curves(path)
+    assert (pga.imt, sa.imt, sa.lon, sa.lat) == ("PGA", "SA(1)", -118, 34)
+    np.testing.assert_array_equal(pga.levels, [0.005, 0.05, 0.5])
+    np.testing.assert_array_equal(sa.annual_rate, [0.5, 0.03, 0.002])
+    path.write_text(json.dumps(NSHMP_WS))
+    (pgv,) = read_hazard_curves(path)
+    assert (pgv.imt, pgv.lon, pgv.lat) == ("PGV", -118.0, 34.0)
+    np.testing.assert_allclose(pgv.levels, [0.01, 0.1])
+    np.testing.assert_array_equal(pgv.annual_rate, [0.1, 0.01])
+    for broken in ({"response": {}}, {"response": [{"metadata": {}}]}, {"response": None}):
+        path.write_text(json.dumps(broken))
+        with pytest.raises(InputError, match="no hazard curves as the USGS services answer"):
+            read_hazard_curves(path)
+
+
+@pytest.mark.parametrize("word", ["Exceedance", "Exceedence"])
+def test_a_header_of_the_usgs_tools(tmp_path: Path, word: str) -> None:
+    path = tmp_path / "curve.csv"
+    path.write_text(f"Ground Motion (g), Annual Frequency of {word}\n0.01, 0.1\n0.1, 0.01\n")
+    (curve,) = read_hazard_curves(path, imt="SA(1.0)")
+    assert curve.imt == "SA(1)"
+    np.testing.assert_array_equal(curve.levels, [0.01, 0.1])
+    np.testing.assert_array_equal(curve.annual_rate, [0.1, 0.01])
+    with pytest.raises(InputError, match=r"does not say whether of PGA or SA; state it as imt PGA"):
+        read_hazard_curves(path)
+
+
+def test_a_row_for_each_site(tmp_path: Path) -> None:
+    path = tmp_path / "curves.csv"
+    path.write_text(
+        "name,lon,lat,1.0E-3,0.01,0.1\nLos Angeles,-118.25,34.05,0.5,0.1,0.01\n"
+        "Reno,-119.8,39.55,0.4,0.08,0.006\n"
+    )
+    first, second = read_hazard_curves(path, imt="PGA")
+    assert (first.site, first.lon, first.lat) == ("Los Angeles", -118.25, 34.05)
+    np.testing.assert_array_equal(second.levels, [0.001, 0.01, 0.1])
+    np.testing.assert_array_equal(second.annual_rate, [0.4, 0.08, 0.006])
+    (named,) = read_hazard_curves(path, imt="PGA", site="Reno")
+    assert named.lat == 39.55
+    with pytest.raises(InputError, match="does not say whether of PGA or SA"):
+        read_hazard_curves(path)
+    path.write_text("name,lon,lat,0.001,0.01\nReno,-119.8,39.55,0.4\n")
+    with pytest.raises(InputError, match="line 2: 4 cells under 5 columns"):
+        read_hazard_curves(path, imt="PGA")

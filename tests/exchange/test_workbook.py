@@ -13,11 +13,13 @@ import numpy as np
 import openpyxl
 import pytest
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables import workbook
 from rbfrag.exchange.tables.files import write_block_table
+from rbfrag.hazards.curve_file import read_hazard_curves
+from rbfrag.motions.recognise import read_motions
 from rbfrag.question.components import SINGLE_ASSUMED
 from tests.block_tables import read_columns
 
@@ -216,3 +218,67 @@ for act in (lambda: table_path("a.xlsx"), lambda: read_blocks("a.xlsx")):
         [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert done.stdout.count("pip install 'rbfrag[excel]'") == 2, done.stderr
+
+
+def save_ods(path: Path, **sheets: list[tuple[object, ...]]) -> Path:
+    """An OpenDocument spreadsheet as LibreOffice has it."""
+    import pandas as pd
+
+    with pd.ExcelWriter(path, engine="odf") as writer:
+        for name, rows in sheets.items():
+            frame = pd.DataFrame(rows)
+            frame.to_excel(writer, sheet_name=name, header=False, index=False)
+    return path
+
+
+def test_an_open_document_spreadsheet_is_answered_as_a_workbook_is(tmp_path: Path) -> None:
+    rows = [HEAD, (1, 3, 0.1, 0.6, "y"), ("b", 3.5, "0,1", 0.6, None), ("c", 3, None, 0.6, "x")]
+    source = save_ods(tmp_path / "blocks.ods", blocks=rows, other=[("kr",), (0.1,)])
+    save(tmp_path / "blocks.xlsx", *rows)
+    told = answer(source, tmp_path / "a.csv")
+    same = answer(tmp_path / "blocks.xlsx", tmp_path / "b.csv")
+    assert (
+        (told["rows"], told["without_answer"]) == (same["rows"], same["without_answer"]) == (3, 1)
+    )
+    first, second = (
+        read_columns(tmp_path / name, ("probability",), texts=("block_id",))
+        for name in ("a.csv", "b.csv")
+    )
+    assert [*first["block_id"]] == [*second["block_id"]]
+    np.testing.assert_array_equal(
+        np.asarray(first["probability"]), np.asarray(second["probability"])
+    )
+    with pytest.raises(InputError, match="there is no sheet 'third'; the sheets are blocks, other"):
+        read_blocks(source, sheet="third")
+    with pytest.raises(InputError, match=r"the suffix '\.ods' is none of"):
+        write_block_table({"kr": np.ones(1)}, tmp_path / "out.ods")
+    source.write_bytes(b"PK\x03\x04 no archive")
+    with pytest.raises(InputError, match=r"spreadsheet \(.ods\), or a damaged one"):
+        read_blocks(source)
+
+
+def test_without_odfpy_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = save_ods(tmp_path / "blocks.ods", blocks=[("p2", "kr"), (3.0, 0.1)])
+    monkeypatch.setitem(sys.modules, "odf", None)
+    monkeypatch.setitem(sys.modules, "odf.opendocument", None)
+    with pytest.raises(MissingExtraError, match="need odfpy"):
+        read_blocks(source)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
+def test_text_in_utf_16(tmp_path: Path, delimiter: str, encoding: str) -> None:
+    rows = [("block_id", "p2_1_s2", "kr", "pgv_m_s"), ("Größe", "3", "0.1", "0.6")]
+    text = "".join(delimiter.join(row) + "\r\n" for row in rows)
+    mark = b"" if encoding == "utf-16" else b"\xfe\xff"
+    (tmp_path / "blocks.csv").write_bytes(mark + text.encode(encoding))
+    answer(tmp_path / "blocks.csv", tmp_path / "out.csv")
+    found = (tmp_path / "out.csv").read_text(encoding="utf-8-sig")
+    assert "Größe" in found
+    # Excel's "Unicode text": a hazard curve and an accelerogram, too
+    curve = "pgv_m_s,annual_rate\r\n0.1,0.01\r\n0.5,0.001\r\n"
+    (tmp_path / "curve.csv").write_bytes(mark + curve.encode(encoding))
+    assert read_hazard_curves(tmp_path / "curve.csv")[0].levels.tolist() == [0.1, 0.5]
+    record = "time [s],a [m/s²]\r\n" + "".join(f"{0.01 * i:.2f},{i % 7}\r\n" for i in range(50))
+    (tmp_path / "record.csv").write_bytes(mark + record.encode(encoding))
+    assert read_motions(tmp_path / "record.csv")[0].npts == 50

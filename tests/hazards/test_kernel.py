@@ -61,3 +61,40 @@ def test_the_mass_is_the_rate_of_the_first_level_with_scatter_and_without() -> N
     beyond = under([curve()], grid)[0][node:]
     level = float(np.exp(grid.u[node]))
     assert beyond.sum() - 0.5 * beyond[0] == pytest.approx(float(curve().rate_at(level)), rel=1e-4)
+
+
+def random_curve(rng: np.random.Generator, measure: str) -> HazardCurve:
+    """A curve of random ends, steps and slopes, flat in parts, steep in others."""
+    n = int(rng.integers(2, 15))
+    steps = rng.uniform(0.1, 0.8, n)
+    x = np.exp(np.cumsum(steps) + rng.uniform(-7.0, -1.0))
+    falls = rng.exponential(rng.uniform(0.01, 3.0), n) * (rng.random(n) > 0.2)
+    return hazard_curve(measure, x, 10.0 ** rng.uniform(-4.0, 0.0) * np.exp(-np.cumsum(falls)))
+
+
+def test_rates_of_random_pairs_are_bounded_and_monotone() -> None:
+    """10,000 pairs of curve and block: 0 <= rate <= that of the first level, falling with k_r."""
+    rng, pairs = np.random.default_rng(45), 100
+    site = np.zeros(pairs, dtype=np.intp)
+    for turn in range(100):
+        measure, component = ("pgv_m_s", "pga_g")[turn % 2], ("single", "rotd50")[turn // 2 % 2]
+        drawn = random_curve(rng, measure)
+        shaking = LevelShaking.of(drawn, component=component)
+        p2 = np.exp(rng.uniform(np.log(0.1), np.log(30.0), pairs))
+        kr = np.exp(rng.uniform(np.log(0.02), np.log(3.0), pairs))
+
+        def annual(
+            curve: HazardCurve, kr: np.ndarray, shaking: LevelShaking = shaking,
+            measure: str = measure, p2: np.ndarray = p2,
+        ) -> np.ndarray:  # fmt: skip
+            model = model_for({}, ("p2", "kr", measure), "toppling")
+            numbers = {"p2": p2, "kr": kr}
+            ((_, own),) = KernelBlocks.of(model, shaking.median, numbers, site)
+            return rates(own, curve_mass([[curve]], np.ones(1), shaking), 0.95).rate
+
+        rate = annual(drawn, kr)
+        assert (rate >= 0.0).all()
+        assert (rate <= drawn.annual_rate[0]).all()
+        assert (annual(drawn, 1.05 * kr) <= rate).all()
+        higher = hazard_curve(measure, drawn.levels, 1.3 * drawn.annual_rate)
+        assert (annual(higher, kr) >= rate).all()

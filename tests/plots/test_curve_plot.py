@@ -9,6 +9,7 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.words import fitted_in_words
 from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
@@ -35,7 +36,7 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
         here = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
         assert (here.min(), here.max()) == pytest.approx((answer.ci_low, answer.ci_high))
     assert y[-1] > 0.95
-    assert "360 critical blocks of 7 earthquakes" in axes.get_title()
+    assert "fitted on 360 critical values of 7 earthquakes" in axes.get_title()
 
 
 def test_the_range_at_some_sites_is_a_second_band(tmp_path, caught) -> None:
@@ -87,3 +88,12 @@ def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overla
     assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 20
     assert axes.get_window_extent().height > 0.3 * figure.bbox.height
     assert overlapping(figure, [axes.title, *figure.legends[0].get_texts()]) == []
+
+
+def test_a_model_of_outcomes_is_fitted_on_outcomes() -> None:
+    about = {"n": 8579, "n_outcomes": 45766, "events": 100}
+    assert fitted_in_words(about) == "fitted on 45,766 outcomes of 100 earthquakes"
+    assert fitted_in_words({"n": 8579, "events": 100}) == (
+        "fitted on 8,579 critical values of 100 earthquakes"
+    )
+    assert fitted_in_words({}) == ""

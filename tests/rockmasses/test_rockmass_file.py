@@ -146,7 +146,7 @@ def test_csv_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "folder.toml").mkdir()
-    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00variable")
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfd\x00variable")
     written(tmp_path, "empty.csv", "")
     for name, words in (
         ("none.toml", "no such file"),

@@ -112,8 +112,20 @@ def test_no_shaking_moves_nothing_that_stands() -> None:
 def test_what_the_models_lack_is_refused() -> None:
     with pytest.raises(InputError, match="displacement_m"):
         scenario(MADE, {"pgv_m_s": 0.6}, displacement_m=0.0)
-    with pytest.raises(InputError, match="read PGV"):
-        scenario(MADE, {"pga_g": 0.6, "tm_s": 0.5}, displacement_m=0.1)
     without = scenario(MADE, {"pgv_m_s": 0.6})
     assert without.covered_share < 1.0
     assert math.isclose(sum(without.uncovered_share.values()), 1.0 - without.covered_share)
+
+
+def test_what_can_be_answered_is_and_the_rest_is_listed() -> None:
+    pgv = scenario(MADE, {"pgv_m_s": 0.6}, displacement_m=0.05)
+    covered = {mode.mode: mode.covered.count for mode in pgv.modes}
+    assert covered["slide"] > 0
+    assert covered["slump"] == 0
+    lacks = [text for text in pgv.warnings if text.startswith("slump: ")]
+    assert len(lacks) == 1
+    assert lacks[0].endswith("no stored slumping model works with pgv_m_s: give pgv_m_s and pga_g")
+    slumps = MADE.of_mode("slump", "stable")
+    assert set(pgv.reason[slumps & np.isnan(pgv.probability)]) == {lacks[0].split("answer: ")[1]}
+    with pytest.raises(InputError, match="no stored sliding model works with pga_g: give pgv_m_s"):
+        scenario(MADE, {"pga_g": 0.6}, displacement_m=0.1)

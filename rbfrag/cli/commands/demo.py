@@ -32,7 +32,7 @@ def demo(
     rbfrag-demo-response.png and rbfrag-demo-fit.png.
     """
     from rbfrag.errors import InputError
-    from rbfrag.motions.sample_motions import demo_motions
+    from rbfrag.motions.sample_motions import demo_motions, sample_folder
 
     home = Path(folder)
     if not home.is_dir():
@@ -59,6 +59,8 @@ def demo(
     print(f"\ndone in {time.perf_counter() - started:.0f} s; written:")
     for path in (database, response_png, fit_png):
         print(f"  {path}")
+    if sample_folder() is None:
+        print(f"\n{sentence}")
     print("\nnext:")
     for command in NEXT:
         print(f"  {command}")

@@ -17,6 +17,7 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.sentences import rounded
+from rbfrag.fragility.words import fitted_in_words
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport
@@ -29,6 +30,7 @@ class Data:
     """What is fitted."""
 
     suite: options.Suite = None
+    include_structures: bool = option(options.INCLUDE_STRUCTURES, False)
     vertical: str = option("Combinations without vertical motion, with it, or both.", "without")
     doubtful_pgd: bool = option(
         "Let pgd_tm read the PGD of records flagged final_velocity or "
@@ -85,7 +87,8 @@ def fit(
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
-    The model is stored. The one of the best score on earthquakes left out is the default of its
+    The model is stored in the database; without one the built-in data are fitted and nothing is
+    stored. The one of the best score on earthquakes left out is the default of its
     kind, unless  rbfrag models default NAME  has chosen another.
     """
     from rbfrag.fragility.fit.stored import fit as run
@@ -96,6 +99,7 @@ def fit(
         term=term,
         method=method,
         suite=data.suite,
+        include_structures=data.include_structures,
         vertical=data.vertical,  # type: ignore[arg-type]
         name=stored.name,
         seed=stored.seed,
@@ -131,11 +135,9 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
         f"Model {report.name} ({report.method} on {report.term}{default}) says the "
         f"{report.model.meaning}."
     )
-    outcomes: Any = report.details.get("n_outcomes")
     if why := report.details.get("why_method"):
         yield f"No method was named: {why}."
-    what = f"{report.n:,} critical values" if outcomes is None else f"{outcomes:,} outcomes"
-    data = f"It is fitted on {what} of {report.events:,} earthquakes"
+    data = f"It is {fitted_in_words(report.model.row.diagnostics)}"
     score = report.scores.get("log_loss_held_out")
     around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
     if score is None:

@@ -86,8 +86,16 @@ def show_model(
 def set_default_model(name: Name, db: options.Db = None) -> None:
     """Choose the default of a kind, instead of the model of the best score."""
     from rbfrag.db.engine import opened_database
+    from rbfrag.db.location import data_place
     from rbfrag.db.models import set_default
+    from rbfrag.errors import InputError
 
+    place, built_in = data_place(db)
+    if built_in:
+        raise InputError(
+            f"the built-in data set is read only: name the model with --model {name}, or copy "
+            f"{place} to rbfrag.db, run  rbfrag db upgrade  and choose the default of that"
+        )
     with opened_database(db) as engine, engine.begin() as connection:
         set_default(connection, name)
     print(f"{name} is the default model now")

@@ -7,6 +7,7 @@ from typing import Any
 
 from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
 from rbfrag.cli.output import (
+    ProgressBar,
     check_files,
     print_json,
     print_pairs,
@@ -99,11 +100,12 @@ def shakemap(
             f"{target}: a GeoTIFF file takes the nodes of a grid, and these blocks have places of "
             "their own: write .gpkg or .csv in its place"
         )
-    answer = answered(
-        grid, blocks=several.question, uncertainty=meaning.uncertainty,
-        component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
-        seed=drawing.seed, **answering,
-    )  # fmt: skip
+    with ProgressBar("shakemap", "draws") as bar:
+        answer = answered(
+            grid, blocks=several.question, uncertainty=meaning.uncertainty,
+            component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
+            seed=drawing.seed, **answering, on_progress=bar.show,
+        )  # fmt: skip
     warnings = [*several.remarks, *answer.warnings]
     about = {**answer.about, "warnings": warnings, "notes": as_documents(warnings)}
     _write(dict(answer.columns), about, target, excel_text=excel_text)

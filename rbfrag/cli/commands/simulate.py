@@ -141,6 +141,7 @@ def simulate(
     *,
     workers: WorkerOptions,
     suite: options.Suite = None,
+    include_structures: bool = option(options.INCLUDE_STRUCTURES, False),
     kind: str = option(
         "What the blocks do: toppling, rocking, slumping, confined_toppling or sliding.", "toppling"
     ),
@@ -185,6 +186,7 @@ def simulate(
             db,
             kind=kind,
             suite=suite,
+            include_structures=include_structures,
             p2=_numbers(blocks.p2, "--p2"),
             rotations_deg=None if blocks.rotation is None else _rotations(blocks.rotation),
             displacements_m=_numbers(blocks.displacement, "--displacement"),

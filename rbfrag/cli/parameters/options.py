@@ -90,6 +90,7 @@ AllowPartial = Annotated[
     ),
 ]
 
+INCLUDE_STRUCTURES = "Use records of sensors on structures (flag structure), excluded by default."
 Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
 
 Block = Annotated[

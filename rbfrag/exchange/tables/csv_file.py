@@ -29,6 +29,7 @@ from rbfrag.exchange.tables.parts import (
     pyarrow,
     split_header,
 )
+from rbfrag.files import encoding_of
 from rbfrag.question.table import ROWS_ABOVE, fields_stated, header_row
 
 NOTE = "# note"
@@ -42,9 +43,10 @@ def dialect_of(origin: Path) -> Dialect:
     """Return how a file is written, of its header and its first cells."""
     with origin.open("rb") as file:
         start = file.read(_PEEK)
-    if b"\0" in start:
+    encoding = encoding_of(start)
+    if b"\0" in start and encoding != "utf-16":
         raise InputError(f"{origin} is binary, not text: name a block table, saved as CSV")
-    lines = start.removeprefix(_BOM).decode("utf-8", "replace").splitlines() or [""]
+    lines = start.decode(encoding, "replace").splitlines() or [""]
 
     def rows(delimiter: str) -> list[list[str]]:
         return list(csv.reader(lines[:ROWS_ABOVE], delimiter=delimiter))
@@ -59,7 +61,7 @@ def dialect_of(origin: Path) -> Dialect:
             for mark in ".,"
         )
         decimal = "." if points and not commas else ","
-    return Dialect(delimiter, decimal, start.startswith(_BOM))
+    return Dialect(delimiter, decimal, start.startswith(_BOM) or encoding == "utf-16", encoding)
 
 
 def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
@@ -69,13 +71,13 @@ def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
     of the time; from the first cell on that is no number, it is read cell by cell as others are.
     """
     dialect = dialect_of(origin)
-    file = stack.enter_context(origin.open(newline="", encoding="utf-8-sig"))
+    file = stack.enter_context(origin.open(newline="", encoding=dialect.encoding))
     reader = csv.reader(file, delimiter=dialect.delimiter)
     names, line, rows, remarks = split_header(_rows(reader), "line")
 
     def read(numeric: Container[str]) -> Parts:
         done: int | None = 0
-        if fast and dialect.delimiter == ",":
+        if fast and dialect.delimiter == "," and dialect.encoding != "utf-16":
             done = yield from _by_arrow(origin, names, line, numeric)
         if done is not None:
             decimal = "," if dialect.decimal == "," else ".,"

@@ -21,11 +21,11 @@ from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
 from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
 from rbfrag.exchange.tables.parts import Dialect, TableFile, TablePart, Write, pyarrow
 from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer
-from rbfrag.files import output_path, reading, write_text, written_whole
+from rbfrag.files import WORKBOOKS, output_path, reading, write_text, written_whole
 from rbfrag.results.diagnostic import as_documents
 
 SUFFIXES = (".csv", ".xlsx", ".parquet")
-"""File types of a table of blocks."""
+"""File types of a table of blocks, of which .ods is read too."""
 
 MOST_BYTES = 1 << 36
 """Larger tables are refused: a thousand million blocks need no more."""
@@ -65,11 +65,11 @@ def open_table(
         return _of_one_part(_given_part(source), "row")
     path = Path(source)
     suffix = path.suffix.lower()
-    if sheet is not None and suffix != ".xlsx":
+    if sheet is not None and suffix not in WORKBOOKS:
         raise InputError(f"{path} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
     if suffix in GEOJSON:
         return _of_one_part(read_points(path), "feature")
-    if suffix not in SUFFIXES:
+    if suffix not in (*SUFFIXES, *WORKBOOKS):
         raise InputError(
             f"{path}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
             f"{path.suffix!r}"
@@ -78,7 +78,7 @@ def open_table(
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise InputError(f"{path} has {size} bytes: no block table is so large")
-    if suffix == ".xlsx":
+    if suffix in WORKBOOKS:
         return open_workbook(path, stack, sheet)
     if suffix == ".parquet":
         return open_parquet(path, stack)

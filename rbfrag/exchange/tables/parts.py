@@ -106,12 +106,14 @@ class Dialect:
     Args:
         delimiter: what stands between cells: a comma, a semicolon or a tab.
         decimal: what stands before decimals: a point or a comma.
-        marked: whether it begins with the mark of UTF-8 (BOM) that spreadsheets write.
+        marked: whether it begins with a byte-order mark, as spreadsheets write it.
+        encoding: how it is read; it is written in UTF-8.
     """
 
     delimiter: str = ","
     decimal: str = "."
     marked: bool = False
+    encoding: str = "utf-8-sig"
 
 
 @dataclass(eq=False)

@@ -1,4 +1,4 @@
-"""A table of blocks as a sheet of an Excel workbook (.xlsx)."""
+"""A table of blocks as a sheet of an Excel workbook (.xlsx), or of a spreadsheet (.ods)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Container, Generator, Iterator, Mapping, Sequence
+from collections.abc import Container, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,20 @@ def openpyxl() -> Any:
     return library
 
 
+def _open_document_rows(origin: Path) -> dict[str, Iterable[Sequence[Any]]]:
+    """Return the rows of each sheet of an OpenDocument spreadsheet (.ods)."""
+    import pandas as pd
+
+    try:
+        frames = pd.read_excel(origin, engine="odf", sheet_name=None, header=None, dtype=object)
+    except ImportError:
+        raise MissingExtraError("OpenDocument spreadsheets (.ods) need odfpy", "excel") from None
+    return {
+        str(title): [[None if cell != cell else cell for cell in row] for row in frame.to_numpy()]
+        for title, frame in frames.items()
+    }
+
+
 def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFile:
     """Return a sheet that is open; the stack closes its workbook.
 
@@ -71,21 +85,25 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
     Raises:
         InputError: no workbook, one without that sheet, or with a formula that was never computed.
     """
-    library = openpyxl()
     with _damage(origin):
         _check(origin)
-        book = library.load_workbook(origin, read_only=True, data_only=True, keep_links=False)
-        stack.callback(book.close)
-        sheets = {each.title: each for each in book.worksheets}
+        if origin.suffix.lower() == ".ods":
+            sheets = _open_document_rows(origin)
+        else:
+            book = openpyxl().load_workbook(
+                origin, read_only=True, data_only=True, keep_links=False
+            )
+            stack.callback(book.close)
+            for each in book.worksheets:
+                each.reset_dimensions()  # what programs state there is not always so
+            sheets = {each.title: each.iter_rows(values_only=True) for each in book.worksheets}
         if not sheets:
             raise InputError(f"{origin}: the workbook has no sheet")
         if sheet is not None and sheet not in sheets:
             raise InputError(
                 f"{origin}: there is no sheet {sheet!r}; the sheets are {', '.join(sheets)}"
             )
-        chosen = book.worksheets[0] if sheet is None else sheets[sheet]
-        chosen.reset_dimensions()  # what programs state there is not always so
-        filled = _rows(origin, chosen)
+        filled = _rows(origin, sheets[next(iter(sheets)) if sheet is None else sheet])
         stack.callback(filled.close)
         names, _, rows, remarks = split_header(filled, "row")
 
@@ -98,9 +116,11 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
     return TableFile(names, read, remarks, sheets=() if sheet else [*sheets])
 
 
-def _rows(origin: Path, sheet: Any) -> Generator[tuple[int, Sequence[Any]], None, None]:
+def _rows(
+    origin: Path, rows: Iterable[Sequence[Any]]
+) -> Generator[tuple[int, Sequence[Any]], None, None]:
     with _damage(origin):
-        for number, row in enumerate(sheet.iter_rows(values_only=True), 1):
+        for number, row in enumerate(rows, 1):
             if any(cell is not None and str(cell).strip() for cell in row):
                 yield number, row
 
@@ -115,7 +135,8 @@ def _damage(origin: Path) -> Iterator[None]:
             raise
         except DAMAGED as error:
             raise InputError(
-                f"{origin}: not an Excel workbook (.xlsx), or a damaged one: {error}; save it anew"
+                f"{origin}: not an Excel workbook or spreadsheet ({origin.suffix}), or a damaged "
+                f"one: {error}; save it again"
             ) from None
 
 

@@ -40,12 +40,13 @@ class ModelCheck:
 
 
 def selection_of(row: ModelRow) -> Selection:
-    """Return what a fit was asked to read: suite, vertical motion, doubtful PGD, rotation."""
+    """Return what a fit was asked to read."""
     diagnostics = cast("Mapping[str, Any]", row.diagnostics)
     return {
         "suite": diagnostics.get("suite"),
         "vertical": diagnostics.get("vertical", "without"),
         "doubtful_pgd": bool(diagnostics.get("doubtful_pgd", False)),
+        "include_structures": bool(diagnostics.get("include_structures", False)),
         "rotation_deg": diagnostics.get("rotation_deg"),
     }
 

@@ -68,6 +68,7 @@ class FitSource:
         sensitive: whether outcomes of the grid are other ones for the motion times 1 ± 1e-6, shape
             (n, m), NaN where that is not stored; None where it is of none.
         of_block: what is stored of the blocks beside their size, by name, shape (n,).
+        structures: number of motions that are excluded, recorded on structures.
     """
 
     table: CombinationTable
@@ -78,6 +79,7 @@ class FitSource:
     recording: NDArray[np.int64] | None = None
     sensitive: FloatArray | None = None
     of_block: Mapping[str, FloatArray] = field(default_factory=dict)
+    structures: int = 0
 
     @classmethod
     def of_table(cls, table: CombinationTable) -> FitSource:
@@ -89,7 +91,7 @@ class FitSource:
         """Return some of the combinations."""
         part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        del columns["table"], columns["of_block"]
+        del columns["table"], columns["of_block"], columns["structures"]
         return replace(
             self,
             table=CombinationTable(**part),
@@ -142,17 +144,18 @@ def read_source(
         block: what describes the kind's block.
         kind: response kind; None for the one that `block` stands for.
     """
-    from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
+    from rbfrag.db import queries
     from rbfrag.db.spectra import spectrum_values
 
     kind_read = kind or block.kind
-    table = combination_table(connection, kind=kind_read, **selection)
+    table = queries.combination_table(connection, kind=kind_read, **selection)
     spectra = {}
     for version in np.unique(table.numerics_version.astype(str)).tolist():
         spectra = spectrum_values(connection, numerics_version=version)
+    all_sensors = selection.get("include_structures")
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
-    grid = outcome_grid(connection, table.combination_id)
-    recordings = recordings_of_motions(connection)
+    grid = queries.outcome_grid(connection, table.combination_id)
+    recordings = queries.recordings_of_motions(connection)
     source = FitSource(
         table,
         np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64),
@@ -165,6 +168,7 @@ def read_source(
             name: np.array([_number_of(text, name) for text in table.block], dtype=np.float64)
             for name in block.stored
         },
+        0 if all_sensors else queries.motions_on_structures(connection, kind_read),
     )
     if grid.outcome.shape[1] == 0 and block.points == "strengths":
         none = FitSource.of_table(table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Required, Unpack
 
 import numpy as np
 
-from rbfrag.db.model_file import ModelRow
+from rbfrag.db.model_file import ModelRow, refuse_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
@@ -23,6 +23,7 @@ from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.method import Method
 from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.motions.pulses import PULSE
 from rbfrag.solver.results import NUMERICS_VERSION
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def fit(
     name: str | None = None,
     seed: int = 0,
     estimate_m: bool = False,
+    taken: Collection[str] = (),
     **selection: Unpack[Selection],
 ) -> FitReport:
     """Fit a fragility model as :func:`rbfrag.fit` does, but store nothing.
@@ -70,6 +72,7 @@ def fit(
         source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
             the current folder), or the data themselves (critical values alone carry ``wls`` and
             ``lognormal``), of which the selection chooses nothing.
+        taken: names that the model must not have; rejected before anything is computed.
 
     Returns:
         The report; ``report.model.row`` is what the database stores.
@@ -85,6 +88,7 @@ def fit(
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
+    refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif source is None or isinstance(source, str | PathLike):
@@ -180,6 +184,8 @@ def fit_source(
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"
+    of_data = _data_warnings(data, source.structures)
+    warnings = [*_older(table), *of_data, *result.warnings, *unknown]
     row = ModelRow(
         name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,
@@ -197,7 +203,7 @@ def fit_source(
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
             "scores": result.scores,
-            "warnings": [*_older(table), *_data_warnings(data), *result.warnings, *unknown],
+            "warnings": warnings,
             "n_total": data.n_total,
             "n_found": int((table.status == "found").sum()),
             "n_below_limit": int((table.status == "below_limit").sum()),
@@ -205,11 +211,13 @@ def fit_source(
             "n_excluded_undefined_term": data.n_excluded,
             "n_outside_model": data.n_outside_model,
             "guessed_events": data.guessed_events,
+            "recorded_events": sum(not name.startswith(PULSE) for name in data.event_names),
             "power_law": asdict(law) if law is not None else None,
             "log_correlations": correlations,
             "term_rank": list(correlations),
             "suite": chosen.get("suite"),
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
+            "include_structures": chosen.get("include_structures", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
             **({"why_method": why} if why else {}),
@@ -300,8 +308,12 @@ def _older(table: CombinationTable) -> list[str]:
     ]
 
 
-def _data_warnings(data: FitData) -> list[str]:
+def _data_warnings(data: FitData, structures: int) -> list[str]:
     result = []
+    if structures:
+        result.append(
+            f"{structures} motions recorded on structures are excluded: they are not ground motion"
+        )
     if data.guessed_events:
         result.append(
             f"{data.guessed_events} of {data.events} earthquakes are guessed from file "

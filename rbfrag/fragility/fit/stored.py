@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 from os import PathLike
 from typing import Unpack
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.models import save_model
+from rbfrag.db.location import data_place
+from rbfrag.db.models import names_of_models, save_model
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.fit.fitting import FitOptions
 from rbfrag.fragility.fit.fitting import fit as fit_model
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
+
+NOT_STORED = (
+    "the fit is of the built-in data set, which is read only: the model is not stored; name a "
+    "database of your own (db) to store one"
+)
 
 
 def fit(
@@ -25,13 +32,14 @@ def fit(
 
     Args:
         db: the database: a path or URL; None for ``RBFRAG_DB`` or ``rbfrag.db`` in the current
-            folder.
+            folder, or else the built-in data, which are read only: the model is not stored.
         replace: replace a stored model of the same name.
         kind: what the blocks do: any kind that campaigns store; ``toppling`` if left out.
         term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``; there is no default.
         method: one of those of the kind (docs/theory/fragility.md); None for the one that predicts
             earthquakes left out best with this term: ``details["why_method"]`` says why.
         suite: suite of motions to fit; None for all motions.
+        include_structures: read motions of sensors on structures, too.
         vertical: ``without`` (if left out) or ``with`` vertical motion, or ``both``.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
             such as ``sliding-pgv``.
@@ -62,8 +70,15 @@ def fit(
             "term is missing: name the measure that the model reads, as fit(db, term='pgv'): one "
             f"of {', '.join(TERMS)}"
         )
+    place, built_in = data_place(db)
+    if built_in:
+        report = fit_model(place, **question)
+        return dataclasses.replace(report, warnings=(*report.warnings, NOT_STORED))
+    # what cannot be stored is found out before anything is computed
+    with opened_database(db) as engine, engine.connect() as connection:
+        taken = [] if replace else names_of_models(connection)
     # reading takes no lock, so that a campaign may go on meanwhile
-    report = fit_model(db, **question)
+    report = fit_model(db, taken=taken, **question)
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)
     return FitReport.from_model(FragilityModel.from_row(row))

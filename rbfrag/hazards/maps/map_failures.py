@@ -14,7 +14,7 @@ that :func:`rbfrag.hazards.maps.site_probability.site_probability` integrates.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -189,6 +189,7 @@ def map_failures(
     seed: int = 0,
     between: float = BETWEEN,
     range_km: float | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
 ) -> MapFailures:
     """Return how many blocks fail together; they face unknown azimuths.
 
@@ -199,6 +200,7 @@ def map_failures(
         between: β, 0 to 1.
         range_km: range of the within-event correlation [km]; None for that of the first measure
             that the model reads (:func:`~rbfrag.hazards.maps.spatial_field.correlation_range_km`).
+        on_progress: called with (draws done, draws in all).
 
     Raises:
         InputError: a number of draws, a seed or a share that makes no sense.
@@ -237,6 +239,8 @@ def map_failures(
             fails = ndtr(normals(count, generator).T) <= prediction.probability
             drawn[name][part] = weights[blocks] @ fails
             any_fails[name][part] = fails.any(axis=0)
+        if on_progress is not None:
+            on_progress(start, draws)
     counted = answer.each[each > 0.0]
     bounds = float(counted.max(initial=0.0)), min(float(counted.sum()), 1.0)
     by_law = {

@@ -54,6 +54,7 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     azimuth = file.label(
         span, re.compile(rf"\bAzimuth\b.*\b{re.escape(axis)}\s+(\d+(?:\.\d+)?)", re.ASCII)
     )
+    orientation = azimuth_deg(f"{azimuth}°")
     return ParsedTrace(
         values,
         dt,
@@ -66,5 +67,5 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
         is_corrected=False,
         durations=(duration, again) if number_or_none(again.text) else (duration,),
         remark_if_partial=f"dt = {dt:g} s is the duration over the number of points of the header",
-        labels={"orientation_deg": azimuth_deg(azimuth), "is_vertical": is_vertical_name(axis)},
+        labels={"orientation_deg": orientation, "is_vertical": is_vertical_name(axis)},
     )

@@ -73,7 +73,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         remarks += (f"the channel {names} holds zeros only and is left out",)
     for channel in channels:
         if channel.values.any():
-            yield replace(channel, remarks=remarks)
+            yield replace(channel, remarks=(*remarks, *channel.remarks))
 
 
 def _channel(file: RecordFile, span: range) -> ParsedTrace:
@@ -107,6 +107,7 @@ def _channel(file: RecordFile, span: range) -> ParsedTrace:
         event=file.lines[span.start + 1].strip() if len(span) > 1 else "",
         start=file.label(span, _TRIGGER),
         is_corrected=False,
+        remarks=file.location(span),
         durations=(duration,),
         peak=peak_of(file.optional(span, _PEAK)),
     )

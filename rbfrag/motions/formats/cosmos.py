@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.direction import is_vertical_name
 from rbfrag.motions.text.file import field_layout, finite_number
 from rbfrag.motions.text.record_file import HeaderField, ParsedTrace, RecordFile, peak_of
 
@@ -67,9 +67,6 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
     values = file.fixed_width(data, series.line + 1, _layout(file, series), "acceleration")
     direction = file.label(header, _CHANNEL)
     component = file.label(header, _SCNL) or direction
-    azimuth, vertical = azimuth_deg(direction or component), is_vertical_name(direction)
-    if vertical is None:
-        vertical = is_vertical_name(component)
     record = file.label(header, _RECORD)
     return ParsedTrace(
         values,
@@ -77,6 +74,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         unit,
         count,
         component,
+        axis=component if is_vertical_name(direction) is None else direction,
         station=file.label(header, _STATION),
         event=file.label(header, _EVENT),
         # NN.00725272.CI.MLAC.HNE.-- names one of three channels
@@ -85,7 +83,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         else None,
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
-        labels={"orientation_deg": azimuth, "is_vertical": vertical},
+        remarks=file.location(header),
         durations=(file.optional(here, _SECONDS),),
         peak=peak_of(file.optional(header, _PEAK)),
     )

@@ -34,7 +34,6 @@ _HEAD = re.compile(
 )
 _RECORD = re.compile(r"^corrected accelerogram\s+(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S.*?)(?:\s{2,}location:.*)?$", re.IGNORECASE)
-_LOCATION = re.compile(r"^\s*chan\s*\d+\s*:.*\blocation:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^station\s+(?:no|id)\.?\s*(\S+)", re.IGNORECASE)
 _START = re.compile(r"\b(?:start|trigger) time\s*:\s*(\S.*)", re.IGNORECASE)
 _POINTS = re.compile(r"^\s*(\S+)\s+points of accel\w*\s+data", re.IGNORECASE)
@@ -84,8 +83,6 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
     channel = file.find(header, _CHANNEL, f"line 'Chan' in {name}")
     # the line after it names the event, unless it gives no more than the time of the record
     event = file.lines[channel.line].strip() if channel.line < header.stop else ""
-    if location := file.label(range(channel.line - 1, channel.line), _LOCATION):
-        remarks = (*remarks, f"the sensor's location by the header: {location}")
     return ParsedTrace(
         values,
         dt,
@@ -97,7 +94,7 @@ def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...])
         recording=file.find(header, _RECORD, "name of the record").text,
         start=file.label(header, _START),
         is_corrected=True,
-        remarks=remarks,
+        remarks=(*remarks, *file.location(header)),
         durations=(file.optional(header, _DURATION),),
         peak=peak_of(file.optional(header, _PEAK)),
     )

@@ -28,8 +28,7 @@ LARGEST_SCALE = 1e3
 """Gal a count; digitisers resolve thousandths."""
 
 _CHANNELS = {
-    "1": ("NS1", "N-S"), "2": ("EW1", "E-W"), "3": ("UD1", "U-D"),
-    "4": ("NS2", "N-S"), "5": ("EW2", "E-W"), "6": ("UD2", "U-D"),
+    "1": "NS1", "2": "EW1", "3": "UD1", "4": "NS2", "5": "EW2", "6": "UD2",
 }  # fmt: skip
 _BOREHOLE = frozenset({"1", "2", "3"})
 
@@ -61,7 +60,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     offset = float(counts.mean()) if counts.size else 0.0
 
     direction = field("Dir.").text
-    component, axis = _CHANNELS.get(direction, (direction, direction))
+    component = _CHANNELS.get(direction, direction)
     station = field("Station Code").text
     remarks = [
         f"the mean of {offset:.6g} counts, the offset of the instrument, was subtracted as the "
@@ -79,7 +78,6 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         scale,
         station=station,
         event=f"{field('Origin Time').text} JST",
-        axis=axis,
         recording=f"{station} {recorded}{' borehole' if direction in _BOREHOLE else ''}",
         start=recorded,
         is_corrected=False,

@@ -32,6 +32,10 @@ _QUANTITY = re.compile(
 )
 _UNIT = re.compile(r"UNITS\s+OF\s+([A-Za-z/0-9^*']+)", re.IGNORECASE)
 _NOT_IN_LABELS = re.compile(r"[^!-~]|[,=]")
+# a station and the direction of the component: MUL009, A-ELC180, 14403090, 25C00EW, NCADBHNE
+_AFTER_STATION = re.compile(
+    r"[\w.-]{2,}?((?:[0-2]\d|3[0-5])\d|360|NS|EW|H[NL][ENZ]|UP|DWN|VER)", re.ASCII | re.IGNORECASE
+)
 _REMARK = re.compile(r"\([^()]*\)\s*$")
 
 
@@ -49,6 +53,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     dt = file.dt(HeaderField(match[2], at + 1), "DT")
     unit = _unit(file, file.lines[:at])
     event, station, component = _names(file.lines[1] if at >= 2 else "")
+    direction = _AFTER_STATION.fullmatch(component)
     yield ParsedTrace(
         file.free_numbers(file.lines[at + 1 :], at + 2, "acceleration"),
         dt,
@@ -57,6 +62,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         component,
         station=station,
         event=event,
+        axis=direction and direction[1],
         # an event alone would join records of all its stations
         recording=f"{event} {station}" if event and station else "",
     )

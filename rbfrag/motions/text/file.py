@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
-from rbfrag.files import NO_FILE, bounded_bytes, is_endless, packed_as
+from rbfrag.files import NO_FILE, bounded_bytes, encoding_of, is_endless, packed_as
 
 LARGEST_FILE_BYTES = 512 * 1024**2
 MOST_DIGITS = 12
@@ -62,13 +62,14 @@ def decoded(path: Path, raw: bytes) -> str:
     packed = packed_as(raw[:6])
     if packed is not None:
         raise MotionFileError(path, f"it is a {packed} file: unpack it, and name a record in it")
-    if b"\0" in raw:
+    encoding = encoding_of(raw)
+    if b"\0" in raw and encoding != "utf-16":
         raise MotionFileError(
             path,
             "the file is binary and no miniSEED: export the record in one of the text formats",
         )
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode(encoding)
     except UnicodeDecodeError:
         # every byte has a meaning in Latin-1, which older networks write
         text = raw.decode("latin-1")

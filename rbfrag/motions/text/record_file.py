@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rbfrag.errors import MotionFileError, UnitNotStatedError
+from rbfrag.motions.ground_motion import LOCATION
 from rbfrag.motions.polarity import FloatArray
 from rbfrag.motions.text.file import (
     MOST_DIGITS,
@@ -40,6 +41,7 @@ MOST_SIGNIFICANT = 17
 LONGEST_LINE = 1000
 """Characters of a header line that are looked at."""
 
+_LOCATION = re.compile(r"^\s*(?:sta\s+)?chan\b.*\blocation:\s*(\S.*)", re.IGNORECASE)
 _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
 
 
@@ -171,6 +173,11 @@ class RecordFile:
         """Return the first match's group 1 among the lines of a span; empty where there is none."""
         field = self.optional(span, pattern)
         return field.text if field else ""
+
+    def location(self, span: range) -> tuple[str, ...]:
+        """Return the remark on where the sensor of a channel stands, if that is stated."""
+        location = self.label(span, _LOCATION)
+        return (LOCATION + location,) if location else ()
 
     def find(self, span: range, pattern: re.Pattern[str], what: str) -> HeaderField:
         """Return the first match's group 1 among the lines of a span, which must have it."""

@@ -472,15 +472,11 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
 
 
 def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[str]:
-    row, about = model.row, model.row.diagnostics
-    counts = (
-        f" on {about['n']} critical blocks of {about['events']} earthquakes"
-        if about.get("n") and about.get("events")
-        else ""
-    )
+    row = model.row
+    fitted = words.fitted_in_words(row.diagnostics) or "fitted"
     lines = [
         f"rbfrag {__version__}. Model {model.name} (method {row.method}, measures "
-        f"{' '.join(model.term.inputs)}), fitted{counts}, {row.created[:10] or 'undated'}, "
+        f"{' '.join(model.term.inputs)}), {fitted}, {row.created[:10] or 'undated'}, "
         f"data {row.data_fingerprint[:12] or 'unknown'}. "
         f"Database: {data}."
     ]

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
+from rbfrag.errors import SchemaVersionError
+from rbfrag.fragility.fit import fitting
 from rbfrag.fragility.fit.fitting import fit as fit_only
+from rbfrag.fragility.fit.stored import NOT_STORED
+from rbfrag.fragility.model import SYNTHETIC
+from rbfrag.motions.sample_motions import demo_motions
 from tests.cli.conftest import Shell, shell
 from tests.synthetic import write_suite
 
@@ -42,3 +50,65 @@ def test_python_and_shell_store_the_same(shell: Shell, tmp_path: Path) -> None:
         fit_only(connection, term="pga_tm")
     stored = [each["name"] for each in shell.json("models", "list", "--db", "a.db")]
     assert stored == sorted(["other", report.name])
+
+
+def test_the_built_in_data_are_fitted_where_there_is_no_database(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rbfrag.add_motions([write_suite(tmp_path / "records")], db="built-in.db")
+    rbfrag.simulate(db="built-in.db", p2=[10.0, 1.0], jobs=1)
+    monkeypatch.setattr("rbfrag.db.location.REFERENCE", tmp_path / "built-in.db")
+    before = (tmp_path / "built-in.db").read_bytes()
+    report = rbfrag.fit(term="pgv", method="wls")
+    assert report.warnings[-1].startswith("the fit is of the built-in data set")
+    stored = rbfrag.fit("built-in.db", term="pgv", method="wls", name="own")
+    assert report.coefficients == stored.coefficients
+    assert NOT_STORED not in stored.warnings
+    (tmp_path / "built-in.db").write_bytes(before)
+    said = shell("fit", "--term", "pgv", "--method", "wls")
+    assert said.stdout.startswith("Model wls-pgv ")
+    assert "the model is not stored" in said.stderr
+    assert not Path("rbfrag.db").exists()
+    assert (tmp_path / "built-in.db").read_bytes() == before
+    assert rbfrag.read_table("motion").equals(rbfrag.read_table("motion", db="built-in.db"))
+    said = shell("models", "default", "wls-pgv", expect=2).stderr
+    assert "the built-in data set is read only: name the model with --model wls-pgv" in said
+
+
+def test_schema_and_name_are_checked_before_anything_is_computed(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(REFERENCE, "older.db")
+    rbfrag.add_motions([write_suite(tmp_path / "records")], db="own.db")
+    rbfrag.simulate(db="own.db", p2=[10.0, 1.0], jobs=1)
+    rbfrag.fit("own.db", term="pgv", method="wls")
+
+    def read_source(*inputs: object, **options: object) -> None:
+        raise AssertionError("the data were read")
+
+    monkeypatch.setattr(fitting, "read_source", read_source)
+    with pytest.raises(SchemaVersionError, match="has schema 0008, this rbfrag needs 0009"):
+        rbfrag.fit("older.db", term="pgv")
+    with pytest.raises(rbfrag.InputError, match="there is a model 'wls-pgv' already"):
+        rbfrag.fit("own.db", term="pgv", method="wls")
+    with pytest.raises(AssertionError, match="the data were read"):
+        rbfrag.fit("own.db", term="pgv", method="wls", replace=True)
+
+
+def test_a_model_of_synthetic_pulses_says_so_in_every_answer(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rbfrag.motions.sample_motions.find_spec", lambda name: None)
+    files, _ = demo_motions(tmp_path)
+    assert rbfrag.add_motions(files, db="pulses.db").warnings == ()
+    rbfrag.simulate(db="pulses.db", p2=[3.0], jobs=1)
+    said = shell("fit", "--term", "pgv", "--method", "logistic", "--db", "pulses.db").stdout
+    assert "of 12 synthetic pulses, which are not earthquakes" in said
+    single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, db="pulses.db")
+    assert SYNTHETIC in single.warnings
+    many = rbfrag.predict(np.array([3.0, 1.0]), np.array([0.1, 0.2]), pgv_m_s=0.6, db="pulses.db")
+    assert SYNTHETIC in many.warnings
+    Path("curve.csv").write_text("pgv_m_s,annual_rate\n0.05,0.1\n0.5,0.001\n2,0.00001\n")
+    rate = rbfrag.hazard("curve.csv", p2=3.0, kr=0.1, db="pulses.db")
+    assert any(SYNTHETIC in warning for warning in rate.warnings)
+    assert SYNTHETIC not in rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).warnings

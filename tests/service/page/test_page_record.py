@@ -276,18 +276,44 @@ def test_a_record_decides_the_headline(open_page, tmp_path):
     opened = open_page("?p2=3&kr=0.35&pgv=0.6")
     page = opened.page
     expect(page.locator("#by-record")).to_be_hidden()
-    drop(page, "pulse.csv", pulse())
+    # not the same backwards: the two polarities topple different blocks
+    text = pulse(0.4, 1.0).splitlines()
+    drop(page, "pulse.csv", "\n".join(text[:150]) + "\n")
     expect(page.locator("#by-record-title")).to_have_text("Does pulse.csv topple it?")
     answer = page.locator("#by-record-answer")
-    expect(answer).to_have_text("No")
-    (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    expect(answer).to_have_text("No, in neither polarity")
+    (tmp_path / "pulse.csv").write_text("\n".join(text[:150]) + "\n", encoding="utf-8")
     import rbfrag
 
     [motion] = rbfrag.read_motions(tmp_path / "pulse.csv")
-    kr = max(rbfrag.critical(motion, p2=3.0, polarity=each).kr for each in ("forward", "reverse"))
-    for factor, said in ((0.99, "Yes"), (1.01, "No"), (0.9, "Yes")):
-        page.fill("#kr", f"{factor * kr:.4f}")
+    found = {
+        each: rbfrag.critical(motion, p2=3.0, polarity=each).kr for each in ("forward", "reverse")
+    }
+    less, more = sorted(found, key=found.get)
+    assert found[less] < 0.95 * found[more]
+    for kr, said in (
+        (0.99 * found[less], "Yes, in both polarities"),
+        (1.01 * found[less], f"Yes, in the {more} polarity"),
+        (1.01 * found[more], "No, in neither polarity"),
+    ):
+        page.fill("#kr", f"{kr:.5f}")
         expect(answer).to_have_text(said)
         expect(page.locator("#probability")).to_contain_text("%")
+    expect(page.locator("#by-record-words")).to_contain_text(f"Its PGV is {motion.pgv_m_s:.3g}")
     page.click("#drop-record")
     expect(page.locator("#by-record")).to_be_hidden()
+
+
+def test_the_probability_is_that_of_the_record(open_page):
+    opened = open_page("?p2=3&kr=0.1&pgv=0.1")
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    pgv = 0.4 * STANDARD_GRAVITY / math.pi
+    page.wait_for_function("() => Number(document.querySelector('#pgv').value) > 1")
+    assert float(page.input_value("#pgv")) == pytest.approx(pgv, rel=5e-3)
+    # what is typed afterwards stays, also when another block is asked about
+    page.fill("#pgv", "0.2")
+    page.fill("#p2", "5")
+    expect(page.locator("#spectrum-words")).to_contain_text("At p² = 5")
+    assert page.input_value("#pgv") == "0.2"

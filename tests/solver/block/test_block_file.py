@@ -125,7 +125,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputError, match="is a folder"):
         read_block(tmp_path / "folder.csv")
-    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfd\x00\x01")
     with pytest.raises(InputError, match="not a text file"):
         read_block(tmp_path / "binary.csv")
     (tmp_path / "large.csv").write_bytes(b" " * 1_100_000)

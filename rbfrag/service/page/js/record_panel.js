@@ -36,6 +36,8 @@ export function recordPanel(tell) {
   let spectrum = null;
   /** @type {Place | null} */
   let block = null;
+  /** Whether the shaking of the question is to become that of the record. */
+  let isNew = false;
 
   const ask = latest(async (/** @type {File} */ asked) => {
     byId("record-said").textContent = `Waiting for the spectrum of ${asked.name} …`;
@@ -46,7 +48,10 @@ export function recordPanel(tell) {
       const found = await askSpectrum(asked, reading, block?.p2 ?? NaN, name);
       reached();
       nothingWrong(panel);
-      if (asked === file) show(found);
+      if (asked !== file) return;
+      show(found);
+      if (isNew) tell.takePgv(found.pgv_m_s);
+      isNew = false;
     } catch (error) {
       if (error instanceof Unreachable) return unreachable(error, () => ask(asked));
       if (!(error instanceof Refusal)) throw error;
@@ -101,16 +106,20 @@ export function recordPanel(tell) {
     const able = spectrum && block ? canTopple(spectrum, block) : null;
     if (!spectrum || !block || able === null) return showByRecord(null);
     const words = `The block is ${able ? "not " : ""}more than 2 % above its toppling spectrum.`;
-    showByRecord({ name: spectrum.name, answer: able ? "Perhaps" : "No", words });
+    const answer = able ? "Perhaps" : "No, in neither polarity";
+    showByRecord({ name: spectrum.name, answer, words: `${words} ${pgvOf(spectrum)}` });
     if (able && file) decide({ file, spectrum, block });
   }
 
   const decide = latest(async (/** @type {{file: File, spectrum: Spectrum, block: Place}} */ of) => {
     try {
-      const kr = await askCritical(of.file, readingNow(), of.block.p2);
+      const { forward, reverse } = await askCritical(of.file, readingNow(), of.block.p2);
       if (of.spectrum !== spectrum || of.block !== block) return;
-      const words = `It topples blocks of this size up to k_r = ${quantity(kr, "g")}.`;
-      showByRecord({ name: spectrum.name, answer: of.block.kr <= kr ? "Yes" : "No", words });
+      const words =
+        `It topples blocks of this size up to k_r = ${quantity(forward, "g")} in the forward ` +
+        `polarity and ${quantity(reverse, "g")} in the reverse one. ${pgvOf(spectrum)}`;
+      const answer = verdict(of.block.kr <= forward, of.block.kr <= reverse);
+      showByRecord({ name: spectrum.name, answer, words });
     } catch (error) {
       if (!(error instanceof Refusal || error instanceof Unreachable)) throw error; // still perhaps
     }
@@ -119,6 +128,7 @@ export function recordPanel(tell) {
   /** @param {File} taken */
   function take(taken) {
     file = taken;
+    isNew = true;
     offerTraces([]);
     ask(taken);
     panel.scrollIntoView({ block: "nearest" });
@@ -130,6 +140,7 @@ export function recordPanel(tell) {
     const input = /** @type {HTMLInputElement} */ (byId(id));
     let half = false;
     input.addEventListener("input", () => {
+      isNew = true; // another unit, interval or trace has another PGV
       half = isHalfTyped(input);
       if (file && !half) askSoon(file);
     });
@@ -172,13 +183,26 @@ function canTopple(spectrum, { p2, y }) {
   return xs.every(Number.isFinite) ? xs.some((x) => y <= BOUND * x) : null;
 }
 
+/** Whether a record topples a block, with the polarity that does.
+ * @type {(forward: boolean, reverse: boolean) => string} */
+function verdict(forward, reverse) {
+  if (forward && reverse) return "Yes, in both polarities";
+  if (forward || reverse) return `Yes, in the ${forward ? "forward" : "reverse"} polarity`;
+  return "No, in neither polarity";
+}
+
+/** @type {(spectrum: Spectrum) => string} */
+function pgvOf(spectrum) {
+  return `Its PGV is ${quantity(spectrum.pgv_m_s, "m/s")}.`;
+}
+
 /**
  * What a record is, and whether it can topple a block.
  * @param {Spectrum} spectrum
  * @param {Place | null} block
  */
 function inWords(spectrum, block) {
-  const record = `Its PGV is ${quantity(spectrum.pgv_m_s, "m/s")}.`;
+  const record = pgvOf(spectrum);
   return block ? `${record} ${comparison(spectrum, block)}` : record;
 }
 

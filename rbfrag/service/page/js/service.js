@@ -102,13 +102,15 @@ export async function askSpectrum(file, reading, p2, name) {
   return spectrumOf(await upload("v1/spectrum", query, file), name);
 }
 
-/** The greatest k_r of a size that a record topples, of both polarities; 0 where it topples none.
- * @type {(file: File, reading: Record<string, string>, p2: number) => Promise<number>} */
+/** The greatest k_r of a size that a record topples, by polarity; 0 where it topples none.
+ * @type {(file: File, reading: Record<string, string>, p2: number) =>
+ *   Promise<{forward: number, reverse: number}>} */
 export async function askCritical(file, reading, p2) {
   const asked = [false, true].map((reverse) =>
     upload("v1/critical", { ...reading, p2, reverse: String(reverse) }, file),
   );
-  return Math.max(...(await Promise.all(asked)).map((each) => each.kr ?? 0));
+  const [forward, reverse] = (await Promise.all(asked)).map((each) => each.kr ?? 0);
+  return { forward, reverse };
 }
 
 /**

@@ -1,0 +1,58 @@
+"""The horizontal motions that a campaign simulates, and what is to be said of their sensors."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+from sqlalchemy import Connection
+
+from rbfrag.db.motions import motion_rows
+from rbfrag.db.rows import MotionRow
+from rbfrag.errors import InputError
+from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE
+
+
+class MotionChoice(TypedDict):
+    """Which motions a campaign is of."""
+
+    suite: str | None
+    include_structures: bool
+
+
+def horizontal_motions(
+    connection: Connection, *, suite: str | None = None, include_structures: bool = False
+) -> tuple[list[MotionRow], list[str]]:
+    """Return the horizontal motions of a campaign by id, and warnings about their sensors.
+
+    Args:
+        suite: only the motions of this suite.
+        include_structures: use motions of sensors on structures, too.
+
+    Raises:
+        InputError: no such suite, or no horizontal motion.
+    """
+    every = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
+    where = "the database" if suite is None else f"suite {suite!r}"
+    if not every:
+        raise InputError(
+            f"there is no horizontal motion in {where}: rbfrag motions add PATH  brings some"
+        )
+    rows = [row for row in every if include_structures or STRUCTURE not in row.flags]
+    if not rows:
+        raise InputError(
+            f"all {len(every)} horizontal motions in {where} were recorded on structures: add "
+            "others, or set include_structures",
+            fields=("include_structures",),
+        )
+    warnings = []
+    if len(rows) < len(every):
+        warnings.append(
+            f"{len(every) - len(rows)} of {len(every)} horizontal motions were recorded on "
+            "structures and are excluded: they are not ground motion"
+        )
+    if guessed := sum(DIRECTION_GUESSED in row.flags for row in rows):
+        warnings.append(
+            f"the direction of {guessed} of {len(rows)} motions is guessed: a vertical one among "
+            "them is simulated as a horizontal; give is_vertical in a table of metadata"
+        )
+    return rows, warnings
