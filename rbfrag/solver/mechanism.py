@@ -3,6 +3,7 @@ block's mechanism at rest."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
@@ -14,6 +15,17 @@ from rbfrag.solver.results import Outcome, Response
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.single import refuse_undecided, stability
 from rbfrag.solver.whole_run import WholeRun, response_of, whole_run
+
+
+def driven_up_below(site: BlockOnPlanes) -> float:
+    """Return the k_h/(1 + k_v) below which the whole block slides up its back plane.
+
+    -tan(γ + β + φ_back); minus infinity for a block that no pulse drives up it.
+    """
+    if site.block is None or not site.back_fracture:
+        return -math.inf
+    steepness = math.radians(site.block.gamma_deg) + site.beta_rad + site.phi_back_rad
+    return -math.tan(steepness) if steepness < 0.5 * math.pi else -math.inf
 
 
 class MechanismKind(Kind):

@@ -11,6 +11,7 @@ from rbfrag.solver.contacts import gap_m, touching
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
     MODES_OF,
+    ROCKS,
     FreeError,
     FreeMotion,
     Kinematics,
@@ -40,7 +41,7 @@ class WholeRun:
     Args:
         mechanism: the block as its model describes it.
         start: the state that it started from; None for its first place.
-        run: what its mechanism did; None for a start that no mechanism describes.
+        run: what its mechanism did; None where it is followed step by step from the beginning.
         free: what the block did after it; None where the mechanism goes to the end.
     """
 
@@ -122,11 +123,9 @@ class WholeRun:
         return math.inf if self.free.error is None else self._error(self.free.error)
 
     def _error(self, of_free: FreeError | None) -> float:
+        before = 0.0 if self.start is None else self.start.error
         if self.run is not None:
             before = self.run.error
-        else:
-            assert self.start is not None
-            before = self.start.error
         if of_free is None:
             return before
         return before + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
@@ -142,16 +141,23 @@ class WholeRun:
     def final_mode(self) -> ModeName | None:
         """Failure mode of the last motion that is one of a mode; None for no motion.
 
-        A block that has turned over backward ends in a slump, whatever it turned about.
+        A block that has turned over backward ends in a slump, whatever it turned about. One that
+        rocks about its toe as it lands has not toppled, unless it fails.
         """
         if self.started_s is None:
             return None
         free = self.free
-        if free and free.outcome is Outcome.TOPPLED and free.backward_rad > free.forward_rad:
+        failed = self.outcome is Outcome.TOPPLED
+        if free and failed and free.backward_rad > free.forward_rad:
             return "slump"
         first = () if self.run is None else (self.mechanism.first.name,)
         names = (*first, *(change.motion for change in self.changes))
-        return next((MODES_OF[name] for name in reversed(names) if name in MODES_OF), None)
+        modes = (
+            MODES_OF[name]
+            for name in reversed(names)
+            if name in MODES_OF and (failed or name != ROCKS)
+        )
+        return next(modes, None)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -219,8 +225,10 @@ def whole_run(
         start: the state that the motion finds; None for the first place.
     """
     run, release = None, None
-    # a start without a coordinate is one that no mechanism describes
-    if start is None or start.position is not None:
+    # a start without a coordinate is one that no mechanism describes, nor does it describe a block
+    # that the record drives up its back plane
+    in_mechanism = start is None or start.position is not None
+    if in_mechanism and excited.min_q >= mechanism.stepwise_below:
         at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
         run = follow(mechanism, excited, history=history, start=at)
         if not (mechanism.goes_on and run.outcome is Outcome.CONTACT_LOST):
@@ -228,7 +236,9 @@ def whole_run(
         assert run.ended_s is not None
         release = released(run.ended_s, run.phase.pose, run.x, run.rate)
     else:
-        pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
+        pose = mechanism.first.pose(0.0)
+        if start is not None:
+            pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
         release = Release(float(excited.time_s[0]), pose)
     free = free_motion(site, excited, release, at_toe=mechanism.at_toe)
     return WholeRun(mechanism, site, start, run, free)

@@ -8,13 +8,14 @@ inertial force that is normal to the base changes the friction. The dissertation
 horizontal one, whose factor is 1. Nothing depends on s, so that s is a cubic of time between
 samples and the answer exact.
 
-A block that leans on its back plane at rest (β < α1) slides away from it while its base stays in
-touch, because the resultant then lies at φ. Where it has stopped, and the resultant falls behind
-its heel,
+While the block slides, its base stays in touch whatever k_h, because the reaction then lies at
+φ >= α1. At a standstill away from its back plane a pulse into the slope tips it about its heel when
+the resultant falls behind that heel,
 
     k_h < (1 + k_v) tan(α1 - β),
 
-it tips back; from there it is followed step by step (docs/theory/slide-to-slump.md).
+whatever the sign of α1 - β; from there it is followed step by step (docs/theory/slide-to-slump.md).
+A block with α1 <= -φ slides up its base before it tips, and is not followed beyond Newmark's block.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from rbfrag.solver.integrator.one_freedom.harmonics import constant
 from rbfrag.solver.kind import (
     BlockOnPlanes,
 )
-from rbfrag.solver.mechanism import MechanismKind
+from rbfrag.solver.mechanism import MechanismKind, driven_up_below
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, FloatArray, Outcome, Polarity
 from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
@@ -72,8 +73,10 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
     forward = _equation(site, 1.0)
     start = site.centroid_m
-    # both settings are forms of Newmark's block, which knows no rotation
-    tips = _leans(site) and not (two_way or site.settings.get("horizontal", False))
+    # both settings are forms of Newmark's block, which has no rotation
+    newmark = two_way or bool(site.settings.get("horizontal", False))
+    may_tip = _may_tip(site)
+    tips = may_tip and not newmark
 
     def pose(s: float) -> Pose:
         return Pose(0.0, (start[0] + s, start[1]), s)
@@ -98,18 +101,41 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         ),
         rotates=False,
         critical=None,
-        warnings=() if tips else _warnings(site),
+        warnings=(KY_ALONE,) if site.block is None and not newmark else (),
+        least_q=tip_threshold(site) if may_tip and newmark else -math.inf,
+        if_below=MAY_TIP,
+        stepwise_below=-math.inf if newmark else driven_up_below(site),
         goes_on=site.block is not None and not site.settings.get("horizontal", False),
     )
 
 
-def _leans(site: BlockOnPlanes) -> bool:
-    """Whether the block leans on its back plane at rest."""
-    block = site.block
-    if block is None or not site.back_fracture:
+KY_ALONE = (
+    "a block given by its shape may be tipped by pulses into the slope and slide further "
+    "(unconservative)"
+)
+
+MAY_TIP = (
+    "pulses into the slope tip the block about its heel once it has slid; this option neglects "
+    "that: it may slide further, slump or overturn (unconservative)"
+)
+
+
+def _may_tip(site: BlockOnPlanes) -> bool:
+    """Whether a pulse into the slope can tip the block about its heel.
+
+    With α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
+    centroid, and no pulse into the slope turns the block about it.
+    """
+    if site.block is None:
         return False
-    # in radians, which equal angles are equal in: degrees and back may round to another number
-    return site.beta_rad < math.radians(block.alpha1_deg)
+    alpha1 = math.radians(site.block.alpha1_deg)
+    return alpha1 > -site.phi_rad and alpha1 - site.beta_rad > -0.5 * math.pi
+
+
+def tip_threshold(site: BlockOnPlanes) -> float:
+    """Return the k_h/(1 + k_v) below which the block tips about its heel, tan(α1 - β)."""
+    assert site.block is not None
+    return math.tan(math.radians(site.block.alpha1_deg) - site.beta_rad)
 
 
 def _tips_back(site: BlockOnPlanes) -> Equation:
@@ -146,15 +172,6 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
         driving=constant(driving),
         resistance=constant(driving * math.tan(phi - beta)),
         conditions=() if horizontal else (contact,),
-    )
-
-
-def _warnings(site: BlockOnPlanes) -> tuple[str, ...]:
-    if not _leans(site):
-        return ()
-    return (
-        "at rest the block leans on its back plane (beta is below alpha1): once it has slid away, "
-        "it tips back on the plane and may slump later, which horizontal and two_way leave out",
     )
 
 

@@ -206,6 +206,8 @@ class Mechanism:
         if_impact: the same where the block has come back to its lowest position in motion.
         least_q: least k_h/(1 + k_v) that the model covers.
         if_below: what the reader should know where the record goes below it.
+        stepwise_below: k_h/(1 + k_v) below which the mechanism does not hold: a record that goes
+            below it is followed step by step from its beginning.
         goes_on: whether the block is followed step by step where a contact is lost.
         at_toe: whether its displacement is that of the toe.
     """
@@ -217,5 +219,6 @@ class Mechanism:
     if_impact: str = ""
     least_q: float = -np.inf
     if_below: str = ""
+    stepwise_below: float = -np.inf
     goes_on: bool = False
     at_toe: bool = False

@@ -90,8 +90,8 @@ def run_phase(
             line = line_at(record, node, free_s, 1.0)
             stop, condition = stop_at_rest(record, rules, state, line, rest.place)
             now_s = line.start_s + tau * line.h
-            # a start that a contact does not survive is one: the block moves, the model ends
-            if math.isnan(started_s) and stop in (GOES_ON, VIOLATED):
+            # a start that a contact does not survive, or into another phase, is one too
+            if math.isnan(started_s) and stop in (GOES_ON, VIOLATED, REVERSE):
                 started_s = now_s
             if stop != GOES_ON:
                 break
