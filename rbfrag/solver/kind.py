@@ -92,6 +92,7 @@ class Shaking:
         start: the state that the motion finds; None for a block at rest in its first place.
         laws: whether the error after a lost contact includes what laws of impact and friction
             differ by, which takes as long as the motion itself.
+        stepwise: whether a record that drives the block up its back plane is followed step by step.
     """
 
     motion: GroundMotion
@@ -101,6 +102,7 @@ class Shaking:
     remarks: tuple[str, ...] = ()
     start: BlockState | None = None
     laws: bool = True
+    stepwise: bool = True
 
     @cached_property
     def excitation(self) -> Excitation:

@@ -50,7 +50,10 @@ class MechanismKind(Kind):
         """
         mechanism = self._without_cohesion(site)
         excited = shaking.excitation
-        whole = whole_run(mechanism, site, excited, history=shaking.history, start=shaking.start)
+        whole = whole_run(
+            mechanism, site, excited, history=shaking.history, start=shaking.start,
+            stepwise=shaking.stepwise,
+        )  # fmt: skip
         return response_of(self.kind, whole, shaking)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
@@ -103,9 +106,9 @@ class ShakenMechanism:
     remarks: tuple[str, ...]
     site: BlockOnPlanes
 
-    def run(self, excited: Excitation) -> WholeRun:
-        """Follow the block under an excitation."""
-        return whole_run(self.mechanism, self.site, excited)
+    def run(self, excited: Excitation, *, stepwise: bool = True) -> WholeRun:
+        """Follow the block under an excitation; `stepwise` as of :func:`whole_run`."""
+        return whole_run(self.mechanism, self.site, excited, stepwise=stepwise)
 
 
 def shaken_mechanism(

@@ -27,6 +27,7 @@ RESPONSE_NUMBERS = (
 )  # fmt: skip
 OF_TWO_CORNERS = (
     "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
+    "peak_spread",
 )  # fmt: skip
 """Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
 

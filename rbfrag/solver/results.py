@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
 from rbfrag.solver.stability.modes import ModeName
+
+if TYPE_CHECKING:
+    from rbfrag.solver.integrator.one_freedom.equation import Pose
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -127,6 +130,9 @@ class BlockState:
         position: coordinate of its mechanism [rad] or [m]; None where no mechanism describes it.
         error: bound on the error of the rotation [rad], of a sliding block of the displacement [m];
             infinite where it is not known.
+        by_law: where a run of twice the step and runs by each other law of impact leave the block,
+            from where the next motion continues each of them; () for a block that no mechanism has
+            left, or that fails by some of them.
     """
 
     turned_rad: float
@@ -136,6 +142,7 @@ class BlockState:
     touching: tuple[str, ...]
     position: float | None
     error: float
+    by_law: tuple[Pose, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return it with the keys of the JSON contract."""
@@ -207,6 +214,8 @@ class Response(Tabular):
         peak_backward_rad: greatest rotation about the heel [rad]; None likewise.
         impacts: impacts within the record; the free motion after it is decided in closed form.
         sensitive: whether the outcome is another one for the motion times 1 + 1e-6 or 1 - 1e-6.
+        peak_spread: greatest relative change of `peak_theta_rad` for these motions; None where the
+            outcome changes, where the block overturns or does not move, and for other kinds.
         state: where the block is left at rest; None where it is not, or not known.
         mode: failure mode of the block in its first place.
         final_mode: that of its last motion that is one of a mode; None for no motion.
@@ -242,6 +251,7 @@ class Response(Tabular):
     peak_backward_rad: float | None = None
     impacts: int | None = None
     sensitive: bool | None = None
+    peak_spread: float | None = None
     state: BlockState | None = None
     mode: ModeName | None = None
     final_mode: ModeName | None = None

@@ -51,6 +51,10 @@ GOES_ON = -1
 FREE_STEPS_MAX = 100_000
 """Steps after the record before a motion that does not end is given up."""
 
+PASSES_PER_NODE = 100
+"""Passes of the loop of a phase per node of the record, beyond `FREE_STEPS_MAX`, before it is given
+up: accelerations next to the smallest numbers start and stop a block at one place without end."""
+
 FREE_STEP_S = 0.1
 """Length of a step after the record where the equation is the same everywhere [s]."""
 
@@ -72,7 +76,8 @@ def run_phase(
     state = state_on_entry(rules, entry)
     peak = Peak(entry.x, entry.error_x)
     started_s = stopped_s = certain_s = math.nan
-    steps = moved = impacts = free_steps = filled = 0
+    steps = moved = impacts = free_steps = filled = passes = 0
+    passes_max = FREE_STEPS_MAX + PASSES_PER_NODE * record.k_h.size
     counted = -1  # the interval that was last counted as moved in
     stop, condition = GOES_ON, 0
     # without friction nothing holds the block, even where its rate is zero
@@ -82,6 +87,10 @@ def run_phase(
     line = line_at(record, node, free_s, 1.0)
 
     while stop == GOES_ON:
+        passes += 1
+        if passes > passes_max:
+            stop = ENDLESS
+            break
         if not moving:
             # a block at rest does not change its thresholds: once is enough
             rest = depart(record, thresholds(rules, state), Place(node, tau), barred)
