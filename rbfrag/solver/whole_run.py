@@ -142,13 +142,14 @@ class WholeRun:
     def final_mode(self) -> ModeName | None:
         """Failure mode of the last motion that is one of a mode; None for no motion.
 
-        A block that has turned over backward ends in a slump, whatever it turned about. One that
-        rocks about its toe as it lands has not toppled, unless it fails.
+        A block that has turned over backward ends in a slump, whatever it turned about. A
+        slide that rocks about its toe as it lands has not toppled, unless it fails.
         """
         if self.started_s is None:
             return None
         free = self.free
         failed = self.outcome is Outcome.TOPPLED
+        rocks_count = failed or self.mechanism.rotates
         if free and failed and free.backward_rad > free.forward_rad:
             return "slump"
         first = () if self.run is None else (self.mechanism.first.name,)
@@ -156,7 +157,7 @@ class WholeRun:
         modes = (
             MODES_OF[name]
             for name in reversed(names)
-            if name in MODES_OF and (failed or name != ROCKS)
+            if name in MODES_OF and (rocks_count or name != ROCKS)
         )
         return next(modes, None)
 
