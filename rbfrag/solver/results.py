@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-NUMERICS_VERSION = "6"
+NUMERICS_VERSION = "7"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
 
 Status = Literal["found", "below_limit", "no_motion", "outside_model"]
@@ -331,9 +331,9 @@ class CriticalResult(Tabular):
         lower: lower end of the bracket, k_r/PGA: a block there topples, by a run that is clear of
             its error.
         upper: upper end of the bracket, k_r/PGA: no block there topples. Where the answer is
-            certified the two are 1e-6 apart at most. Toppling where it is not: `upper` is K_up,
-            above which nothing topples, and between them only single blocks were looked at; then
-            also of a search that has found nothing.
+            certified the two are 1e-6 apart at most. Toppling where it is not: from `upper` on a
+            dense scan has met no block that topples, and no gap in it that may hide one; of a
+            search that has found nothing it is K_up, above which nothing topples.
         kr: the critical k_r itself.
         y_m_s: critical toppling velocity k_r g/p [m/s].
         certified: True when every k_r above the bracket is proven not to topple, slivers of

@@ -62,7 +62,7 @@ def test_printed_needs_of_a_record(
     assert answer.toe_slips_g == pytest.approx(0.4009, abs=6e-5)
     (said,) = (text for text in answer.warnings if "at the toe" in text)
     assert said.startswith(f"rotation without slip needs {needs_deg:.1f} deg at the toe at ")
-    assert said.endswith("phi = 16 gives way at 0.40 g: the slip of the toe is followed step by step")
+    assert "phi = 16 gives way at 0.40 g: the slip of the toe is followed" in said
     assert answer.peak_displacement_m is not None
     pga_g = rbfrag.read_motions(record)[0].pga_g
     assert toe_needs_deg(block, 0.0, pga_g) == pytest.approx(17.995, abs=6e-4)
