@@ -309,6 +309,7 @@ def _run(
         block.on_back_edge_rad,
         block.on_front_face_rad,
         *law,
+        *site.push,
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)

@@ -26,6 +26,7 @@ from rbfrag.solver.results import (
 )
 from rbfrag.solver.stability.modes import ModeName
 from rbfrag.solver.stability.single import Stability
+from rbfrag.solver.stability.toe import DRY, Push
 
 SHAKING = ("vertical", "polarity", "search_limit")
 """Options of every search."""
@@ -47,6 +48,8 @@ class BlockOnPlanes:
             block's mode is another one.
         settings: options of one model or another, by name.
         p2: frequency parameter p² of a block without a shape [1/s²].
+        push: of water that keeps acting, as :class:`rbfrag.solver.stability.single.Stability` has
+            it.
     """
 
     block: Block | None
@@ -58,6 +61,7 @@ class BlockOnPlanes:
     cohesive: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
     p2: float | None = None
+    push: Push = DRY
 
     @classmethod
     def of(
@@ -73,6 +77,7 @@ class BlockOnPlanes:
             judged.back_fracture,
             judged.cohesion is not None,
             settings,
+            push=judged.push or DRY,
         )
 
     @property

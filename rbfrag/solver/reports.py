@@ -63,6 +63,7 @@ def response_as_dict(response: Response) -> dict[str, Any]:
         "outcome": response.outcome.value,
         "how": response.how,
         **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
+        "drained": None if response.drained is None else asdict(response.drained),
         "mode_changes": [asdict(change) for change in response.mode_changes],
         "warnings": list(response.warnings),
     }

@@ -18,6 +18,7 @@ from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
     from rbfrag.solver.integrator.one_freedom.equation import Pose
+    from rbfrag.solver.stability.single import DrainedYield
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -225,6 +226,7 @@ class Response(Tabular):
         toe_slips_g: acceleration at which the toe gives way as the block starts to turn [g]; None
             where it holds at any.
         parts: of a sequence, the answer to each motion; () for a single one.
+        drained: yield acceleration of the drained block; None without water.
     """
 
     kind: str
@@ -259,6 +261,7 @@ class Response(Tabular):
     toe_needs_s: float | None = None
     toe_slips_g: float | None = None
     parts: tuple[Part, ...] = ()
+    drained: DrainedYield | None = None
 
     @property
     def how(self) -> str:

@@ -133,20 +133,24 @@ def _may_tip(site: BlockOnPlanes) -> bool:
 
 
 def tip_threshold(site: BlockOnPlanes) -> float:
-    """Return the k_h/(1 + k_v) below which the block tips about its heel, tan(α1 - β)."""
-    assert site.block is not None
-    return math.tan(math.radians(site.block.alpha1_deg) - site.beta_rad)
+    """Return the k_h/(1 + k_v) below which the block tips about its heel, dry tan(α1 - β)."""
+    tips = _tips_back(site)
+    return tips.threshold(0.0)
 
 
 def _tips_back(site: BlockOnPlanes) -> Equation:
     """Return the equation of the start of a rotation backward about the heel."""
     assert site.block is not None
-    # moments about the heel: k_h against (1 + k_v) tan(α1 - β); only its sign is read
+    # moments about the heel over m g r1: k_h cos(α1 - β) against (1 + k_v) times sin(α1 - β) and
+    # the backward moment of water; only their sign is read
     past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
+    along, off, moment_m = site.push
+    heel_x, heel_y = site.block.heel
+    moment_m += heel_y * along - heel_x * off
     return Equation(
         inertia=constant(1.0),
         driving=constant(math.cos(past_heel)),
-        resistance=constant(math.sin(past_heel)),
+        resistance=constant(math.sin(past_heel) + moment_m / site.block.r1_m),
     )
 
 
@@ -159,9 +163,12 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
     if horizontal:
         factor = 1.0
     driving = STANDARD_GRAVITY_M_S2 * factor
+    # the push of water over the weight lessens the yield, and leaves the factor as it is
+    along, off, _ = site.push
+    pushed = (along * math.cos(phi) + off * math.sin(phi)) / math.cos(phi - beta)
     contact = Condition(
         per_k_h=constant(-math.sin(beta)),
-        per_w=constant(math.cos(beta)),
+        per_w=constant(math.cos(beta) - off),
         per_rate2=constant(0.0),
         outcome=Outcome.CONTACT_LOST,
         sentence="the block loses contact with its base",
@@ -170,7 +177,7 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
         # nothing depends on s: the engine solves such an equation exactly
         inertia=constant(1.0),
         driving=constant(driving),
-        resistance=constant(driving * math.tan(phi - beta)),
+        resistance=constant(driving * (math.tan(phi - beta) - pushed)),
         conditions=() if horizontal else (contact,),
     )
 

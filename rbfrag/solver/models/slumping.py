@@ -112,6 +112,7 @@ def equation(site: BlockOnPlanes, sense: float) -> Equation:
         clockwise=False,
         inertia_m2=block.inertia_m2,
         beta_rad=site.beta_rad,
+        push=site.push,
     )
 
 

@@ -45,8 +45,9 @@ class Toppling(Kind):
         if site.block is None or answer.history is None:
             return answer
         beta_deg, phi_deg = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
-        slips_g = toe_slips_g(site.block, beta_deg, phi_deg)
-        need, at_s = toe_needs_in_time(site.block, beta_deg, answer.history) or (None, None)
+        slips_g = toe_slips_g(site.block, beta_deg, phi_deg, site.push)
+        needs = toe_needs_in_time(site.block, beta_deg, answer.history, site.push)
+        need, at_s = needs or (None, None)
         history = answer.history if shaking.history else None
         # a block of another mode, asked about as a topple, is not followed: it would slide or slump
         if need is not None and need > phi_deg and site.yield_g is not None:
@@ -112,7 +113,7 @@ def _mechanism(site: BlockOnPlanes) -> Mechanism:
     return Mechanism(
         first=Phase(
             name="topples about its toe",
-            forward=rocking_equation(block, site.beta_rad),
+            forward=rocking_equation(block, site.beta_rad, push=site.push),
             pose=pose,
             after=lambda _: Ending(Outcome.CONTACT_LOST),
         ),

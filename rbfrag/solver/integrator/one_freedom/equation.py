@@ -31,7 +31,7 @@ class Condition:
     Args:
         per_k_h: factor of the driving acceleration.
         per_w: factor of the effective gravity 1 + k_v.
-        per_rate2: factor of x'^2; it alone may hold a third harmonic.
+        per_rate2: factor of x'^2; like `per_w` it may hold a third harmonic.
         outcome: how the run ends where the condition fails.
         sentence: what has happened then.
     """
