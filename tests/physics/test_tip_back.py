@@ -174,3 +174,46 @@ def test_a_column_of_water_does_not_change_a_dry_block() -> None:
         **{name: [value] for name, value in planes.items()}, water_m=[0.0],
     )  # fmt: skip
     assert many.yield_acceleration[0] == pytest.approx(7.436433841813929, rel=1e-12)
+
+
+def random_record(seed: int) -> GroundMotion:
+    """Three seconds of smooth noise with a PGA of 0.9 g."""
+    rng = np.random.default_rng(seed)
+    noise = np.convolve(rng.standard_normal(300), np.hanning(int(rng.integers(8, 40))), "same")
+    samples = noise * np.hanning(300)
+    return GroundMotion(0.9 * samples / np.abs(samples).max(), 0.01)
+
+
+def assert_continuous(motions: tuple[GroundMotion, GroundMotion], *alphas_deg: float) -> bool:
+    """Compare two blocks on a base of 15° with 30° of friction; whether they move."""
+    low, high = (
+        respond(motion, block=Block.from_angles(alpha, 60.0, 1.0), beta_deg=15.0, phi_deg=30.0)
+        for motion, alpha in zip(motions, alphas_deg, strict=True)
+    )
+    assert low.outcome == high.outcome
+    if low.peak_displacement_m is None or high.peak_displacement_m is None:
+        return True
+    errors = (low.error_estimate, high.error_estimate)
+    if None not in errors:
+        jump = abs(low.peak_displacement_m - high.peak_displacement_m)
+        assert jump <= max(error for error in errors if error is not None) + 1e-6
+    return low.peak_displacement_m > 0.0
+
+
+@pytest.mark.parametrize("boundary", ["alpha1 = beta", "alpha1 = -phi", "threshold", "first slip"])
+def test_displacements_have_no_jump_at_a_boundary(boundary: str) -> None:
+    moves = 0
+    for seed in range(200):
+        motion = random_record(seed)
+        # at the threshold the greatest pulse into the slope just tips the block
+        tips_deg = 15.0 + math.degrees(math.atan(motion.acceleration_g.min()))
+        alpha1 = {"alpha1 = beta": 15.0, "alpha1 = -phi": -30.0}.get(boundary, max(tips_deg, -29.0))
+        below, above = alpha1 - 1e-6, alpha1 + 1e-6
+        motions = (motion, motion)
+        if boundary == "first slip":
+            # the record just reaches the yield: a block that has not slid leans on its back plane
+            reach = math.tan(math.radians(15.0)) / motion.acceleration_g.max()
+            motions = (motion.scaled(reach * (1.0 - 1e-9)), motion.scaled(reach * (1.0 + 1e-9)))
+            below = above = 5.0
+        moves += assert_continuous(motions, below, above)
+    assert moves > 150 or boundary == "first slip"

@@ -102,8 +102,8 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         rotates=False,
         critical=None,
         warnings=(KY_ALONE,) if site.block is None and not newmark else (),
-        least_q=tip_threshold(site) if may_tip and newmark else -math.inf,
-        if_below=MAY_TIP,
+        least_q=_neglected_below(site, two_way=two_way, newmark=newmark),
+        if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
         stepwise_below=-math.inf if newmark else driven_up_below(site),
         goes_on=site.block is not None and not site.settings.get("horizontal", False),
     )
@@ -118,6 +118,22 @@ MAY_TIP = (
     "pulses into the slope tip the block about its heel once it has slid; this option neglects "
     "that: it may slide further, slump or overturn (unconservative)"
 )
+
+
+MAY_SLIDE_UP = (
+    "pulses into the slope slide the block up its base, which is neglected (conservative): "
+    "two_way follows it"
+)
+
+
+def _neglected_below(site: BlockOnPlanes, *, two_way: bool, newmark: bool) -> float:
+    """Return the k_h/(1 + k_v) below which the block does what its model neglects."""
+    if _may_tip(site):
+        return tip_threshold(site) if newmark else -math.inf
+    up = site.phi_rad + site.beta_rad
+    if site.block is None or two_way or up >= 0.5 * math.pi:
+        return -math.inf
+    return -math.tan(up)
 
 
 def _may_tip(site: BlockOnPlanes) -> bool:
