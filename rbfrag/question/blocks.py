@@ -356,7 +356,7 @@ def one_block(
         return Blocks((Group(kind, given),), unread)
     from rbfrag.solver.stability.first_slip import after_first_slip
     from rbfrag.solver.stability.margins import warnings_about
-    from rbfrag.solver.stability.single import judged
+    from rbfrag.solver.stability.single import judged, push_of
 
     if numbers := [name for name in NUMBERS if name in given]:
         raise InputError(
@@ -375,7 +375,8 @@ def one_block(
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
     planes, after = after_first_slip(shape.block, planes)
-    finding, *_ = judged(shape.block, **planes)
+    finding, on, _ = judged(shape.block, **planes)
+    push = push_of(shape.block, on)
     listener = _One(shape.remarks)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     numbers_read = numbers_of_shape(
@@ -401,7 +402,12 @@ def one_block(
     ):
         from rbfrag.solver.stability.toe import about_toe
 
-        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))
+        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push))
+    if pga_g is not None and "ky" in numbers_read:
+        from rbfrag.solver.stability.toe import about_heel
+
+        tips = about_heel(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push)
+        remarks += [] if tips is None else [tips]
     across_m = 2.0 * shape.block.r3_m
     if not LEAST_M <= across_m <= MOST_M:
         remarks.append(f"the block measures some {across_m:.2g} m: lengths are in m")
