@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
@@ -118,6 +119,7 @@ def shaken_mechanism(
     beta_deg: float,
     phi_deg: float,
     phi_back_deg: float | None = None,
+    **water: Any,
 ) -> ShakenMechanism:
     """Return the mechanism of a block whose failure mode is that of the kind.
 
@@ -127,13 +129,16 @@ def shaken_mechanism(
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        water: ``water_m``, ``drainage`` and ``density_kg_m3`` of :func:`stability`.
 
     Raises:
         InputError: another kind; a block of another mode, or one that no earthquake decides about.
     """
     if not isinstance(model, MechanismKind):
         raise InputError(f"kind {model.kind!r} is not one whose records are scaled")
-    judged = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
+    judged = stability(
+        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, **water
+    )
     refuse_undecided(judged)
     if judged.mode != model.mode:
         raise InputError(

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rbfrag import Block, BlockArray, GroundMotion, InputError, respond, stability, stability_arrays
+from rbfrag import (
+    Block,
+    BlockArray,
+    GroundMotion,
+    InputError,
+    critical,
+    respond,
+    stability,
+    stability_arrays,
+)
 from rbfrag.solver.contacts import corner_at
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.free_motion import Release, free_motion
@@ -207,3 +216,13 @@ def test_cohesion_has_no_effect_on_a_topple_and_that_is_said() -> None:
     assert bonded.kr == stability(**topple_on).kr
     assert any("cohesion has no effect on k_r" in text for text in bonded.warnings)
     assert any("2,650" in text for text in bonded.warnings)
+
+
+def test_a_wet_slump_fails_under_a_weaker_record() -> None:
+    block, motion = Block.from_angles(45.0, 65.0, 1.0), half_sines(((0.75, 0.3),))
+    planes = {"beta_deg": 5.0, "phi_deg": 35.0, "rotation_deg": 3.0}
+    dry = critical(motion, block=block, **planes)
+    wet = critical(motion, block=block, **planes, water_m=0.4, density_kg_m3=2600.0)
+    drained = critical(motion, block=block, **planes, water_m=0.4, drainage="drained")
+    assert wet.of_kind["scale"] < dry.of_kind["scale"]
+    assert drained.of_kind["scale"] == dry.of_kind["scale"]

@@ -102,7 +102,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         rotates=False,
         critical=None,
         warnings=(KY_ALONE,) if site.block is None and not newmark else (),
-        least_q=_neglected_below(site, two_way=two_way, newmark=newmark),
+        least_q=_neglected_below(site, two_way=two_way, tips=tips, may_tip=may_tip),
         if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
         stepwise_below=-math.inf if newmark else driven_up_below(site),
         goes_on=site.block is not None and not site.settings.get("horizontal", False),
@@ -126,14 +126,14 @@ MAY_SLIDE_UP = (
 )
 
 
-def _neglected_below(site: BlockOnPlanes, *, two_way: bool, newmark: bool) -> float:
+def _neglected_below(site: BlockOnPlanes, *, two_way: bool, tips: bool, may_tip: bool) -> float:
     """Return the k_h/(1 + k_v) below which the block does what its model neglects."""
-    if _may_tip(site):
-        return tip_threshold(site) if newmark else -math.inf
-    up = site.phi_rad + site.beta_rad
-    if site.block is None or two_way or up >= 0.5 * math.pi:
+    if site.block is None or tips:
         return -math.inf
-    return -math.tan(up)
+    if may_tip:
+        return tip_threshold(site)
+    up = site.phi_rad + site.beta_rad
+    return -math.inf if two_way or up >= 0.5 * math.pi else -math.tan(up)
 
 
 def _may_tip(site: BlockOnPlanes) -> bool:

@@ -27,7 +27,6 @@ _ENDS = (
     " ends with the first slip (yield {k:.4g} g, {mode}), and no displacement or probability "
     f"follows from it: {STATE_RESIDUAL}"
 )
-UPLIFT = f"water_m does not go with a probability or a time history of {{kind}}: uplift{_ENDS}"
 ROUGH = f"jrc does not go with a probability or a time history of {{kind}}: roughness{_ENDS}"
 
 SLIPS_ON = (

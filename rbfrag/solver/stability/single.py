@@ -55,7 +55,7 @@ from rbfrag.solver.stability.modes import (
     words_of_mode,
     yield_coefficient,
 )
-from rbfrag.solver.stability.toe import toe_slips_g
+from rbfrag.solver.stability.toe import Push, toe_slips_g
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Stability(Tabular):
     joint: JointStrength | None = None
     water_m: float = 0.0
     toe_slips_g: float | None = None
-    push: tuple[float, float, float] | None = None
+    push: Push | None = None
     drained: DrainedYield | None = None
 
 
@@ -186,13 +186,11 @@ def stability(
     }  # fmt: skip
     finding, planes, strength = judged(block, **question, **joint)
     water_m = float(joint.get("water_m") or 0.0)
-    push = drained = None
+    drained = None
     if water_m > 0.0:
         dry: dict[str, Any] = {**joint, "drainage": DRAINED}
         drained = DrainedYield(judged(block, **question, **dry)[0].k)
-    if planes.water is not None:
-        unit_m = block.half_s1_m
-        push = (planes.water.along, planes.water.normal, planes.water.moment * unit_m)
+    push = push_of(block, planes)
     assumed: tuple[str, ...] = ()
     if density_kg_m3 is None and (cohesion_pa or water_m or strength):
         assumed = (ASSUMED_DENSITY,)
@@ -279,6 +277,14 @@ def judged(
         back_fracture, backward, untenable and back_fracture, lifts,
     )  # fmt: skip
     return finding, planes, strength
+
+
+def push_of(block: Block, planes: Planes[float]) -> Push | None:
+    """Return the push of water on a block as :class:`Stability` has it; None for none."""
+    water = planes.water
+    if water is None:
+        return None
+    return water.along, water.normal, water.moment * block.half_s1_m
 
 
 def _density(density_kg_m3: object) -> float:

@@ -17,7 +17,8 @@ def rocking_equation(
 ) -> Equation:
     """Return θ'' = p² [k_h cos(θc - θ) - (1 + k_v) (sin(θc - θ) - m0)], θc = α3 - β, clockwise.
 
-    m0 is the forward moment of water about the toe over m g r3. With `phi_rad` its conditions are that the toe presses on the base and does not slip.
+    m0 is the forward moment of water about the toe over m g r3. With `phi_rad` its conditions are
+    that the toe presses on the base and does not slip.
 
     Args:
         beta_rad: dip of the base [rad].

@@ -12,8 +12,10 @@ and F = A u_a + B u_b, the two forces drop out:
     D θ'' = g (F_y G_x - F_x G_y) - (F_y C''_x - F_x C''_y) θ'²
     D     = F_y C'_x - F_x C'_y - (I_C/m) u_a x u_b
 
-Water pushes with the force m g (1 + k_v) e, which turns with the block, and the moment m g (1 + k_v)
-mu about the centroid. It adds g (1 + k_v) (F_y e_x - F_x e_y - s mu u_a x u_b) to D θ''.
+Water pushes with the force m g (1 + k_v) e, which turns with the block, and with the moment
+m g (1 + k_v) mu about the centroid. Both add to D θ''
+
+    g (1 + k_v) (F_y e_x - F_x e_y - s mu u_a x u_b).
 """
 
 from __future__ import annotations
