@@ -24,9 +24,8 @@ from rbfrag.solver.results import (
     Polarity,
     Response,
 )
-from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.modes import DRY, ModeName, Push
 from rbfrag.solver.stability.single import Stability
-from rbfrag.solver.stability.toe import DRY, Push
 
 SHAKING = ("vertical", "polarity", "search_limit")
 """Options of every search."""

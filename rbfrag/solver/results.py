@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,7 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
-from rbfrag.solver.stability.modes import ModeName
-
-if TYPE_CHECKING:
-    from rbfrag.solver.integrator.one_freedom.equation import Pose
-    from rbfrag.solver.stability.single import DrainedYield
+from rbfrag.solver.stability.modes import DrainedYield, ModeName
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -115,6 +111,22 @@ class ModeChange:
 
     time_s: float
     motion: str
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the block is, in the base frame with the heel at rest as origin.
+
+    Args:
+        turned_rad: rotation, counter-clockwise [rad].
+        centroid_m: position of the centroid (x, y) [m].
+        displacement_m: how far the contact on the base has slipped along it, down the
+            slope positive [m].
+    """
+
+    turned_rad: float
+    centroid_m: tuple[float, float]
+    displacement_m: float
 
 
 @dataclass(frozen=True)

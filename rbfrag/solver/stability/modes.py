@@ -236,6 +236,23 @@ class Water(Generic[N]):
     moment: N
 
 
+@dataclass(frozen=True)
+class DrainedYield:
+    """The drained bound of a yield.
+
+    Args:
+        yield_acceleration: of the governing mode of the drained block [g].
+    """
+
+    yield_acceleration: float
+
+
+Push = tuple[float, float, float]
+"""Push of water over the weight: down the base, off it, and the moment about the centroid,
+counter-clockwise [m]."""
+
+DRY: Push = (0.0, 0.0, 0.0)
+
 Arms = tuple[tuple[N, Any], tuple[N, Any], tuple[N, Any], tuple[N, Any]]
 """Contacts from the centroid, along the base and normal to it."""
 

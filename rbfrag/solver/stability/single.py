@@ -48,14 +48,16 @@ from rbfrag.solver.stability.margins import (
 from rbfrag.solver.stability.modes import (
     MODES,
     STATES,
+    DrainedYield,
     ModeName,
     Planes,
+    Push,
     StateName,
     state_code,
     words_of_mode,
     yield_coefficient,
 )
-from rbfrag.solver.stability.toe import Push, toe_slips_g
+from rbfrag.solver.stability.toe import toe_slips_g
 
 
 @dataclass(frozen=True)
@@ -134,17 +136,6 @@ class Stability(Tabular):
     toe_slips_g: float | None = None
     push: Push | None = None
     drained: DrainedYield | None = None
-
-
-@dataclass(frozen=True)
-class DrainedYield:
-    """The drained bound of a yield.
-
-    Args:
-        yield_acceleration: of the governing mode of the drained block [g].
-    """
-
-    yield_acceleration: float
 
 
 def stability(

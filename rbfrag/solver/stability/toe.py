@@ -16,15 +16,10 @@ from typing import TYPE_CHECKING
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.modes import DRY, Push
 
 if TYPE_CHECKING:
     from rbfrag.solver.results import ResponseHistory
-
-Push = tuple[float, float, float]
-"""Push of water over the weight: down the base, off it, and the moment about the centroid,
-counter-clockwise [m]."""
-
-DRY: Push = (0.0, 0.0, 0.0)
 
 # of 2,652 random blocks 16 % slip at the toe below their critical amplitude, ln of which then
 # differs by 0.036 +- 0.10 from that of pure toppling
@@ -48,9 +43,7 @@ def moment_about_toe(block: Block, push: Push | None) -> float:
     return (block.toe[0] * off - block.toe[1] * along - moment_m) / block.r3_m
 
 
-def _balance(
-    block: Block, beta_deg: float, push: Push | None
-) -> tuple[float, float, float, float]:
+def _balance(block: Block, beta_deg: float, push: Push | None) -> tuple[float, float, float, float]:
     """Return thrust and pressure at the toe over the weight, each a constant and per k."""
     beta, alpha3 = math.radians(beta_deg), math.radians(block.alpha3_deg)
     turns, factor = alpha3 - beta, block.shape_factor

@@ -17,6 +17,7 @@ import numpy as np
 
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, constant
 from rbfrag.solver.results import FloatArray, Outcome
+from rbfrag.solver.results import Pose as Pose
 
 _LOOKS = 256
 """Points at which the strength of a block is looked at, over the range of its motion."""
@@ -109,22 +110,6 @@ class Equation:
     def threshold(self, x: float) -> float:
         """Return the k_h that starts the motion at a position where 1 + k_v = 1."""
         return self.resistance(x) / self.driving(x)
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where the block is, in the base frame with the heel at rest as origin.
-
-    Args:
-        turned_rad: rotation, counter-clockwise [rad].
-        centroid_m: position of the centroid (x, y) [m].
-        displacement_m: how far the contact on the base has slipped along it, down the
-            slope positive [m].
-    """
-
-    turned_rad: float
-    centroid_m: tuple[float, float]
-    displacement_m: float
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.integrator.one_freedom.equation import Condition, Equation
 from rbfrag.solver.integrator.one_freedom.harmonics import Vector, constant_vector, turning
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.stability.toe import DRY, Push
+from rbfrag.solver.stability.modes import DRY, Push
 
 
 @dataclass(frozen=True, eq=False)
