@@ -116,7 +116,7 @@ class ScaledRecords(Sequences):
             shaken = self._shaken(block)
             ratios = self.grid(cases[numbers[0]], shaking.motion)
             scales = [shaken.yield_g / (k * excited.pga_g) for k in ratios.tolist()]
-            ends = [shaken.run(excited.scaled(scale)) for scale in scales]
+            ends = [shaken.run(excited.scaled(scale), stepwise=False) for scale in scales]
             for i in numbers:
                 rotation: Any = cases[i].settings["rotation_deg"]
                 fails = rotation_rad(rotation)

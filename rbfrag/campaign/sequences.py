@@ -200,7 +200,8 @@ def run_pair(work: PairWork) -> PairResults:
             polarity: Polarity = task.polarity,
         ) -> Response:
             """Return what the block does under a motion that finds it in a state."""
-            return model.respond(site, Shaking(motion, None, polarity, start=start, laws=False))
+            shaking = Shaking(motion, None, polarity, start=start, laws=False, stepwise=False)
+            return model.respond(site, shaking)
 
         first, intact = under(work.first), under(work.second)
         second, runs = None, runs + 2

@@ -27,8 +27,7 @@ from rbfrag.question.fields import (
 )
 from rbfrag.question.shapes import (
     BOND,
-    DENSITY_ASSUMED,
-    DENSITY_KG_M3,
+    DENSITY_NOTE,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
@@ -53,6 +52,7 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
+from rbfrag.solver.stability.joint import ROCK_KG_M3
 
 if TYPE_CHECKING:
     import numpy as np
@@ -244,8 +244,8 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     bond = bond_of(planes)
     needed = any(bond.get(name) for name in ("cohesion_pa", "water_m", "jrc"))
     if needed and "density_kg_m3" not in bond:
-        bond["density_kg_m3"] = DENSITY_KG_M3
-        listener.remarks.append(DENSITY_ASSUMED)
+        bond["density_kg_m3"] = ROCK_KG_M3
+        listener.remarks.append(DENSITY_NOTE)
     remarks = (*off_section, *listener.remarks)
     return Shape(block, {**planes, **stated, **bond}, is_rectangle, remarks)
 
@@ -378,7 +378,7 @@ def one_block(
         return Blocks((Group(kind, given),), (*unread, *size_questions(given.get("p2"))))
     from rbfrag.solver.stability.first_slip import after_first_slip
     from rbfrag.solver.stability.margins import warnings_about
-    from rbfrag.solver.stability.single import judged
+    from rbfrag.solver.stability.single import judged, push_of
 
     if numbers := [name for name in NUMBERS if name in given]:
         raise InputError(
@@ -397,12 +397,13 @@ def one_block(
     if requested is not None and requested.free_standing:
         planes["back_fracture"] = False
     before_slip = {name: planes[name] for name in planes if name != "phi_residual_deg"}
-    finding, *_ = judged(shape.block, **before_slip)
+    finding, on, _ = judged(shape.block, **before_slip)
     after: tuple[str, ...] = ()
     if finding.k > 0.0:
         planes, after = after_first_slip(shape.block, planes)
         if after:
-            finding, *_ = judged(shape.block, **planes)
+            finding, on, _ = judged(shape.block, **planes)
+    push = push_of(shape.block, on)
     listener = _One(shape.remarks)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     judged_shape = ModeShapes(
@@ -432,7 +433,12 @@ def one_block(
     ):
         from rbfrag.solver.stability.toe import about_toe
 
-        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g))
+        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push))
+    if pga_g is not None and "ky" in numbers_read:
+        from rbfrag.solver.stability.toe import about_heel
+
+        tips = about_heel(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push)
+        remarks += [] if tips is None else [tips]
     across_m, size = 2.0 * shape.block.r3_m, _One()
     check_size(shape.block.p2, size)
     if across_m < LEAST_M:

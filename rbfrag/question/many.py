@@ -25,8 +25,7 @@ from rbfrag.question.blocks import (
 )
 from rbfrag.question.shapes import (
     BOND,
-    DENSITY_ASSUMED,
-    DENSITY_KG_M3,
+    DENSITY_NOTE,
     FRICTION_MISSING,
     JOINT,
     LEAST_M,
@@ -49,8 +48,8 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.arrays import REASONS, BlockArray
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
-from rbfrag.solver.stability.first_slip import AFTER_SLIP, SLIPS_ON
-from rbfrag.solver.stability.joint import NO_FRACTURE
+from rbfrag.solver.stability.first_slip import AFTER_SLIP, ENDED, SLIPS_ON
+from rbfrag.solver.stability.joint import NO_FRACTURE, ROCK_KG_M3
 from rbfrag.solver.stability.modes import MODES, words_of_mode
 
 _IF_EMPTY = {"beta_deg": 0.0}
@@ -376,8 +375,8 @@ class _Sorted:
             needed: Any = False
             for name in ("cohesion_pa", "water_m", "jrc"):
                 needed = needed | (strength.get(name, np.zeros(1)) > 0.0)
-            listener.remark(np.isnan(density) & needed, DENSITY_ASSUMED)
-            strength["density_kg_m3"] = np.where(np.isnan(density), DENSITY_KG_M3, density)
+            listener.remark(np.isnan(density) & needed, DENSITY_NOTE)
+            strength["density_kg_m3"] = np.where(np.isnan(density), ROCK_KG_M3, density)
         on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
         judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
         residual = stated.get("phi_residual_deg", np.full(1, np.nan))
@@ -389,10 +388,8 @@ class _Sorted:
                 left & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
             )
             phi, back = (np.where(left, residual, each) for each in (phi, back))
-            strength = {
-                name: each if name in ("density_kg_m3", "jcs_mpa") else np.where(left, 0.0, each)
-                for name, each in strength.items()
-            }
+            ended = strength.keys() & ENDED - {"jcs_mpa"}
+            strength |= {name: np.where(left, 0.0, strength[name]) for name in ended}
             judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
             fails = left & (judged_all.yield_acceleration <= 0.0)
             listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)

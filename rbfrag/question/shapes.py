@@ -25,7 +25,8 @@ from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise,
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
 from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
-from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, UPLIFT, slips_on_base
+from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, slips_on_base
+from rbfrag.solver.stability.joint import ASSUMED_DENSITY, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 
 if TYPE_CHECKING:
@@ -53,12 +54,7 @@ been meant."""
 
 LENGTHS = ("height_m", "width_m", "s1_m", "s2_m", "r3_m")
 
-DENSITY_KG_M3 = 2650.0
-"""Density of the rock that is assumed where it is needed and not given [kg/m³]."""
-
-DENSITY_ASSUMED = Diagnostic(
-    f"the density is not given: {DENSITY_KG_M3:,.0f} kg/m³ is assumed", "density_assumed"
-)
+DENSITY_NOTE = Diagnostic(ASSUMED_DENSITY, "density_assumed")
 
 FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
 
@@ -340,13 +336,14 @@ def numbers_of_shape(
         listener.refuse(True, NO_MODEL_OF_MODE, **words)
         return {}
     listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
-    listener.refuse(judged.wet, UPLIFT, "water_m", "phi_residual_deg", **words)
+    listener.remark(judged.wet, STAYS_UNDRAINED)
     if slips_on_base(facts):
         listener.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
         listener.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
     if "ky" in facts.parameters:
         listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
-        return {"ky": k, "beta_deg": judged.beta_deg, "displacement_m": displacement_m, **stated}
+        dip_deg = _dip_of_factor(judged)
+        return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **stated}
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
     if facts.search_needs == "block":  # shape, friction and dip decide how it moves
@@ -374,6 +371,33 @@ def numbers_of_shape(
     restitution = stated.get("restitution", own)
     restitution = functions.where(restitution == restitution, restitution, own)
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
+
+
+def _dip_of_factor(judged: ModeShapes) -> Any:
+    """Return the dip [deg] that gives wet slides the factor of their displacements.
+
+    Models derive cos(φ - b)/cos φ from k_y and a dip b with φ = b + atan k_y. Water lessens k_y and
+    leaves the factor F as it is: b = acos(cos(atan k_y)/F) - atan k_y. Where F is less than any of
+    that k_y, b is that of the least, which is conservative.
+    """
+    if judged.wet is False or judged.k is None:
+        return judged.beta_deg
+    trigonometry: Any = math
+    functions: Elementwise[Any] = SCALAR
+    if not isinstance(judged.body, Block):
+        import numpy as np
+
+        trigonometry, functions = np, array_elementwise()
+    arccos, arctan = (
+        (math.acos, math.atan)
+        if trigonometry is math
+        else (trigonometry.arccos, trigonometry.arctan)
+    )
+    phi, beta = (trigonometry.radians(angle) for angle in (judged.phi_deg, judged.beta_deg))
+    steep = functions.where(abs(judged.k) < math.inf, arctan(judged.k), 0.0)
+    cosine = trigonometry.cos(steep) * trigonometry.cos(phi) / trigonometry.cos(phi - beta)
+    dip = trigonometry.degrees(arccos(functions.where(cosine < 1.0, cosine, 1.0)) - steep)
+    return functions.where(judged.wet, dip, judged.beta_deg)
 
 
 def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:

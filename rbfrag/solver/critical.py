@@ -23,6 +23,9 @@ def critical(
     beta_deg: float | None = None,
     phi_deg: float | None = None,
     phi_back_deg: float | None = None,
+    water_m: float | None = None,
+    drainage: str | None = None,
+    density_kg_m3: float | None = None,
     rotation_deg: float | None = None,
     displacement_m: float | None = None,
     vertical: MotionLike | None = None,
@@ -51,6 +54,11 @@ def critical(
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        water_m: height of the water in the back fracture above the heel [m]. It decides the mode,
+            and how slumps and confined topples move; the critical k of a topple or a slide is the
+            same for a wet block as for a dry one.
+        drainage: ``undrained`` (default) or ``drained``.
+        density_kg_m3: density of the rock [kg/m³]; None for 2,650.
         rotation_deg: scaled records: peak rotation that counts as failure [deg]; None for failure
             past recovery.
         displacement_m: sliding: the distance on a level plane [m]; on a base that dips, divide
@@ -77,6 +85,9 @@ def critical(
         "beta_deg": beta_deg,
         "phi_deg": phi_deg,
         "phi_back_deg": phi_back_deg,
+        "water_m": water_m,
+        "drainage": drainage,
+        "density_kg_m3": density_kg_m3,
         "rotation_deg": rotation_deg,
         "displacement_m": displacement_m,
         "full_map": full_map or None,
@@ -126,6 +137,9 @@ def judged_at_rest(given: Mapping[str, Any]) -> Stability:
         beta_deg=given["beta_deg"],
         phi_deg=given.get("phi_deg", rough_deg(block)),
         phi_back_deg=given.get("phi_back_deg"),
+        water_m=given.get("water_m") or 0.0,
+        drainage=given.get("drainage"),
+        density_kg_m3=given.get("density_kg_m3"),
     )
     refuse_undecided(judged)
     return judged

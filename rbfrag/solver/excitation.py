@@ -14,6 +14,9 @@ from rbfrag.motions.polarity import Polarity, driving_acceleration_g
 from rbfrag.motions.quality import quality_flags
 from rbfrag.solver.results import FloatArray
 
+PGA_MOST_G = 1000.0
+"""PGA above which the unit of the samples must be wrong [g]."""
+
 BLOCK = 16
 """Nodes per block of the table of maxima that rest is skipped by."""
 
@@ -175,7 +178,13 @@ def excitation(
             same sampling interval (or, for node motions, the same node times). Where one
             component is shorter, it is taken as zero after its last sample, with a warning.
         polarity: ``forward`` or ``reverse``; the vertical is never reversed.
+
+    Raises:
+        InputError: components that cannot be brought together; a PGA above `PGA_MOST_G`.
     """
+    for component in (motion, vertical):
+        if component is not None and component.pga_g > PGA_MOST_G:
+            raise InputError(f"PGA is {component.pga_g:.3g} g: check the unit of the samples")
     k_h = driving_acceleration_g(motion.acceleration_g, polarity)
     time_s, interval_s = motion.time_s, motion.interval_s
     warnings: list[str] = []

@@ -126,6 +126,7 @@ class FreeMotion:
         steps: steps of both runs.
         contact: the contact whose displacement is given, from the centroid [m].
         rows: what the kernel kept of the motion.
+        coarse: the run of twice the step.
         by_other_laws: runs the block by the laws of `OTHER_LAWS`.
     """
 
@@ -143,18 +144,31 @@ class FreeMotion:
     block: Block
     contact: tuple[float, float]
     rows: FloatArray
-    by_other_laws: Callable[[], FreeError | None]
+    coarse: _Path
+    by_other_laws: Callable[[], tuple[_Path, ...]]
+
+    @cached_property
+    def _others(self) -> tuple[_Path, ...]:
+        """The runs by other laws, which take as long as the motion itself has taken."""
+        return self.by_other_laws()
 
     @cached_property
     def error(self) -> FreeError | None:
-        """What steps and laws of impact and friction leave open; None where it is whether it fails.
-
-        Takes as long as the motion itself has taken.
-        """
-        of_laws = self.by_other_laws()
-        if of_laws is None:
+        """Error of the steps plus the spread of the laws of impact; None where they disagree on
+        whether the block fails."""
+        if any(other.fails != self.coarse.fails for other in self._others):
             return None
+        # compared with the coarse run: what laws differ by needs no finer steps
+        of_laws = map(max, *(self.coarse.beside(other) for other in self._others))
         return FreeError(*(a + b for a, b in zip(self.step_error, of_laws, strict=True)))
+
+    @cached_property
+    def by_law(self) -> tuple[Pose, ...]:
+        """Where the coarse run and those by other laws rest; () where not all of them do."""
+        paths = (self.coarse, *self._others)
+        if any(path.run.stop != AT_REST for path in paths):
+            return ()
+        return tuple(_pose(self.block, path.run.motion, self.contact) for path in paths)
 
     @cached_property
     def history(self) -> Kinematics:
@@ -216,20 +230,23 @@ def free_motion(
     release: Release,
     *,
     at_toe: bool = False,
+    by_law: tuple[Pose, ...] = (),
 ) -> FreeMotion:
     """Return what a block does from where its mechanism has left it.
 
     Args:
         release: where and how fast it is.
         at_toe: whether displacements along the base are those of the toe, else of the heel.
+        by_law: where the coarse run and those by other laws begin, at rest; () for all where the
+            block is released.
     """
     block = site.block
     assert block is not None
     contact = block.toe if at_toe else block.heel
 
-    def path(step_s: float, law: tuple[float, float]) -> _Path:
-        run, rows = _run(site, excited, release, step_s, law)
-        begin, end = release.pose, _pose(block, run.motion, contact)
+    def path(step_s: float, law: tuple[float, float], start: Release) -> _Path:
+        run, rows = _run(site, excited, start, step_s, law)
+        begin, end = start.pose, _pose(block, run.motion, contact)
         return _Path(
             run,
             rows,
@@ -240,19 +257,20 @@ def free_motion(
         )
 
     # the method is of first order: the difference of both is the error of the finer one
-    fine, coarse = path(STEP_S, RIGID), path(2.0 * STEP_S, RIGID)
+    starts = [Release(release.time_s, pose) for pose in by_law]
+    starts = starts or [release] * (1 + len(OTHER_LAWS))
+    fine = path(STEP_S, RIGID, release)
+    coarse = path(2.0 * STEP_S, RIGID, starts[0])
 
-    def by_other_laws() -> FreeError | None:
-        # beside the coarse run: what laws differ by needs no finer steps
-        others = [path(2.0 * STEP_S, law) for law in OTHER_LAWS]
-        if any(other.fails != coarse.fails for other in others):
-            return None
-        return FreeError(*map(max, *(coarse.beside(other) for other in others)))
+    def by_other_laws() -> tuple[_Path, ...]:
+        laws = zip(OTHER_LAWS, starts[1:], strict=True)
+        return tuple(path(2.0 * STEP_S, law, start) for law, start in laws)
 
     outcome, sentence = _ending(fine.run)
     least_rad, most_rad, _ = fine.rotations
+    step_error = fine.beside(coarse)
     # whether it fails hangs on the step: closer to critical than the error
-    if fine.fails != coarse.fails:
+    if fine.fails != coarse.fails or any(map(math.isnan, step_error)):
         outcome, sentence = Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice
     return FreeMotion(
         outcome=outcome,
@@ -264,11 +282,12 @@ def free_motion(
         backward_rad=max(0.0, most_rad),
         forward_rad=max(0.0, -least_rad),
         slip_m=fine.slips[1],
-        step_error=fine.beside(coarse),
+        step_error=step_error,
         steps=fine.run.steps + coarse.run.steps,
         block=block,
         contact=contact,
         rows=fine.rows,
+        coarse=coarse,
         by_other_laws=by_other_laws,
     )
 
@@ -290,6 +309,7 @@ def _run(
         block.on_back_edge_rad,
         block.on_front_face_rad,
         *law,
+        *site.push,
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)

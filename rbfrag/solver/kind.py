@@ -24,7 +24,7 @@ from rbfrag.solver.results import (
     Polarity,
     Response,
 )
-from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.modes import DRY, ModeName, Push
 from rbfrag.solver.stability.single import Stability
 
 SHAKING = ("vertical", "polarity", "search_limit")
@@ -47,6 +47,8 @@ class BlockOnPlanes:
             block's mode is another one.
         settings: options of one model or another, by name.
         p2: frequency parameter p² of a block without a shape [1/s²].
+        push: of water that keeps acting, as :class:`rbfrag.solver.stability.single.Stability` has
+            it.
     """
 
     block: Block | None
@@ -58,6 +60,7 @@ class BlockOnPlanes:
     cohesive: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
     p2: float | None = None
+    push: Push = DRY
 
     @classmethod
     def of(
@@ -73,6 +76,7 @@ class BlockOnPlanes:
             judged.back_fracture,
             judged.cohesion is not None,
             settings,
+            push=judged.push or DRY,
         )
 
     @property
@@ -92,6 +96,7 @@ class Shaking:
         start: the state that the motion finds; None for a block at rest in its first place.
         laws: whether the error after a lost contact includes what laws of impact and friction
             differ by, which takes as long as the motion itself.
+        stepwise: whether a record that drives the block up its back plane is followed step by step.
     """
 
     motion: GroundMotion
@@ -101,6 +106,7 @@ class Shaking:
     remarks: tuple[str, ...] = ()
     start: BlockState | None = None
     laws: bool = True
+    stepwise: bool = True
 
     @cached_property
     def excitation(self) -> Excitation:

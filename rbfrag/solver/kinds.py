@@ -14,8 +14,8 @@ from rbfrag.errors import InputError
 if TYPE_CHECKING:
     from rbfrag.solver.stability.modes import ModeName
 
-PLANES = ("beta_deg", "phi_deg", "phi_back_deg")
-"""Options that describe the planes of a block."""
+PLANES = ("beta_deg", "phi_deg", "phi_back_deg", "water_m", "drainage", "density_kg_m3")
+"""Options that describe the planes of a block, and the water in its back fracture."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,9 @@ block's mechanism at rest."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
@@ -14,6 +16,17 @@ from rbfrag.solver.results import Outcome, Response
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.single import refuse_undecided, stability
 from rbfrag.solver.whole_run import WholeRun, response_of, whole_run
+
+
+def driven_up_below(site: BlockOnPlanes) -> float:
+    """Return the k_h/(1 + k_v) below which the whole block slides up its back plane.
+
+    -tan(γ + β + φ_back); minus infinity for a block that no pulse drives up it.
+    """
+    if site.block is None or not site.back_fracture:
+        return -math.inf
+    steepness = math.radians(site.block.gamma_deg) + site.beta_rad + site.phi_back_rad
+    return -math.tan(steepness) if steepness < 0.5 * math.pi else -math.inf
 
 
 class MechanismKind(Kind):
@@ -38,7 +51,10 @@ class MechanismKind(Kind):
         """
         mechanism = self._without_cohesion(site)
         excited = shaking.excitation
-        whole = whole_run(mechanism, site, excited, history=shaking.history, start=shaking.start)
+        whole = whole_run(
+            mechanism, site, excited, history=shaking.history, start=shaking.start,
+            stepwise=shaking.stepwise,
+        )  # fmt: skip
         return response_of(self.kind, whole, shaking)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
@@ -91,9 +107,9 @@ class ShakenMechanism:
     remarks: tuple[str, ...]
     site: BlockOnPlanes
 
-    def run(self, excited: Excitation) -> WholeRun:
-        """Follow the block under an excitation."""
-        return whole_run(self.mechanism, self.site, excited)
+    def run(self, excited: Excitation, *, stepwise: bool = True) -> WholeRun:
+        """Follow the block under an excitation; `stepwise` as of :func:`whole_run`."""
+        return whole_run(self.mechanism, self.site, excited, stepwise=stepwise)
 
 
 def shaken_mechanism(
@@ -103,6 +119,7 @@ def shaken_mechanism(
     beta_deg: float,
     phi_deg: float,
     phi_back_deg: float | None = None,
+    **water: Any,
 ) -> ShakenMechanism:
     """Return the mechanism of a block whose failure mode is that of the kind.
 
@@ -112,13 +129,16 @@ def shaken_mechanism(
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        water: ``water_m``, ``drainage`` and ``density_kg_m3`` of :func:`stability`.
 
     Raises:
         InputError: another kind; a block of another mode, or one that no earthquake decides about.
     """
     if not isinstance(model, MechanismKind):
         raise InputError(f"kind {model.kind!r} is not one whose records are scaled")
-    judged = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
+    judged = stability(
+        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, **water
+    )
     refuse_undecided(judged)
     if judged.mode != model.mode:
         raise InputError(

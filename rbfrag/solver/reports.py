@@ -27,6 +27,7 @@ RESPONSE_NUMBERS = (
 )  # fmt: skip
 OF_TWO_CORNERS = (
     "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
+    "peak_spread",
 )  # fmt: skip
 """Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
 
@@ -62,6 +63,7 @@ def response_as_dict(response: Response) -> dict[str, Any]:
         "outcome": response.outcome.value,
         "how": response.how,
         **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
+        "drained": None if response.drained is None else asdict(response.drained),
         "mode_changes": [asdict(change) for change in response.mode_changes],
         "warnings": list(response.warnings),
     }

@@ -18,6 +18,7 @@ from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
 from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
+from rbfrag.solver.stability.joint import IS_DRAINED, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.single import Stability, refuse_undecided, stability
 
@@ -44,7 +45,7 @@ def respond(
     horizontal: bool = False,
     restitution: float | None = None,
     history: bool = False,
-    **of_kind: float,
+    **of_kind: Any,
 ) -> Response:
     """Return what a block does under a ground motion, or under several one after another.
 
@@ -68,7 +69,7 @@ def respond(
         back_fracture: False for a block without a plane behind it: one that topples rocks about
             both corners.
         cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
-        density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
+        density_kg_m3: density of the rock [kg/m³]; None for 2,650 with a cohesion or water.
         vertical: vertical motion of the same recording, upward positive; of a list of motions, a
             list of as many, None where there is none.
         polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
@@ -84,8 +85,10 @@ def respond(
             None for what angular momentum leaves at each corner.
         history: keep the motion in time.
         of_kind: further settings of a kind, as its line in `rbfrag.solver.kinds` names them; of a
-            shape also ``water_m``, ``jrc``, ``jcs_mpa``, ``joint_length_m``, which end with the
-            first slip, and ``phi_residual_deg``, on which it is then run.
+            shape also ``water_m`` with ``drainage`` (``undrained``, the default: the water
+            pressure keeps acting while the block moves; ``drained``: it vanishes), ``jrc``,
+            ``jcs_mpa``, ``joint_length_m``, which end with the first slip, and
+            ``phi_residual_deg``, on which it is then run.
 
     Raises:
         TypeError: a keyword that no kind knows.
@@ -145,7 +148,9 @@ def respond(
         if phi_deg is None:
             site = replace(site, phi_rad=0.5 * math.pi)
         remarks = (*after, *_remarks(judged, model))
-        return answer(model, site, remarks, judged.mode)
+        if judged.drained is not None:
+            remarks = (*remarks, IS_DRAINED if judged.push is None else STAYS_UNDRAINED)
+        return replace(answer(model, site, remarks, judged.mode), drained=judged.drained)
     numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
     model, site = known_by_numbers(kind, numbers, settings)
     return answer(model, site)

@@ -14,12 +14,12 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
-from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.modes import DrainedYield, ModeName
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-NUMERICS_VERSION = "6"
+NUMERICS_VERSION = "7"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
 
 Status = Literal["found", "below_limit", "no_motion", "outside_model"]
@@ -114,6 +114,22 @@ class ModeChange:
 
 
 @dataclass(frozen=True)
+class Pose:
+    """Where the block is, in the base frame with the heel at rest as origin.
+
+    Args:
+        turned_rad: rotation, counter-clockwise [rad].
+        centroid_m: position of the centroid (x, y) [m].
+        displacement_m: how far the contact on the base has slipped along it, down the
+            slope positive [m].
+    """
+
+    turned_rad: float
+    centroid_m: tuple[float, float]
+    displacement_m: float
+
+
+@dataclass(frozen=True)
 class BlockState:
     """A block at rest where a motion has left it, from which another one may start.
 
@@ -127,6 +143,9 @@ class BlockState:
         position: coordinate of its mechanism [rad] or [m]; None where no mechanism describes it.
         error: bound on the error of the rotation [rad], of a sliding block of the displacement [m];
             infinite where it is not known.
+        by_law: where a run of twice the step and runs by each other law of impact leave the block,
+            from where the next motion continues each of them; () for a block that no mechanism has
+            left, or that fails by some of them.
     """
 
     turned_rad: float
@@ -136,6 +155,7 @@ class BlockState:
     touching: tuple[str, ...]
     position: float | None
     error: float
+    by_law: tuple[Pose, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return it with the keys of the JSON contract."""
@@ -207,6 +227,8 @@ class Response(Tabular):
         peak_backward_rad: greatest rotation about the heel [rad]; None likewise.
         impacts: impacts within the record; the free motion after it is decided in closed form.
         sensitive: whether the outcome is another one for the motion times 1 + 1e-6 or 1 - 1e-6.
+        peak_spread: greatest relative change of `peak_theta_rad` for these motions; None where the
+            outcome changes, where the block overturns or does not move, and for other kinds.
         state: where the block is left at rest; None where it is not, or not known.
         mode: failure mode of the block in its first place.
         final_mode: that of its last motion that is one of a mode; None for no motion.
@@ -216,6 +238,7 @@ class Response(Tabular):
         toe_slips_g: acceleration at which the toe gives way as the block starts to turn [g]; None
             where it holds at any.
         parts: of a sequence, the answer to each motion; () for a single one.
+        drained: yield acceleration of the drained block; None without water.
     """
 
     kind: str
@@ -242,6 +265,7 @@ class Response(Tabular):
     peak_backward_rad: float | None = None
     impacts: int | None = None
     sensitive: bool | None = None
+    peak_spread: float | None = None
     state: BlockState | None = None
     mode: ModeName | None = None
     final_mode: ModeName | None = None
@@ -249,6 +273,7 @@ class Response(Tabular):
     toe_needs_s: float | None = None
     toe_slips_g: float | None = None
     parts: tuple[Part, ...] = ()
+    drained: DrainedYield | None = None
 
     @property
     def how(self) -> str:
@@ -321,9 +346,9 @@ class CriticalResult(Tabular):
         lower: lower end of the bracket, k_r/PGA: a block there topples, by a run that is clear of
             its error.
         upper: upper end of the bracket, k_r/PGA: no block there topples. Where the answer is
-            certified the two are 1e-6 apart at most. Toppling where it is not: `upper` is K_up,
-            above which nothing topples, and between them only single blocks were looked at; then
-            also of a search that has found nothing.
+            certified the two are 1e-6 apart at most. Toppling where it is not: from `upper` on a
+            dense scan has met no block that topples, and no gap in it that may hide one; of a
+            search that has found nothing it is K_up, above which nothing topples.
         kr: the critical k_r itself.
         y_m_s: critical toppling velocity k_r g/p [m/s].
         certified: True when every k_r above the bracket is proven not to topple, slivers of

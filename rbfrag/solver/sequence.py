@@ -191,7 +191,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
 
 _GREATEST = (
     "peak_theta_n", "peak_theta_rad", "peak_displacement_m", "peak_forward_rad",
-    "peak_backward_rad", "toe_needs_deg",
+    "peak_backward_rad", "peak_spread", "toe_needs_deg",
 )  # fmt: skip
 _SUMS = ("steps", "samples_moved", "samples_total")
 

@@ -58,6 +58,8 @@ def respond(
     refuse_endless(excited, p2)
     run = simulate(excited, p2=p2, kr=kr)
     outcome = OUTCOMES[run.outcome]
+    if math.isnan(run.error_rad):  # the error is beyond any number: nothing is known of the end
+        outcome = Outcome.UNDETERMINED
     theta_c = math.atan(kr)
     known = math.isfinite(run.peak_rad)
     return Response(
@@ -68,7 +70,7 @@ def respond(
         critical_angle_deg=math.degrees(theta_c),
         started_s=finite_or_none(run.started_s),
         toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
-        error_estimate=run.error_rad,
+        error_estimate=finite_or_none(run.error_rad),
         steps=run.steps,
         samples_moved=run.samples_moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),

@@ -11,6 +11,7 @@ from rbfrag.solver.contacts import gap_m, touching
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
     MODES_OF,
+    ROCKS,
     FreeError,
     FreeMotion,
     Kinematics,
@@ -40,7 +41,7 @@ class WholeRun:
     Args:
         mechanism: the block as its model describes it.
         start: the state that it started from; None for its first place.
-        run: what its mechanism did; None for a start that no mechanism describes.
+        run: what its mechanism did; None where it is followed step by step from the beginning.
         free: what the block did after it; None where the mechanism goes to the end.
     """
 
@@ -122,11 +123,10 @@ class WholeRun:
         return math.inf if self.free.error is None else self._error(self.free.error)
 
     def _error(self, of_free: FreeError | None) -> float:
+        # where each law goes on from its own place, the spread of this motion has that of the last
+        before = 0.0 if self.start is None or self.start.by_law else self.start.error
         if self.run is not None:
             before = self.run.error
-        else:
-            assert self.start is not None
-            before = self.start.error
         if of_free is None:
             return before
         return before + (of_free.rotation_rad if self.mechanism.rotates else of_free.displacement_m)
@@ -142,16 +142,24 @@ class WholeRun:
     def final_mode(self) -> ModeName | None:
         """Failure mode of the last motion that is one of a mode; None for no motion.
 
-        A block that has turned over backward ends in a slump, whatever it turned about.
+        A block that has turned over backward ends in a slump, whatever it turned about. A
+        slide that rocks about its toe as it lands has not toppled, unless it fails.
         """
         if self.started_s is None:
             return None
         free = self.free
-        if free and free.outcome is Outcome.TOPPLED and free.backward_rad > free.forward_rad:
+        failed = self.outcome is Outcome.TOPPLED
+        rocks_count = failed or self.mechanism.rotates
+        if free and failed and free.backward_rad > free.forward_rad:
             return "slump"
         first = () if self.run is None else (self.mechanism.first.name,)
         names = (*first, *(change.motion for change in self.changes))
-        return next((MODES_OF[name] for name in reversed(names) if name in MODES_OF), None)
+        modes = (
+            MODES_OF[name]
+            for name in reversed(names)
+            if name in MODES_OF and (rocks_count or name != ROCKS)
+        )
+        return next(modes, None)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -166,11 +174,12 @@ class WholeRun:
             known = (*known, FALLS_ON_ITS_BASE.format(self.free.landed_s))
         return (*known, self.free.sentence) if self.free.sentence else known
 
-    def state(self, error: float) -> BlockState | None:
+    def state(self, error: float, *, laws: bool) -> BlockState | None:
         """Return where the block is left at rest; None where it is not.
 
         Args:
             error: bound on its error.
+            laws: whether it keeps where other laws of impact leave the block.
         """
         pose, block = self.pose, self.site.block
         if self.outcome is not Outcome.STABLE:
@@ -188,6 +197,7 @@ class WholeRun:
             position=position,
             # in its first place it is exactly
             error=0.0 if position == 0.0 else error,
+            by_law=self.free.by_law if self.free is not None and laws else (),
         )
 
 
@@ -210,6 +220,7 @@ def whole_run(
     *,
     history: bool = False,
     start: BlockState | None = None,
+    stepwise: bool = True,
 ) -> WholeRun:
     """Follow a block to its end.
 
@@ -217,10 +228,15 @@ def whole_run(
         mechanism: the block as its model describes it.
         history: keep the motion in time.
         start: the state that the motion finds; None for the first place.
+        stepwise: whether a record that drives the block up its back plane is followed step by step
+            from its beginning. Campaigns stay with the mechanism: of 304 such runs of slumps under
+            scaled records 2 differ by more than 1 %, and all take 60 % longer.
     """
     run, release = None, None
-    # a start without a coordinate is one that no mechanism describes
-    if start is None or start.position is not None:
+    # a start without a coordinate is one that no mechanism describes, nor does it describe a block
+    # that the record drives up its back plane
+    in_mechanism = start is None or start.position is not None
+    if in_mechanism and not (stepwise and excited.min_q < mechanism.stepwise_below):
         at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
         run = follow(mechanism, excited, history=history, start=at)
         if not (mechanism.goes_on and run.outcome is Outcome.CONTACT_LOST):
@@ -228,9 +244,12 @@ def whole_run(
         assert run.ended_s is not None
         release = released(run.ended_s, run.phase.pose, run.x, run.rate)
     else:
-        pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
+        pose = mechanism.first.pose(0.0)
+        if start is not None:
+            pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
         release = Release(float(excited.time_s[0]), pose)
-    free = free_motion(site, excited, release, at_toe=mechanism.at_toe)
+    by_law = () if start is None or run is not None else start.by_law
+    free = free_motion(site, excited, release, at_toe=mechanism.at_toe, by_law=by_law)
     return WholeRun(mechanism, site, start, run, free)
 
 
@@ -278,7 +297,7 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
         stopped_s=whole.ended_s,
         mode_changes=whole.changes,
         final_mode=whole.final_mode,
-        state=whole.state(error),
+        state=whole.state(error, laws=shaking.laws),
     )
 
 

@@ -117,8 +117,34 @@ def lost_contacts(
             continue
         if answer.kind not in ("sliding", "slumping") or not answer.mode_changes:
             continue
+        # slides that stand on their base at rest are drawn by `tipping_slides`
+        if answer.kind == "sliding" and alpha1 <= beta:
+            continue
         if answer.displacement_m is not None:
             yield LostContact(block, beta, phi, back, motion, answer)
+
+
+def tipping_slides(seed: int, motions: Iterator[GroundMotion]) -> Iterator[LostContact]:
+    """Draw slides that stand on their base at rest, and yield those that pulses tip back.
+
+    Args:
+        motions: those that shake them, one block each.
+    """
+    random = np.random.default_rng(seed)
+    while True:
+        motion = next(motions)
+        beta, phi = random.uniform(5.0, 25.0), random.uniform(28.0, 40.0)
+        alpha1, alpha3 = random.uniform(-0.8 * phi, beta), random.uniform(50.0, 78.0)
+        block = Block.from_angles(alpha1, alpha3, float(np.exp(random.uniform(-1.2, 1.1))))
+        try:
+            answer = respond(motion, block=block, beta_deg=beta, phi_deg=phi)
+        except InputError:
+            continue
+        if answer.kind != "sliding" or not answer.mode_changes or answer.displacement_m is None:
+            continue
+        # a millimetre of slip is beyond the give of the springs
+        if (answer.peak_displacement_m or 0.0) > 1e-3:
+            yield LostContact(block, beta, phi, phi, motion, answer)
 
 
 def of_each_sort(seed: int, counts: dict[str, int]) -> list[LostContact]:

@@ -31,3 +31,18 @@ def sine_lobes(
     phase = np.linspace(0.0, np.pi, samples_per_lobe, endpoint=False)
     lobes = [amplitude * np.sin(phase) for amplitude in amplitudes_g]
     return GroundMotion(np.append(np.concatenate(lobes), 0.0), duration_s / samples_per_lobe)
+
+
+def half_sines(
+    pulses: tuple[tuple[float, float], ...], *, start_s: float = 0.1, rest_s: float = 1.0
+) -> GroundMotion:
+    """Half-sines of a peak [g] and a length [s], one after the other, sampled every 5 ms."""
+    dt_s = 0.005
+    until_s = start_s + sum(length_s for _, length_s in pulses) + rest_s
+    time_s = np.arange(round(until_s / dt_s) + 1) * dt_s
+    samples = np.zeros(time_s.size)
+    for peak_g, length_s in pulses:
+        inside = (time_s >= start_s - 1e-12) & (time_s <= start_s + length_s + 1e-12)
+        samples[inside] += peak_g * np.sin(np.pi * (time_s[inside] - start_s) / length_s)
+        start_s += length_s
+    return GroundMotion(samples, dt_s)

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import rbfrag
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.solver.respond import respond
@@ -181,16 +180,3 @@ def test_displacement_grows_with_weakness_and_never_shrinks_in_time(
     assert strong.history.displacement_m is not None
     assert np.all(np.diff(strong.history.displacement_m) >= -1e-12)
     assert (strong.started_s is None) == (slid(strong) == 0.0 and max(samples) <= ky)
-
-
-@pytest.mark.parametrize("beta_deg", [7.5, 20.0, 30.0])
-def test_a_block_whose_weight_passes_through_its_heel_does_not_lean(beta_deg: float) -> None:
-    block = rbfrag.Block.from_angles(beta_deg, 80.0, 1.0)
-    k = math.tan(math.radians(45.0 - beta_deg))
-    # slides down, and is driven back by less than what slides it up
-    samples = [*[0.0] * 5, *[1.5 * k] * 20, *[-0.5 * k] * 60, 0.0]
-    motion = GroundMotion(np.array(samples), 0.01)
-    answer = respond(motion, block=block, beta_deg=beta_deg, phi_deg=45.0)
-    by_number = respond(motion, ky=k, beta_deg=beta_deg)
-    assert answer.mode_changes == ()
-    assert slid(answer) == pytest.approx(slid(by_number), rel=1e-12)

@@ -21,11 +21,10 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.models import model_of_kind
-from rbfrag.solver.models.rocking import SENSITIVITY, changes_with_the_motion, free_block
+from rbfrag.solver.models.rocking import SENSITIVITY, free_block, repeated
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
 from rbfrag.solver.rocking_run import MOST_IMPACTS, corner_force, rocking_history, simulate
-from rbfrag.solver.toppling_run import OUTCOMES
 from tests.synthetic import shaking
 
 PALM, COYOTE = "N_Palm_Springs_1986_WWT-180", "Coyote_Lake_1979_G02-050"
@@ -279,9 +278,8 @@ def test_a_batch_gives_each_block_what_its_own_run_gives() -> None:
     )
     for i, block in enumerate(blocks):
         alone = simulate(excited, block)
-        outcome = OUTCOMES[alone.outcome]
         assert runs.outcome[i] == alone.outcome
-        assert runs.sensitive[i] == changes_with_the_motion(excited, block, outcome)
+        assert runs.sensitive[i] == repeated(excited, block, alone)[0]
         if alone.outcome == 0:
             ratios = (alone.forward.x, alone.backward.x)
             assert runs.theta_n[i] == max(ratios) / block.toe.theta_c

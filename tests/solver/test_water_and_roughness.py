@@ -189,45 +189,33 @@ def test_many_answer_as_one() -> None:
 SHAPE = {"s1_m": 2.0, "s2_m": 3.0, "gamma_deg": 60.0, "beta_deg": 20.0, "phi_deg": 38.0}
 
 
-def test_no_probability_follows_unless_a_residual_angle_is_stated() -> None:
-    joint = {"water_m": 1.1372, "density_kg_m3": RHO}
+def test_roughness_has_no_probability_unless_a_residual_angle_is_given() -> None:
     asked = {**SHAPE, "displacement_m": 0.05, "pgv_m_s": 0.6}
-    with pytest.raises(InputError, match="uplift ends with the first slip"):
-        rbfrag.predict(**asked, **joint)
     rough = {"jrc": 8.0, "jcs_mpa": 60.0, "density_kg_m3": RHO}
     with pytest.raises(InputError, match="roughness ends with the first slip"):
         rbfrag.predict(**asked, **rough)
-    left = rbfrag.predict(**asked, **joint, phi_residual_deg=30.0)
-    dry = rbfrag.predict(**{**asked, "phi_deg": 30.0})
-    assert left.probability == dry.probability
+    left = rbfrag.predict(**asked, **rough, phi_residual_deg=30.0)
+    smooth = rbfrag.predict(**{**asked, "phi_deg": 30.0})
+    assert left.probability == smooth.probability
     assert any("phi_residual_deg" in text for text in left.warnings)
     with pytest.raises(InputError, match="does not stand"):
-        rbfrag.predict(**asked, **joint, phi_residual_deg=15.0)
-    many = rbfrag.predict(
-        **{name: np.full(3, value) for name, value in asked.items()},
-        water_m=np.array([0.0, 1.1372, 1.1372]), density_kg_m3=RHO,
-        phi_residual_deg=np.array([np.nan, np.nan, 30.0]),
-    )  # fmt: skip
-    assert many.probability[0] == pytest.approx(rbfrag.predict(**asked).probability, rel=1e-12)
-    assert "uplift ends" in many.reason[1]
-    assert many.probability[2] == pytest.approx(left.probability, rel=1e-12)
+        rbfrag.predict(**asked, **rough, phi_residual_deg=15.0)
 
 
-def test_nothing_is_followed_in_time_before_the_first_slip() -> None:
+def test_roughness_is_not_followed_in_time_before_the_first_slip() -> None:
     block = Block.from_fractures(2.0, 3.0, 60.0)
     on = {"block": block, "beta_deg": 20.0, "phi_deg": 38.0, "density_kg_m3": RHO}
     motion = rbfrag.GroundMotion(np.array([0.0, 0.6, 0.0]), 0.2)
-    with pytest.raises(InputError, match=r"water_m .*time history of sliding.*0\.2182 g, slide"):
-        rbfrag.respond(motion, **on, water_m=1.1372)
     with pytest.raises(InputError, match=r"jrc does not go .* history of sliding"):
         rbfrag.respond(motion, **on, jrc=8.0, jcs_mpa=60.0)
-    left = rbfrag.respond(motion, **on, water_m=1.1372, phi_residual_deg=30.0)
-    dry = rbfrag.respond(motion, **{**on, "phi_deg": 30.0})
-    assert left.displacement_m == dry.displacement_m
-    assert dry.displacement_m is not None
+    rough = {"jrc": 8.0, "jcs_mpa": 60.0}
+    left = rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=30.0)
+    smooth = rbfrag.respond(motion, **{**on, "phi_deg": 30.0}, water_m=1.1372)
+    assert left.displacement_m == smooth.displacement_m
+    assert smooth.displacement_m is not None
     assert any("after its first slip" in text for text in left.warnings)
     with pytest.raises(InputError, match="does not stand on phi_residual_deg"):
-        rbfrag.respond(motion, **on, water_m=1.1372, phi_residual_deg=15.0)
+        rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=15.0)
     with pytest.raises(InputError, match="water_m does not go with p2 and kr"):
         rbfrag.respond(motion, p2=3.0, kr=0.2, water_m=1.0)
     # a topple turns about its toe whatever the roughness of its base

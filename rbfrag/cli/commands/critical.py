@@ -192,7 +192,7 @@ def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> 
 def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the keywords of a search that say which block, and what is to be said of it."""
     from rbfrag.question.blocks import shape_of, without_kv
-    from rbfrag.solver.kinds import facts_of, kind_of_mode
+    from rbfrag.solver.kinds import PLANES, facts_of, kind_of_mode
     from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
 
     with given.named():
@@ -216,7 +216,7 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
                 raise InputError(
                     f"{name} does not go with a search in time: leave it out", fields=(name,)
                 )
-    read = {name: value for name, value in planes.items() if name not in (*JOINT, "density_kg_m3")}
+    read = {name: value for name, value in planes.items() if name in PLANES or name not in JOINT}
     return {"block": shape.block, **read}, after
 
 

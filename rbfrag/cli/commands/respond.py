@@ -43,7 +43,8 @@ _PART = (
 
 SHORT = (
     "kind", "mode", "final_mode", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
-    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive", "toe_needs_deg", "toe_slips_g",
+    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive", "peak_spread", "toe_needs_deg",
+    "toe_slips_g",
 )  # fmt: skip
 """Values that are shown without --verbose."""
 

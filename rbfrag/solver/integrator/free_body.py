@@ -71,6 +71,9 @@ class Frame(NamedTuple):
         impact_friction: part of Coulomb's limit that an impact mobilises: 1 where corners give as
             little along their plane as across it; 0 where they give so much more along it that an
             impact is over before they grip.
+        along: push of water down the base over the weight; it turns with the block.
+        off: push of water off the base.
+        moment_m: its moment about the centroid, counter-clockwise [m].
     """
 
     inertia_m2: float
@@ -80,6 +83,9 @@ class Frame(NamedTuple):
     forward_rad: float
     restitution: float
     impact_friction: float
+    along: float = 0.0
+    off: float = 0.0
+    moment_m: float = 0.0
 
 
 class Motion(NamedTuple):
@@ -136,11 +142,13 @@ def one_step(
             it on them.
     """
     g = STANDARD_GRAVITY_M_S2
-    # the velocity without contacts, under the resultant of weight and inertia
-    vx = at.vx + h * g * (w * frame.sine + a * frame.cosine)
-    vy = at.vy + h * g * (a * frame.sine - w * frame.cosine)
-    spin = at.spin
     c, s = math.cos(at.turned), math.sin(at.turned)
+    # the velocity without contacts, under the resultant of weight, water and inertia
+    push_x = frame.along * c - frame.off * s
+    push_y = frame.along * s + frame.off * c
+    vx = at.vx + h * g * (w * (frame.sine + push_x) + a * frame.cosine)
+    vy = at.vy + h * g * (a * frame.sine - w * (frame.cosine - push_y))
+    spin = at.spin + h * g * w * frame.moment_m / frame.inertia_m2
     active = 0
     for i in range(corners.arm_x.size):
         rx = corners.arm_x[i] * c - corners.arm_y[i] * s

@@ -43,7 +43,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             "a block that no overhanging plane confines topples freely: the model of toppling "
             "describes it"
         )
-    rocking = rocking_equation(block, site.beta_rad, site.phi_rad)
+    rocking = rocking_equation(block, site.beta_rad, site.phi_rad, site.push)
     # where the base edge is normal to the back plane, and where the front face lies on the base
     square, flat = free_from(block), block.on_front_face_rad
     slip = toe_slip(block)
@@ -68,7 +68,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         stays = constant(slip(square))
         return Phase(
             name="topples freely about its toe",
-            forward=rocking_equation(block, site.beta_rad),
+            forward=rocking_equation(block, site.beta_rad, push=site.push),
             pose=pose_with(stays),
             after=after_free,
             # no contact slips: no friction holds the block at a standstill
@@ -150,6 +150,7 @@ def equation(site: BlockOnPlanes) -> Equation:
         clockwise=True,
         inertia_m2=block.inertia_m2,
         beta_rad=site.beta_rad,
+        push=site.push,
     )
 
 

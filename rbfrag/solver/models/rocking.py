@@ -50,6 +50,9 @@ from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
 SENSITIVITY = 1e-6
 """Change of the motion whose effect on the outcome makes it a sensitive one."""
 
+NOT_REPEATED = 0.01
+"""Relative change of the peak under that change of the motion from which on it is said."""
+
 CHAOTIC = 1e-3
 """Error over the critical angle from which on the size of a peak means nothing."""
 
@@ -149,12 +152,14 @@ class Rocking(Kind):
         refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
         run = simulate(excited, block)
         outcome = OUTCOMES[run.outcome]
+        if math.isnan(error_of(run, outcome)):  # beyond any number: nothing is known of the end
+            outcome = Outcome.UNDETERMINED
         # of a block that has overturned a peak is only where the run was stopped
         known = outcome is Outcome.STABLE
         senses = peaks(run, outcome)
         ratios = (run.forward.x / block.toe.theta_c, run.backward.x / block.heel.theta_c)
         traced = rocking_history(excited, block, run.impacts)
-        sensitive = changes_with_the_motion(excited, block, outcome)
+        sensitive, spread = repeated(excited, block, run)
         return Response(
             kind=self.kind,
             outcome=outcome,
@@ -163,13 +168,13 @@ class Rocking(Kind):
             critical_angle_deg=math.degrees(block.toe.theta_c),
             started_s=finite_or_none(run.started_s),
             toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
-            error_estimate=error_of(run, outcome),
+            error_estimate=finite_or_none(error_of(run, outcome)),
             steps=run.steps,
             samples_moved=run.samples_moved,
             samples_total=int(np.count_nonzero(excited.interval_s)),
             warnings=(
                 *shaking.warnings,
-                *_warnings(block, site, run, outcome, sensitive, traced.motion),
+                *_warnings(block, site, run, outcome, sensitive, spread, traced.motion),
             ),
             history=_posed(block, traced) if shaking.history else None,
             critical_backward_deg=math.degrees(block.heel.theta_c),
@@ -177,6 +182,7 @@ class Rocking(Kind):
             peak_backward_rad=senses[1],
             impacts=run.impacts,
             sensitive=sensitive,
+            peak_spread=spread if known else None,
         )
 
     def runner(self, site: BlockOnPlanes) -> Runner:
@@ -220,12 +226,23 @@ def error_of(run: RockingRun, outcome: Outcome) -> float:
     return max(run.forward, run.backward).error
 
 
-def changes_with_the_motion(excited: Excitation, block: FreeBlock, outcome: Outcome) -> bool:
-    """Return whether a change of the motion by a millionth changes the outcome."""
-    return any(
-        OUTCOMES[simulate(excited.scaled(1.0 + change), block).outcome] is not outcome
-        for change in (SENSITIVITY, -SENSITIVITY)
-    )
+def repeated(excited: Excitation, block: FreeBlock, run: RockingRun) -> tuple[bool, float | None]:
+    """Repeat a run with the motion times 1 + 1e-6 and 1 - 1e-6.
+
+    Returns:
+        Whether the outcome changes, and the greatest relative change of the greater peak; None for
+        the latter where the outcome changes, or where the block does not move.
+    """
+    repeats = [
+        simulate(excited.scaled(1.0 + change), block) for change in (SENSITIVITY, -SENSITIVITY)
+    ]
+    if any(repeat.outcome != run.outcome for repeat in repeats):
+        return True, None
+    peak = max(run.forward.x, run.backward.x)
+    if not peak > 0.0:
+        return False, None
+    changes = [abs(max(repeat.forward.x, repeat.backward.x) - peak) for repeat in repeats]
+    return False, max(changes) / peak
 
 
 def _warnings(
@@ -234,6 +251,7 @@ def _warnings(
     run: RockingRun,
     outcome: Outcome,
     sensitive: bool,
+    spread: float | None,
     motion: ResponseHistory,
 ) -> list[str]:
     warnings = []
@@ -251,6 +269,11 @@ def _warnings(
     if sensitive:
         warnings.append(
             "the outcome is sensitive: it is another one for the motion times 1 + 1e-6 or 1 - 1e-6"
+        )
+    elif outcome is Outcome.STABLE and spread is not None and spread > NOT_REPEATED:
+        warnings.append(
+            f"the peak rotation cannot be repeated: it changes by {100.0 * spread:.2g} % where the "
+            "motion is scaled by 1 + 1e-6 or 1 - 1e-6"
         )
     elif error_of(run, outcome) > CHAOTIC * min(block.toe.theta_c, block.heel.theta_c):
         warnings.append(

@@ -8,13 +8,14 @@ inertial force that is normal to the base changes the friction. The dissertation
 horizontal one, whose factor is 1. Nothing depends on s, so that s is a cubic of time between
 samples and the answer exact.
 
-A block that leans on its back plane at rest (β < α1) slides away from it while its base stays in
-touch, because the resultant then lies at φ. Where it has stopped, and the resultant falls behind
-its heel,
+While the block slides, its base stays in touch whatever k_h, because the reaction then lies at
+φ >= α1. At a standstill away from its back plane a pulse into the slope tips it about its heel when
+the resultant falls behind that heel,
 
     k_h < (1 + k_v) tan(α1 - β),
 
-it tips back; from there it is followed step by step (docs/theory/slide-to-slump.md).
+whatever the sign of α1 - β; from there it is followed step by step (docs/theory/slide-to-slump.md).
+A block with α1 <= -φ slides up its base before it tips, and is not followed beyond Newmark's block.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from rbfrag.solver.integrator.one_freedom.harmonics import constant
 from rbfrag.solver.kind import (
     BlockOnPlanes,
 )
-from rbfrag.solver.mechanism import MechanismKind
+from rbfrag.solver.mechanism import MechanismKind, driven_up_below
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, FloatArray, Outcome, Polarity
 from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
@@ -72,8 +73,10 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
     forward = _equation(site, 1.0)
     start = site.centroid_m
-    # both settings are forms of Newmark's block, which knows no rotation
-    tips = _leans(site) and not (two_way or site.settings.get("horizontal", False))
+    # both settings are forms of Newmark's block, which has no rotation
+    newmark = two_way or bool(site.settings.get("horizontal", False))
+    may_tip = _may_tip(site)
+    tips = may_tip and not newmark
 
     def pose(s: float) -> Pose:
         return Pose(0.0, (start[0] + s, start[1]), s)
@@ -98,29 +101,72 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         ),
         rotates=False,
         critical=None,
-        warnings=() if tips else _warnings(site),
+        warnings=(KY_ALONE,) if site.block is None and not newmark else (),
+        least_q=_neglected_below(site, two_way=two_way, tips=tips, may_tip=may_tip),
+        if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
+        stepwise_below=-math.inf if newmark else driven_up_below(site),
         goes_on=site.block is not None and not site.settings.get("horizontal", False),
     )
 
 
-def _leans(site: BlockOnPlanes) -> bool:
-    """Whether the block leans on its back plane at rest."""
-    block = site.block
-    if block is None or not site.back_fracture:
+KY_ALONE = (
+    "a block given by its shape may be tipped by pulses into the slope and slide further "
+    "(unconservative)"
+)
+
+MAY_TIP = (
+    "pulses into the slope tip the block about its heel once it has slid; this option neglects "
+    "that: it may slide further, slump or overturn (unconservative)"
+)
+
+
+MAY_SLIDE_UP = (
+    "pulses into the slope slide the block up its base, which is neglected (conservative): "
+    "two_way follows it"
+)
+
+
+def _neglected_below(site: BlockOnPlanes, *, two_way: bool, tips: bool, may_tip: bool) -> float:
+    """Return the k_h/(1 + k_v) below which the block does what its model neglects."""
+    if site.block is None or tips:
+        return -math.inf
+    if may_tip:
+        return tip_threshold(site)
+    up = site.phi_rad + site.beta_rad
+    return -math.inf if two_way or up >= 0.5 * math.pi else -math.tan(up)
+
+
+def _may_tip(site: BlockOnPlanes) -> bool:
+    """Whether a pulse into the slope can tip the block about its heel.
+
+    With α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
+    centroid, and no pulse into the slope turns the block about it.
+    """
+    if site.block is None:
         return False
-    # in radians, which equal angles are equal in: degrees and back may round to another number
-    return site.beta_rad < math.radians(block.alpha1_deg)
+    alpha1 = math.radians(site.block.alpha1_deg)
+    return alpha1 > -site.phi_rad and alpha1 - site.beta_rad > -0.5 * math.pi
+
+
+def tip_threshold(site: BlockOnPlanes) -> float:
+    """Return the k_h/(1 + k_v) below which the block tips about its heel, dry tan(α1 - β)."""
+    tips = _tips_back(site)
+    return tips.threshold(0.0)
 
 
 def _tips_back(site: BlockOnPlanes) -> Equation:
     """Return the equation of the start of a rotation backward about the heel."""
     assert site.block is not None
-    # moments about the heel: k_h against (1 + k_v) tan(α1 - β); only its sign is read
+    # moments about the heel over m g r1: k_h cos(α1 - β) against (1 + k_v) times sin(α1 - β) and
+    # the backward moment of water; only their sign is read
     past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
+    along, off, moment_m = site.push
+    heel_x, heel_y = site.block.heel
+    moment_m += heel_y * along - heel_x * off
     return Equation(
         inertia=constant(1.0),
         driving=constant(math.cos(past_heel)),
-        resistance=constant(math.sin(past_heel)),
+        resistance=constant(math.sin(past_heel) + moment_m / site.block.r1_m),
     )
 
 
@@ -133,9 +179,12 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
     if horizontal:
         factor = 1.0
     driving = STANDARD_GRAVITY_M_S2 * factor
+    # the push of water over the weight lessens the yield, and leaves the factor as it is
+    along, off, _ = site.push
+    pushed = (along * math.cos(phi) + off * math.sin(phi)) / math.cos(phi - beta)
     contact = Condition(
         per_k_h=constant(-math.sin(beta)),
-        per_w=constant(math.cos(beta)),
+        per_w=constant(math.cos(beta) - off),
         per_rate2=constant(0.0),
         outcome=Outcome.CONTACT_LOST,
         sentence="the block loses contact with its base",
@@ -144,17 +193,8 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
         # nothing depends on s: the engine solves such an equation exactly
         inertia=constant(1.0),
         driving=constant(driving),
-        resistance=constant(driving * math.tan(phi - beta)),
+        resistance=constant(driving * (math.tan(phi - beta) - pushed)),
         conditions=() if horizontal else (contact,),
-    )
-
-
-def _warnings(site: BlockOnPlanes) -> tuple[str, ...]:
-    if not _leans(site):
-        return ()
-    return (
-        "at rest the block leans on its back plane (beta is below alpha1): once it has slid away, "
-        "it tips back on the plane and may slump later, which horizontal and two_way leave out",
     )
 
 

@@ -36,10 +36,9 @@ from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_conta
 from rbfrag.solver.kind import (
     BlockOnPlanes,
 )
+from rbfrag.solver.mechanism import driven_up_below
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.search.scale import (
-    ScaledKind,
-)
+from rbfrag.solver.search.scale import ScaledKind
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
@@ -86,17 +85,9 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         critical=forward.first_without_strength(flat),
         if_impact="the block was driven back to where it had been: it is taken to stop there "
         "without rebound, whatever its speed",
-        least_q=_driven_up_the_back_plane(site),
         goes_on=True,
-        if_below="the record drives the block up its back plane at times, which is not followed",
+        stepwise_below=driven_up_below(site),
     )
-
-
-def _driven_up_the_back_plane(site: BlockOnPlanes) -> float:
-    """Return the k_h/(1 + k_v) below which the whole block slides up the back plane."""
-    assert site.block is not None
-    steepness = math.radians(site.block.gamma_deg) + site.beta_rad + site.phi_back_rad
-    return -math.tan(steepness) if steepness < 0.5 * math.pi else -math.inf
 
 
 def equation(site: BlockOnPlanes, sense: float) -> Equation:
@@ -121,6 +112,7 @@ def equation(site: BlockOnPlanes, sense: float) -> Equation:
         clockwise=False,
         inertia_m2=block.inertia_m2,
         beta_rad=site.beta_rad,
+        push=site.push,
     )
 
 

@@ -3,7 +3,8 @@
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
 It has a kernel of its own, `rbfrag.solver.integrator.single_run`, which campaigns and searches
-call by the million.
+call by the million. A block given by its shape whose toe does not hold is followed step by step
+instead, with the slip of its toe.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.contacts import corner_at
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.integrator.one_freedom.equation import Ending, Mechanism, Phase, Pose
+from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
-from rbfrag.solver.results import CriticalResult, Response
+from rbfrag.solver.results import CriticalResult, Outcome, Response
 from rbfrag.solver.stability.toe import slides_at_toe, toe_needs_in_time, toe_slips_g
 from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, respond, simulate
+from rbfrag.solver.whole_run import response_of, whole_run
 
 
 class Toppling(Kind):
@@ -40,15 +45,26 @@ class Toppling(Kind):
         if site.block is None or answer.history is None:
             return answer
         beta_deg, phi_deg = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
-        slips_g = toe_slips_g(site.block, beta_deg, phi_deg)
-        need, at_s = toe_needs_in_time(site.block, beta_deg, answer.history) or (None, None)
-        warnings = answer.warnings
-        if need is not None and need > phi_deg:
-            warnings = (*warnings, slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g))
+        slips_g = toe_slips_g(site.block, beta_deg, phi_deg, site.push)
+        needs = toe_needs_in_time(site.block, beta_deg, answer.history, site.push)
+        need, at_s = needs or (None, None)
+        history = answer.history if shaking.history else None
+        # a block of another mode, asked about as a topple, is not followed: it would slide or slump
+        if need is not None and need > phi_deg and site.yield_g is not None:
+            answer = self._with_toe_slip(site, shaking)
+            slips = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
+            answer = replace(answer, warnings=(*answer.warnings, slips))
+            history = answer.history
         return replace(
-            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, warnings=warnings,
-            history=answer.history if shaking.history else None,
-        )  # fmt: skip
+            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, history=history
+        )
+
+    def _with_toe_slip(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+        """Return what the block does with the slip of its toe, step by step."""
+        # friction on the back face is neglected, as it is in k_r
+        smooth = replace(site, phi_back_rad=0.0)
+        whole = whole_run(_mechanism(site), smooth, shaking.excitation, history=shaking.history)
+        return replace(response_of(self.kind, whole, shaking), state=None)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
@@ -81,6 +97,31 @@ class Toppling(Kind):
         if "p2" not in options:
             raise InputError("p2 is missing: the critical block is searched for one p² [1/s²]")
         return critical(motion, kind=self.kind, **options)
+
+
+def _mechanism(site: BlockOnPlanes) -> Mechanism:
+    """Return a block that turns about its toe, to be followed step by step from the beginning."""
+    block = site.block
+    assert block is not None
+    toe = block.toe
+
+    def pose(theta: float) -> Pose:
+        # the arm from the toe to the centroid, turned clockwise about the toe, which stays
+        x, y = corner_at((block.base_m, 0.0), -theta, (-toe[0], -toe[1]))
+        return Pose(-theta, (x, y), 0.0)
+
+    return Mechanism(
+        first=Phase(
+            name="topples about its toe",
+            forward=rocking_equation(block, site.beta_rad, push=site.push),
+            pose=pose,
+            after=lambda _: Ending(Outcome.CONTACT_LOST),
+        ),
+        rotates=True,
+        critical=math.radians(block.alpha3_deg) - site.beta_rad,
+        stepwise_below=math.inf,
+        at_toe=True,
+    )
 
 
 def _size(site: BlockOnPlanes) -> float:

@@ -152,11 +152,13 @@ class Ends(NamedTuple):
 
     Args:
         lower: k_r/PGA of a block that topples; None where none was seen to.
-        upper: k_r above which nothing topples; None where that is the least one of interest.
+        upper: k_r above which nothing topples, where it is not certified as far as single blocks
+            show; None where that is the least one of interest.
         certified: whether nothing topples above the two.
         undecided: length of k_r that is neither proven safe nor to topple, above the two or where
             they are not certified above the lower one.
         runs: number of blocks, those apart that are kept with the answer.
+        gaps: where it is not certified, gaps between blocks that may hide one that topples.
     """
 
     lower: float | None
@@ -164,6 +166,7 @@ class Ends(NamedTuple):
     certified: bool
     undecided: float
     runs: int
+    gaps: int = 0
 
 
 def _ends(
@@ -187,9 +190,10 @@ def _ends(
     seen = strongest_seen(excitation, p2, low, high, known)
     lower = None
     if seen.kr is not None:
-        lower = seen.kr / pga
+        lower, upper = seen.kr / pga, seen.upper
         blocks.outcome_at(lower)
-    return Ends(lower, upper, False, of_map.undecided_above(seen.kr or bottom), runs + seen.runs)
+    open_length = of_map.undecided_above(seen.kr or bottom)
+    return Ends(lower, upper, False, open_length, runs + seen.runs, seen.gaps)
 
 
 def _lower_end(
@@ -225,6 +229,16 @@ def _doubts(of_map: CertifiedMap, pga: float, ends: Ends, full_map: bool) -> Ite
             f"not certified: {_reason(of_map, pga)}; {ends.undecided / pga:.3g} of k_r/PGA above "
             "the answer is not proven safe"
         )
+        if ends.lower is not None:
+            yield (
+                "the upper end is that of a dense scan of single blocks; proven is only that "
+                f"nothing topples above {of_map.k_up / pga:.6g} PGA"
+            )
+        if ends.lower is not None and ends.gaps:
+            yield (
+                f"{ends.gaps} gaps between blocks below the upper end may hide a block that "
+                "topples: its rotation changes too steeply with k_r to tell"
+            )
     elif full_map and not of_map.complete:
         # only the map below the answer is open, which the proof does not rest on
         yield (

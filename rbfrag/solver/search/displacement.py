@@ -35,6 +35,12 @@ TOLERANCE = 1e-9
 """Width of the bracket of a critical strength, over PGA."""
 
 
+NOT_DETERMINED = (
+    "the accelerations are so small that a block starts and stops without end: no displacement is "
+    "determined"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class SlidingBlocks:
     """Blocks on a level plane under one excitation.
@@ -103,6 +109,8 @@ def critical_of(
         if distance == 0.0:
             # a block moves as soon as k_h/(1 + k_v) exceeds its strength: a closed form
             status, low, high = "found", top, top
+        elif math.isnan(blocks.displacement_m(limit)):
+            status, warnings = "outside_model", (*warnings, NOT_DETERMINED)
         elif blocks.displacement_m(limit) <= distance:
             status = "below_limit"
         else:

@@ -28,7 +28,9 @@ from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.joint import (
     LAB_M,
     NO_FRACTURE,
+    ROCK_KG_M3,
     OnJoint,
+    is_drained,
     refuse_half,
     roughened,
     roughness_at,
@@ -151,7 +153,8 @@ def stability_arrays(
         kv: vertical acceleration of the ground, up positive, above -1 [g].
         back_fracture: False for blocks that no plane supports or hinders from behind.
         cohesion_pa: cohesions of the bases, from 0 [Pa]; None for none.
-        density_kg_m3: densities of the rock, needed with cohesion, water or roughness [kg/m³].
+        density_kg_m3: densities of the rock [kg/m³]; None for 2,650 where cohesion, water or
+            roughness need it.
         nan: ``propagate`` answers NaN with its reason where the input cannot be used,
             ``raise`` refuses it.
         joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
@@ -159,6 +162,8 @@ def stability_arrays(
     Raises:
         InputError: shapes that do not go together, or unusable input that was to be refused.
     """
+    if (drainage := joint.pop("drainage", None)) is not None and "water_m" in joint:
+        joint["water_m"] = _undrained(joint["water_m"], drainage)
     if nan not in ("propagate", "raise"):
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
     given = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
@@ -168,9 +173,8 @@ def stability_arrays(
     on_base = {"cohesion_pa": cohesion_pa, **joint}
     strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
     if strength:
-        if density_kg_m3 is None:
-            raise InputError(f"{next(iter(strength))} needs density_kg_m3, the density of the rock")
-        given |= {**strength, "density_kg_m3": density_kg_m3}
+        density = ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3
+        given |= {**strength, "density_kg_m3": density}
     if joint.get("water_m") is not None and not back_fracture:
         raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
@@ -248,6 +252,15 @@ def water_held_m(
     with np.errstate(invalid="ignore", divide="ignore"):
         top_m = s1_m * np.sin(beta + gamma) / np.sin(gamma)
     return np.asarray(np.minimum(water_m, np.maximum(top_m, 0.0)))
+
+
+def _undrained(water_m: ArrayLike, drainage: ArrayLike) -> FloatArray:
+    """Return the water [m] that keeps acting while blocks move: none on drained blocks."""
+    words = np.asarray(drainage, dtype=str)
+    # an empty word, as of a cell that was not filled in, means undrained
+    drained = np.vectorize(lambda word: is_drained(word or None), otypes=[bool])(words)
+    height_m = np.asarray(water_m, dtype=np.float64)
+    return np.where(drained & (height_m > 0.0), 0.0, height_m)
 
 
 def _tangent(angle_deg: Any) -> Any:

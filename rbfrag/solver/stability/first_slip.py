@@ -13,19 +13,20 @@ if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
 
 # the fields of `joint.OnJoint`, which single numbers do not load
-JOINT = ("water_m", "jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg")
-"""What is stated of a joint beside bond and friction."""
+JOINT = ("water_m", "drainage", "jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg")
+"""Inputs of a joint besides bond and friction."""
 
-ENDED = frozenset({*JOINT, "cohesion_pa", "density_kg_m3", "phi_back_deg"})
+ENDED = frozenset(
+    {"jrc", "jcs_mpa", "joint_length_m", "phi_residual_deg", "cohesion_pa", "phi_back_deg"}
+)
 """Keywords of planes that the first slip ends, or that the residual friction takes the place of."""
 
-STATE_RESIDUAL = "state phi_residual_deg, the friction angle that is left, for the answer after it"
+STATE_RESIDUAL = "give phi_residual_deg, the friction angle that is left, for the answer after it"
 
 _ENDS = (
     " ends with the first slip (yield {k:.4g} g, {mode}), and no displacement or probability "
     f"follows from it: {STATE_RESIDUAL}"
 )
-UPLIFT = f"water_m does not go with a probability or a time history of {{kind}}: uplift{_ENDS}"
 ROUGH = f"jrc does not go with a probability or a time history of {{kind}}: roughness{_ENDS}"
 
 SLIPS_ON = (
@@ -34,7 +35,7 @@ SLIPS_ON = (
 )
 
 AFTER_SLIP = (
-    "the answer is that of the block after its first slip, dry and without bond or roughness, on "
+    "the answer is that of the block after its first slip, without bond or roughness, on "
     "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
     "and a motion below that does nothing"
 )
@@ -80,17 +81,16 @@ def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None
         kind: kind of the block; None for that of its mode.
 
     Raises:
-        InputError: water stands behind the block, or a base that it slips on is rough.
+        InputError: a base that it slips on is rough.
     """
-    if not (planes.get("water_m") or planes.get("jrc")):
+    if not planes.get("jrc"):
         return
     from rbfrag.solver.stability.single import stability
 
     judged = stability(block, **planes)
     backed = planes.get("back_fracture", True)
     facts = facts_of(kind) if kind else kind_of_mode(judged.mode, back_fracture=backed)
-    finding = {"k": judged.yield_acceleration, "mode": words_of_mode(judged.mode)}
-    for name, text in (("water_m", UPLIFT), ("jrc", ROUGH)):
-        if planes.get(name) and (name == "water_m" or slips_on_base(facts)):
-            text = text.format(kind=facts.kind, **finding)
-            raise InputError(text, fields=(name, "phi_residual_deg"))
+    if slips_on_base(facts):
+        finding = {"k": judged.yield_acceleration, "mode": words_of_mode(judged.mode)}
+        text = ROUGH.format(kind=facts.kind, **finding)
+        raise InputError(text, fields=("jrc", "phi_residual_deg"))

@@ -3,7 +3,10 @@
 Formulas for single numbers and for arrays; no numpy is loaded for a single number. Water presses
 on the wetted part of the back plane, V = γw z l/2 at l/3 from the heel with l = z/sin(β + γ), and
 lifts the base, U = γw z L/2 at L/3 from the heel: hydrostatic at the heel and drained at the toe.
-Both end with the first slip, which opens the fracture and shears the roughness off.
+Undrained, which is assumed unless the contrary is given, both keep acting while the block moves:
+they turn with it and scale with 1 + k_v. Drained they vanish as it starts to move, so that the
+block is a dry one: the other bound. Hydrodynamic pressure is neglected. Roughness ends with the
+first slip, which shears it off.
 
 References:
     Barton and Bandis (1982), 23rd US Symposium on Rock Mechanics, 739-760.
@@ -30,6 +33,7 @@ class OnJoint(TypedDict, Generic[V], total=False):
 
     Args:
         water_m: height of the water in the back fracture above the heel [m].
+        drainage: `UNDRAINED` (None means that) or `DRAINED`.
         jrc: joint roughness coefficient of the base, of samples of 10 cm; 0 or None: smooth.
         jcs_mpa: compressive strength of its walls, of such samples, needed with `jrc` [MPa].
         joint_length_m: length of the joint that shears as one [m]; None, or in arrays 0, for that
@@ -37,10 +41,32 @@ class OnJoint(TypedDict, Generic[V], total=False):
     """
 
     water_m: V
+    drainage: str | None
     jrc: V | None
     jcs_mpa: V | None
     joint_length_m: V | None
 
+
+UNDRAINED, DRAINED = DRAINAGES = ("undrained", "drained")
+"""What the water does while the block moves: its pressure keeps acting, or vanishes."""
+
+ROCK_KG_M3 = 2650.0
+"""Density of the rock where none is given [kg/m³]."""
+
+ASSUMED_DENSITY = f"the density is not given: {ROCK_KG_M3:,.0f} kg/m³ is assumed"
+
+STAYS_UNDRAINED = (
+    "water pressure keeps acting while the block moves (conservative); a joint under 1 mm without "
+    "inflow behaves almost as drained; hydrodynamic pressure is neglected"
+)
+IS_DRAINED = (
+    "drained: the water pressure is assumed to vanish as the block starts to move (unconservative)"
+)
+
+NO_EFFECT_OF_COHESION = (
+    "cohesion has no effect on k_r: the base opens in tension; the tensile strength of rock "
+    "bridges is neglected (conservative)"
+)
 
 WATER_N_M3 = 9810.0
 """Unit weight of water, γw [N/m³]."""
@@ -101,6 +127,19 @@ def water_at(
     at_x, at_y = tan_alpha1 - wetted * cosine / 3.0, -1.0 + wetted * sine / 3.0
     moment = at_x * normal - at_y * along + (tan_alpha1 + base / 3.0) * u
     return Water(along, normal + u, moment), holds
+
+
+def is_drained(drainage: object) -> bool:
+    """Return whether the water drains as the block starts to move.
+
+    Raises:
+        InputError: neither of `DRAINAGES`.
+    """
+    if drainage is not None and drainage not in DRAINAGES:
+        raise InputError(
+            f"drainage = {drainage!r}: it must be undrained or drained", fields=("drainage",)
+        )
+    return drainage == DRAINED
 
 
 class Roughness(NamedTuple, Generic[N]):
@@ -197,11 +236,6 @@ class JointStrength:
 
 
 OF_ROUGHNESS = ("jrc", "jcs_mpa")
-
-NEEDS_DENSITY = (
-    "{name} = {value:g} needs density_kg_m3, the density of the rock (about 2700 kg/m³): its "
-    "effect is that of a stress over the weight"
-)
 
 NO_FRACTURE = (
     "water_m does not go with a block without a back fracture: that is where the water stands"

@@ -236,6 +236,23 @@ class Water(Generic[N]):
     moment: N
 
 
+@dataclass(frozen=True)
+class DrainedYield:
+    """The drained bound of a yield.
+
+    Args:
+        yield_acceleration: of the governing mode of the drained block [g].
+    """
+
+    yield_acceleration: float
+
+
+Push = tuple[float, float, float]
+"""Push of water over the weight: down the base, off it, and the moment about the centroid,
+counter-clockwise [m]."""
+
+DRY: Push = (0.0, 0.0, 0.0)
+
 Arms = tuple[tuple[N, Any], tuple[N, Any], tuple[N, Any], tuple[N, Any]]
 """Contacts from the centroid, along the base and normal to it."""
 
@@ -319,7 +336,7 @@ class Planes(Generic[N]):
             differs = differs | (self.bond != 0.0)
         if self.water is not None:
             along = along + self.water.along - self.water.moment
-            differs = differs | (self.water.normal != 0.0)
+            differs = differs | (self.water.along != 0.0)
         # a bond may hold until the inertial force lifts the block off its base
         pressed = normal > 0.0
         limit = where(pressed, along / where(pressed, normal, 1.0), math.inf)
@@ -346,7 +363,8 @@ class Planes(Generic[N]):
             there = abs(across) > _SQUARE
             base = (along * u_y + carried * u_x) / self.functions.where(there, across, 1.0)
             carried = self.functions.where(there, base, carried)
-        return (carried <= 0.0) & (abs(k) < math.inf)
+        # a dry block among wet ones does not float, even if its bond lets the base lift first
+        return (carried <= 0.0) & (abs(k) < math.inf) & (self.water.along != 0.0)
 
     def slump(self, heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N) -> tuple[N, Any]:
         """Return k_s, and whether the back contact cannot hold the block, which is then unstable.

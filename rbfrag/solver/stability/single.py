@@ -22,13 +22,17 @@ from rbfrag.solver.quantity import (
 )
 from rbfrag.solver.stability.joint import (
     AFLOAT,
+    ASSUMED_DENSITY,
+    DRAINED,
     LAB_M,
-    NEEDS_DENSITY,
+    NO_EFFECT_OF_COHESION,
     NO_FRACTURE,
     NOT_OF_OUTLINES,
+    ROCK_KG_M3,
     SPILLS_OVER,
     JointStrength,
     OnJoint,
+    is_drained,
     refuse_half,
     roughened,
     roughness_at,
@@ -44,8 +48,10 @@ from rbfrag.solver.stability.margins import (
 from rbfrag.solver.stability.modes import (
     MODES,
     STATES,
+    DrainedYield,
     ModeName,
     Planes,
+    Push,
     StateName,
     state_code,
     words_of_mode,
@@ -99,8 +105,13 @@ class Stability(Tabular):
         cohesion: the effect of cohesion, or None if there is none.
         joint: the effect of roughness, or None if there is none.
         water_m: height of the water above the heel [m].
-        toe_slips_g: of a dry topple, the acceleration at which its toe gives way as it starts to
+        toe_slips_g: of a topple, the acceleration at which its toe gives way as it starts to
             turn [g]; None where it holds at any, and for other modes.
+        push: what water that keeps acting does to the block: forces down the base and off it over
+            the weight, and the moment about the centroid, counter-clockwise, over the weight [m];
+            None for a dry or drained block.
+        drained: yield acceleration of the drained block, the bound beside that of the undrained
+            one; None without water.
         warnings: sentences on what the answer takes for granted.
     """
 
@@ -123,6 +134,8 @@ class Stability(Tabular):
     joint: JointStrength | None = None
     water_m: float = 0.0
     toe_slips_g: float | None = None
+    push: Push | None = None
+    drained: DrainedYield | None = None
 
 
 def stability(
@@ -150,17 +163,30 @@ def stability(
         kv: vertical acceleration of the ground, up positive, above -1 [g].
         back_fracture: False for a block that no plane supports or hinders from behind.
         cohesion_pa: cohesion of the base [Pa]; the back plane has none.
-        density_kg_m3: density of the rock [kg/m³], needed with cohesion, water or roughness.
+        density_kg_m3: density of the rock [kg/m³]; None for 2,650 where cohesion, water or
+            roughness need it.
         joint: water and roughness, as :class:`rbfrag.solver.stability.joint.OnJoint` has them.
 
     Raises:
         InputError: a value outside its range; the message names the range; or water that lifts
             the block off its base.
     """
-    finding, planes, strength = judged(
-        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, kv=kv,
-        back_fracture=back_fracture, cohesion_pa=cohesion_pa, density_kg_m3=density_kg_m3, **joint,
-    )  # fmt: skip
+    question: dict[str, Any] = {
+        "beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg, "kv": kv,
+        "back_fracture": back_fracture, "cohesion_pa": cohesion_pa, "density_kg_m3": density_kg_m3,
+    }  # fmt: skip
+    finding, planes, strength = judged(block, **question, **joint)
+    water_m = float(joint.get("water_m") or 0.0)
+    drained = None
+    if water_m > 0.0:
+        dry: dict[str, Any] = {**joint, "drainage": DRAINED}
+        drained = DrainedYield(judged(block, **question, **dry)[0].k)
+    push = push_of(block, planes)
+    assumed: tuple[str, ...] = ()
+    if density_kg_m3 is None and (cohesion_pa or water_m or strength):
+        assumed = (ASSUMED_DENSITY,)
+    if planes.bond and finding.mode == "topple":
+        assumed = (*assumed, NO_EFFECT_OF_COHESION)
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
     own = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
@@ -184,12 +210,14 @@ def stability(
             partial(_friction_that_slides_at, beta_deg=beta_deg, planes=planes),
         ),
         cohesion=_cohesion(planes, bond) if bond else None,
-        warnings=warnings_about(block, finding),
+        warnings=(*warnings_about(block, finding), *assumed),
         joint=strength,
-        water_m=float(joint.get("water_m") or 0.0),
-        toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg)
-        if finding.mode == "topple" and planes.water is None
+        water_m=water_m,
+        toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg, push)
+        if finding.mode == "topple"
         else None,
+        push=push,
+        drained=drained,
     )
 
 
@@ -218,7 +246,9 @@ def judged(
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
     planes = Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR, bond or None)
     t1, t3 = block.tan_alpha1, block.tan_alpha3
-    if (water_m := not_negative(joint.get("water_m") or 0.0, "water_m", "m")) > 0.0:
+    water_m = not_negative(joint.get("water_m") or 0.0, "water_m", "m")
+    # the drained block is a dry one
+    if not is_drained(joint.get("drainage")) and water_m > 0.0:
         planes = _wet(block, planes, water_m, density_kg_m3, back_fracture)
     strength = None
     jrc, jcs_mpa, length_m = (joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m"))
@@ -240,19 +270,26 @@ def judged(
     return finding, planes, strength
 
 
-def _weighed(density_kg_m3: object, name: str, value: float) -> float:
-    """Return the density of the rock, or refuse what acts against its weight without it."""
-    if density_kg_m3 is None:
-        text = NEEDS_DENSITY.format(name=name, value=value)
-        raise InputError(text, fields=("density_kg_m3", name))
-    return positive(density_kg_m3, "density_kg_m3", "kg/m³")
+def push_of(block: Block, planes: Planes[float]) -> Push | None:
+    """Return the push of water on a block as :class:`Stability` has it; None for none."""
+    water = planes.water
+    if water is None:
+        return None
+    return water.along, water.normal, water.moment * block.half_s1_m
+
+
+def _density(density_kg_m3: object) -> float:
+    """Return the density of the rock [kg/m³], that of most rocks where none is given."""
+    return positive(
+        ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3, "density_kg_m3", "kg/m³"
+    )
 
 
 def _wet(
     block: Block, planes: Planes[float], water_m: float, density_kg_m3: object, backed: bool
 ) -> Planes[float]:
     """Return the planes with the push of water on a block."""
-    density = _weighed(density_kg_m3, "water_m", water_m)
+    density = _density(density_kg_m3)
     if not backed:
         raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
     if not block.is_parallelogram:
@@ -276,7 +313,7 @@ def _rough(
 ) -> tuple[Planes[float], JointStrength]:  # fmt: skip
     """Return the planes with a rough base, and its strength."""
     coefficient = not_negative(jrc, "jrc", "")
-    density = _weighed(density_kg_m3, "jrc", coefficient)
+    density = _density(density_kg_m3)
     length_m = block.base_m if joint_length_m is None else joint_length_m
     length_m = max(positive(length_m, "joint_length_m", "m"), LAB_M)
     weight_pa = density * STANDARD_GRAVITY_M_S2 * block.area_m2 / block.base_m
@@ -288,12 +325,7 @@ def _rough(
 def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
     """Return the strength of the base's bond over the weight, c L/(ρ g A)."""
     cohesion = not_negative(cohesion_pa, "cohesion_pa", "Pa")
-    if density_kg_m3 is None:
-        if cohesion > 0.0:
-            raise InputError(NEEDS_DENSITY.format(name="cohesion_pa", value=cohesion))
-        return 0.0
-    density = positive(density_kg_m3, "density_kg_m3", "kg/m³")
-    return bond_over_weight(cohesion, density, block.base_m, block.area_m2)
+    return bond_over_weight(cohesion, _density(density_kg_m3), block.base_m, block.area_m2)
 
 
 def _friction_that_slides_at(alpha_deg: float, beta_deg: float, planes: Planes[float]) -> float:
@@ -378,7 +410,7 @@ def rough_deg(block: Block) -> float:
 KEYS = (
     "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
     "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
-    "delta_deg", "margins", "cohesion", "joint", "water_m", "toe_slips_g",
+    "delta_deg", "margins", "cohesion", "joint", "water_m", "drained", "toe_slips_g",
     "warnings",
 )  # fmt: skip
 """What the JSON contract has of a stability and of its block."""

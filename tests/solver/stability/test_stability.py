@@ -121,9 +121,12 @@ def test_confined_topple_against_sliding(
     assume(found.mode == "confined_topple")
     corner = block.gamma_deg + phi + phi_back
     assume(abs(corner - 180.0) > 1e-6)
-    if corner < 180.0:
+    if corner < 180.0 and found.ky < math.inf:
         assert found.yield_acceleration < found.ky
         assert found.state != "locked"
+    elif corner < 180.0:
+        # no acceleration slides the block where phi - beta >= 90, nor need any topple it
+        assert found.yield_acceleration <= found.ky
     else:
         assert found.yield_acceleration > found.ky or found.state == "locked"
         assert found.state != "unstable" or found.ky < 0.0
@@ -337,7 +340,6 @@ def test_a_back_contact_below_the_centroid_cannot_hold_a_slump() -> None:
         ({"kv": -1.0}, "kv = -1"),
         ({"kv": math.inf}, "kv = inf"),
         ({"cohesion_pa": -1.0, "density_kg_m3": 2700.0}, "cohesion_pa = -1"),
-        ({"cohesion_pa": 1000.0}, "density_kg_m3"),
         ({"cohesion_pa": 1000.0, "density_kg_m3": 0.0}, "density_kg_m3 = 0"),
         ({"density_kg_m3": math.nan}, "density_kg_m3 = nan"),
     ],

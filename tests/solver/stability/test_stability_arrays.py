@@ -99,8 +99,9 @@ def test_no_cohesion_leaves_every_bit() -> None:
 
 def test_cohesion_that_cannot_be() -> None:
     blocks = BlockArray.from_angles(5.0, 40.0, 1.0)
-    with pytest.raises(InputError, match="density_kg_m3"):
-        stability_arrays(blocks, beta_deg=0.0, phi_deg=35.0, cohesion_pa=1e3)
+    planes = {"beta_deg": 0.0, "phi_deg": 35.0, "cohesion_pa": 1e3}
+    assumed = stability_arrays(blocks, **planes)
+    assert assumed.ky == stability_arrays(blocks, **planes, density_kg_m3=2650.0).ky
     found = stability_arrays(
         blocks, beta_deg=0.0, phi_deg=35.0, cohesion_pa=[-1.0, 1.0, math.inf, 1.0],
         density_kg_m3=[2700.0, 0.0, 2700.0, 2700.0],

@@ -12,6 +12,7 @@ import rbfrag
 from rbfrag import Block, stability
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.stability.toe import about_toe, toe_needs_deg, toe_needs_in_time, toe_slips_g
+from tests.physics.pulses import half_sines
 
 
 def test_printed_oracle() -> None:
@@ -41,7 +42,7 @@ def test_predict_says_so() -> None:
     asked = {"height_m": 4.0, "width_m": 1.0, "phi_deg": 16.0, "pgv_m_s": 0.6}
     said = rbfrag.predict(**asked, pga_g=0.5).warnings
     assert about_toe(Block.rectangle(4.0, 1.0), 0.0, 16.0, 0.5) in said
-    assert any("slide-rock" in text for text in said)
+    assert any("the toe slips above 0.40 g: P(toppling) changes little" in text for text in said)
 
 
 @pytest.mark.parametrize(
@@ -61,12 +62,37 @@ def test_printed_needs_of_a_record(
     assert answer.toe_slips_g == pytest.approx(0.4009, abs=6e-5)
     (said,) = (text for text in answer.warnings if "at the toe" in text)
     assert said.startswith(f"rotation without slip needs {needs_deg:.1f} deg at the toe at ")
-    assert said.endswith("phi = 16 gives way at 0.40 g: slide-rock, outside the model")
+    assert "phi = 16 gives way at 0.40 g: the slip of the toe is followed" in said
+    assert answer.peak_displacement_m is not None
     pga_g = rbfrag.read_motions(record)[0].pga_g
     assert toe_needs_deg(block, 0.0, pga_g) == pytest.approx(17.995, abs=6e-4)
     rough = rbfrag.respond(str(record), polarity=polarity, **{**on, "phi_deg": 20.0})
     assert rough.toe_needs_deg == answer.toe_needs_deg
     assert not any("at the toe" in text for text in rough.warnings)
+
+
+@pytest.mark.parametrize(
+    ("pulses", "peak_rad", "estimate_rad", "toe_m"),
+    [
+        (((0.8, 0.25), (-0.4, 0.3)), 0.0984, 0.00074, 0.0001),  # P29
+        (((0.9, 0.2), (-0.9, 0.2), (0.9, 0.2)), 0.0571, 0.00070, 0.0180),  # P30
+    ],
+)
+def test_a_toe_that_slips_against_a_body_on_springs(
+    pulses: tuple[tuple[float, float], ...], peak_rad: float, estimate_rad: float, toe_m: float
+) -> None:
+    """Reference rotations are those of springs, toe displacements those of the first code."""
+    answer = rbfrag.respond(
+        half_sines(pulses), block=Block.rectangle(3.0, 1.2), beta_deg=12.0, phi_deg=28.0,
+        phi_back_deg=0.0, history=True,
+    )  # fmt: skip
+    assert answer.error_estimate is not None
+    assert answer.error_estimate <= 1.5 * estimate_rad
+    assert answer.peak_theta_rad == pytest.approx(peak_rad, abs=answer.error_estimate)
+    assert answer.displacement_m == pytest.approx(toe_m, abs=1e-4)
+    assert answer.final_mode == "topple"
+    assert answer.history is not None
+    assert answer.history.theta_rad.max() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
 
 
 @pytest.mark.parametrize("beta", [-5.0, 0.0, 6.0])

@@ -17,6 +17,7 @@ import numpy as np
 
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, constant
 from rbfrag.solver.results import FloatArray, Outcome
+from rbfrag.solver.results import Pose as Pose
 
 _LOOKS = 256
 """Points at which the strength of a block is looked at, over the range of its motion."""
@@ -31,7 +32,7 @@ class Condition:
     Args:
         per_k_h: factor of the driving acceleration.
         per_w: factor of the effective gravity 1 + k_v.
-        per_rate2: factor of x'^2; it alone may hold a third harmonic.
+        per_rate2: factor of x'^2; like `per_w` it may hold a third harmonic.
         outcome: how the run ends where the condition fails.
         sentence: what has happened then.
     """
@@ -109,22 +110,6 @@ class Equation:
     def threshold(self, x: float) -> float:
         """Return the k_h that starts the motion at a position where 1 + k_v = 1."""
         return self.resistance(x) / self.driving(x)
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where the block is, in the base frame with the heel at rest as origin.
-
-    Args:
-        turned_rad: rotation, counter-clockwise [rad].
-        centroid_m: position of the centroid (x, y) [m].
-        displacement_m: how far the contact on the base has slipped along it, down the
-            slope positive [m].
-    """
-
-    turned_rad: float
-    centroid_m: tuple[float, float]
-    displacement_m: float
 
 
 @dataclass(frozen=True)
@@ -206,6 +191,8 @@ class Mechanism:
         if_impact: the same where the block has come back to its lowest position in motion.
         least_q: least k_h/(1 + k_v) that the model covers.
         if_below: what the reader should know where the record goes below it.
+        stepwise_below: k_h/(1 + k_v) below which the mechanism does not hold: a record that goes
+            below it is followed step by step from its beginning.
         goes_on: whether the block is followed step by step where a contact is lost.
         at_toe: whether its displacement is that of the toe.
     """
@@ -217,5 +204,6 @@ class Mechanism:
     if_impact: str = ""
     least_q: float = -np.inf
     if_below: str = ""
+    stepwise_below: float = -np.inf
     goes_on: bool = False
     at_toe: bool = False

@@ -177,8 +177,10 @@ def least_condition(
     for n in range((table.shape[0] - CONDITIONS) // 3):
         row = CONDITIONS + 3 * n
         force = with_double(table, row, c, s, c2, s2) * a
-        force += with_double(table, row + 1, c, s, c2, s2) * w
-        # the centripetal term alone has a third harmonic: a lever times C'' (two_contacts)
+        # third harmonics: a lever times the push of water, or times C'' (two_contacts)
+        per_w = with_double(table, row + 1, c, s, c2, s2)
+        per_w += table[row + 1, 5] * c3 + table[row + 1, 6] * s3
+        force += per_w * w
         third = with_double(table, row + 2, c, s, c2, s2)
         third += table[row + 2, 5] * c3 + table[row + 2, 6] * s3
         force += third * rate * rate

@@ -185,10 +185,12 @@ def follow(
             following = phase.after(Exit(_REASONS[run.stop], run.time_s, end.x, end.rate))
             ended = run.time_s
         else:
-            following = _ending(phase, run)
+            following = _ending(phase, run, record.last)
             ended = ended if run.stop == AT_REST else run.time_s
         if isinstance(following, Ending):
             following = _doubted(following, phase, run)
+            if math.isnan(peak.error) and following.outcome is not Outcome.JUMP:
+                following = Ending(Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice)
             break
         # a model that hands the block to and fro at one instant would never end
         if len(changes) >= PHASES_MAX:
@@ -272,10 +274,17 @@ def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:
     return Ending(Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice)
 
 
-def _ending(phase: Phase, run: PhaseRun) -> Ending:
-    """Return how a run ends that leaves no phase behind it."""
+def _ending(phase: Phase, run: PhaseRun, last: int) -> Ending:
+    """Return how a run ends that leaves no phase behind it.
+
+    Args:
+        last: last node of the record.
+    """
     if run.stop == AT_REST:
         return Ending(Outcome.STABLE)
+    if run.stop == ENDLESS and run.end.place.interval < last:
+        sentence = f"at {run.time_s:.3f} s the block starts and stops without end"
+        return Ending(Outcome.UNDETERMINED, sentence)
     if run.stop == ENDLESS:
         return Ending(Outcome.UNDETERMINED, "after the record the block neither stops nor falls")
     at = f"at {run.time_s:.3f} s: "

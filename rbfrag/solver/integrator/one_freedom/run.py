@@ -49,7 +49,10 @@ GOES_ON = -1
 """A phase that has not ended."""
 
 FREE_STEPS_MAX = 100_000
-"""Steps after the record before a motion that does not end is given up."""
+PASSES_PER_NODE = 100
+"""Passes of the loop of a phase before it is given up: for motion after the record that does not
+end, and per node of it: accelerations next to the smallest numbers start and stop a block at one
+place without end."""
 
 FREE_STEP_S = 0.1
 """Length of a step after the record where the equation is the same everywhere [s]."""
@@ -72,7 +75,8 @@ def run_phase(
     state = state_on_entry(rules, entry)
     peak = Peak(entry.x, entry.error_x)
     started_s = stopped_s = certain_s = math.nan
-    steps = moved = impacts = free_steps = filled = 0
+    steps = moved = impacts = filled = passes = 0
+    passes_max = FREE_STEPS_MAX + PASSES_PER_NODE * record.k_h.size
     counted = -1  # the interval that was last counted as moved in
     stop, condition = GOES_ON, 0
     # without friction nothing holds the block, even where its rate is zero
@@ -82,6 +86,10 @@ def run_phase(
     line = line_at(record, node, free_s, 1.0)
 
     while stop == GOES_ON:
+        passes += 1
+        if passes > passes_max:
+            stop = ENDLESS
+            break
         if not moving:
             # a block at rest does not change its thresholds: once is enough
             rest = depart(record, thresholds(rules, state), Place(node, tau), barred)
@@ -90,8 +98,8 @@ def run_phase(
             line = line_at(record, node, free_s, 1.0)
             stop, condition = stop_at_rest(record, rules, state, line, rest.place)
             now_s = line.start_s + tau * line.h
-            # a start that a contact does not survive is one: the block moves, the model ends
-            if math.isnan(started_s) and stop in (GOES_ON, VIOLATED):
+            # a start that a contact does not survive, or into another phase, is one too
+            if math.isnan(started_s) and stop in (GOES_ON, VIOLATED, REVERSE):
                 started_s = now_s
             if stop != GOES_ON:
                 break
@@ -120,10 +128,6 @@ def run_phase(
         own = 0.0 if rules.uniform else own_rate(table, state.cos, state.sin)
         # after the record any length of step will do: nothing drives the block any more
         line = line_at(record, node, free_s, FREE_STEP_S if rules.uniform else rules.turn_max / own)
-        free_steps += 1 if free else 0
-        if free_steps > FREE_STEPS_MAX:
-            stop = ENDLESS
-            break
         if line.h * (1.0 - tau) <= 0.0:  # a jump of the record, or a start at an interval's end
             moving = not rules.sticks or state.rate != 0.0
             if moving:

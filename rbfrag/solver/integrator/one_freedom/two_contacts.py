@@ -11,6 +11,11 @@ and F = A u_a + B u_b, the two forces drop out:
 
     D θ'' = g (F_y G_x - F_x G_y) - (F_y C''_x - F_x C''_y) θ'²
     D     = F_y C'_x - F_x C'_y - (I_C/m) u_a x u_b
+
+Water pushes with the force m g (1 + k_v) e, which turns with the block, and with the moment
+m g (1 + k_v) mu about the centroid. Both add to D θ''
+
+    g (1 + k_v) (F_y e_x - F_x e_y - s mu u_a x u_b).
 """
 
 from __future__ import annotations
@@ -20,8 +25,9 @@ from dataclasses import dataclass
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.integrator.one_freedom.equation import Condition, Equation
-from rbfrag.solver.integrator.one_freedom.harmonics import Vector, constant_vector
+from rbfrag.solver.integrator.one_freedom.harmonics import Vector, constant_vector, turning
 from rbfrag.solver.results import Outcome
+from rbfrag.solver.stability.modes import DRY, Push
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +53,7 @@ def two_contact_equation(
     clockwise: bool,
     inertia_m2: float,
     beta_rad: float,
+    push: Push = DRY,
 ) -> Equation:
     """Return the equation of motion of a block on two contacts, with their conditions.
 
@@ -57,6 +64,7 @@ def two_contact_equation(
         clockwise: whether the rotation is counted clockwise.
         inertia_m2: moment of inertia about the centroid per mass [m²].
         beta_rad: dip of the base [rad].
+        push: of water over the weight: forces down the base and off it, and the moment [m].
     """
     g = STANDARD_GRAVITY_M_S2
     sense = -1.0 if clockwise else 1.0
@@ -70,23 +78,30 @@ def two_contact_equation(
     bend = velocity.derivative()
     # of the resultant G = per_k_h k_h + per_w (1 + k_v)
     per_k_h = constant_vector((math.cos(beta_rad), math.sin(beta_rad)))
+    # the push of water turns with the block
+    along, off, moment_m = push
     per_w = constant_vector((math.sin(beta_rad), -math.cos(beta_rad)))
+    per_w += turning((along, off), -1 if clockwise else 1)
+    twist = sense * g * moment_m
     # a contact force times D is one of these across the known part of the acceleration
     on_base = u_b * inertia_m2 + velocity * a
     on_back = velocity * b - u_a * inertia_m2
     return Equation(
         inertia=velocity.cross(force) - u_a.cross(u_b) * inertia_m2,
         driving=per_k_h.cross(force) * g,
-        resistance=per_w.cross(force) * -g,
+        resistance=per_w.cross(force) * -g + u_a.cross(u_b) * twist,
         braking=bend.cross(force),
         conditions=tuple(
             Condition(
                 per_k_h=lever.cross(per_k_h) * -g,
-                per_w=lever.cross(per_w) * -g,
+                per_w=lever.cross(per_w) * -g - twisted * twist,
                 per_rate2=lever.cross(bend),
                 outcome=Outcome.CONTACT_LOST,
                 sentence=contact.lost,
             )
-            for contact, lever in ((base, on_base), (back, on_back))
+            for contact, lever, twisted in (
+                (base, on_base, velocity.cross(u_b)),
+                (back, on_back, u_a.cross(velocity)),
+            )
         ),
     )
