@@ -64,10 +64,10 @@ def test_a_curve_is_given_by_its_file_its_path_or_itself(tmp_path) -> None:
         assert rbfrag.hazard(given, 3.0, 0.1, **settings).annual_rate == (
             rbfrag.hazard(curve, 3.0, 0.1, **settings).annual_rate
         )
-        standing = rbfrag.survival(given, 3.0, 0.1, kind="rocking", age_years=1e4, **settings)
+        standing = rbfrag.survival(given, 3.0, 0.1, kind="toppling", age_years=1e4, **settings)
         assert standing.annual_rate_any == (
             rbfrag.survival(
-                curve, 3.0, 0.1, kind="rocking", age_years=1e4, **settings
+                curve, 3.0, 0.1, kind="toppling", age_years=1e4, **settings
             ).annual_rate_any
         )
     halves = rbfrag.hazard([file, file], 3.0, 0.1, weights="0.5,0.5", **settings)

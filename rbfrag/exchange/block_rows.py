@@ -101,7 +101,7 @@ class BlockRows:
     def checked(self) -> BlockRows:
         """Return the table itself, or refuse one without a block, or of blocks without weight."""
         if not self.reasons.size:
-            raise InputError(no_block(self.source, self.remarks))
+            raise InputError(NO_BLOCK.format(self.source))
         if self.refused_count == self.reasons.size:
             self._refuse("")
         weight = self.blocks.get("weight")
@@ -161,11 +161,7 @@ class BlockRows:
         refuse(self.source, self.places, reasons, self.reasons.size, why)
 
 
-def no_block(source: object, warnings: Sequence[str]) -> str:
-    """Return that a table has no block, perhaps but the example of the template."""
-    example = next((f": {text}" for text in warnings if "template" in text), "")
-    return f"{source}: there is no block in the file{example}"
-
+NO_BLOCK = "{}: there is no block in the file"
 
 Blocks = str | os.PathLike[str] | Mapping[str, Any] | BlockRows
 """A table of blocks: its file, its columns by name, such as a pandas table, or as it was read."""

@@ -89,13 +89,17 @@ class BlockTable:
 
     @property
     def parts(self) -> Parts:
-        """Its rows, some thousand at a time, without the example of the template."""
+        """Its rows, some thousand at a time; the template's example is skipped beside others."""
         column = self.stated.columns.get("block_id")
         for part in self.file.parts(self.numeric):
             if column is not None:
                 names = cells_of(part.cells[column.header])
-                part = part.without([i for i, n in enumerate(names) if str(n) == EXAMPLE_NAME])
-                if len(part.lines) < len(names):
+                examples = [i for i, name in enumerate(names) if str(name) == EXAMPLE_NAME]
+                if examples and len(examples) == len(names):
+                    text = f"the only row is {EXAMPLE_NAME!r} of the template"
+                    self.file.remarks.append(Diagnostic(text, "example_only"))
+                elif examples:
+                    part = part.without(examples)
                     text = f"the row {EXAMPLE_NAME!r} of the template is skipped"
                     self.file.remarks.append(Diagnostic(text, "example_skipped"))
             yield part

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE, no_block
+from rbfrag.exchange.block_rows import NO_BLOCK, PLACE
 from rbfrag.exchange.block_table import SHAKING_TEXTS, TEXTS, BlockTable, opened_table
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import table_path, table_writer, write_csv_notes
@@ -150,7 +150,7 @@ def predict_table(
             counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
         total, answered, inside = counts.tolist()
         if not total:
-            raise InputError(no_block(origin, table.file.remarks))
+            raise InputError(NO_BLOCK.format(origin))
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])

@@ -260,7 +260,7 @@ class PlaneFields(TypedDict, Generic[V], total=False):
     phi_deg: Annotated[
         V,
         _friction(
-            "Friction angle of the base; only a rectangle is taken to topple without",
+            "Friction angle of the base; only a rectangle is assumed to topple without",
             "phi", "φ", "friction", "friction_angle",
         ),
     ]  # fmt: skip

@@ -64,7 +64,7 @@ def respond(
         block: shape and size.
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg]; None where `kind` is ``rocking`` and the base
-            is taken not to slip.
+            is assumed not to slip.
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
         back_fracture: False for a block without a plane behind it: one that topples rocks about
             both corners.

@@ -19,7 +19,7 @@ from rbfrag.solver.stability.modes import DrainedYield, ModeName
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-NUMERICS_VERSION = "7"
+NUMERICS_VERSION = "6"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
 
 Status = Literal["found", "below_limit", "no_motion", "outside_model"]

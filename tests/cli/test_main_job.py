@@ -21,7 +21,7 @@ RESPOND_KEYS = {
     "toppled_s", "error_estimate", "steps", "samples_moved", "samples_total", "warnings",
     "final_theta_rad", "displacement_m", "peak_displacement_m", "centroid_displacement_m",
     "stopped_s", "mode_changes", "how", "mode", "final_mode", "toe_needs_deg", "toe_needs_s",
-    "toe_slips_g",
+    "toe_slips_g", "drained",
 }  # fmt: skip
 CRITICAL_KEYS = {
     "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "certified", "k_up_over_pga",

@@ -116,9 +116,8 @@ def add_row(path: Path) -> None:
 def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> None:
     name = f"blocks.{suffix}"
     assert f"predict --blocks {name}" in shell("block", "--template", name).stdout
-    assert "the row 'example' of the template is skipped" in refuses(
-        "predict", "--blocks", name, "--pgv", "0.6"
-    )
+    untouched = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
+    assert untouched["warnings"] == ["the only row is 'example' of the template"]
     add_row(Path(name))
     found = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
     (row,) = found["blocks"]

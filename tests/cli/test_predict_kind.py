@@ -24,9 +24,11 @@ def block(tmp_path: Path) -> Path:
 
 
 def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
-    asked = ("predict", "--kind", "sliding", "--displacement", "0.05", *MOTION)
+    asked = ("predict", "--kind", "sliding", "--displacement", "0.05", "--component", "single",
+             *MOTION)  # fmt: skip
     told = shell.json(*asked, "--ky", "0.1", "--beta", "10")
-    answer = predict(ky=0.1, displacement_m=0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=10.0)
+    stated = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5, "component": "single"}
+    answer = predict(ky=0.1, beta_deg=10.0, **stated)
     answers = told.pop("answers")
     assert told == answer.as_dict()
     assert [each["model"] for each in answers] == ["sliding-pgv_pga", "sliding-pgv"]
@@ -38,7 +40,7 @@ def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     assert "reference" in told["data"]
     block.write_text(SLIDE)
     from_file = shell.json(*asked, "--block", block)
-    by_hand = predict(ky=0.36397023, displacement_m=0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=20.0)
+    by_hand = predict(ky=0.36397023, beta_deg=20.0, **stated)
     assert from_file["probability"] == pytest.approx(by_hand.probability, rel=1e-5)
     assert "median_displacement_m" in shell(*asked, "--ky", "0.1").stdout
 
@@ -145,15 +147,17 @@ def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
 
 
 def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:
-    told = shell("predict", "--height", "240", "--width", "50", "--pgv", "0.6").stderr
-    assert "measures some 2.5e+02 m: lengths are in m" in told
-    assert "lengths are in m" not in shell("predict", "--height", "2.4", "--width", "0.5",
-                                           "--pgv", "0.6").stderr  # fmt: skip
+    told = shell("predict", "--height", "240", "--width", "50", "--pgv", "0.6").stdout
+    assert told.startswith("Check the unit: height 240 m (in cm?)")
+    assert "Check the unit" not in shell("predict", "--height", "2.4", "--width", "0.5",
+                                           "--pgv", "0.6").stdout  # fmt: skip
 
 
-def test_a_block_that_fails_at_rest_is_said_to(refuses: Refuses) -> None:
+def test_a_block_that_fails_at_rest_is_said_to(shell: Shell, refuses: Refuses) -> None:
     steep = ("--height", "2", "--width", "0.5", "--dip", "40", "--phi", "35", "--pgv", "0.3")
-    assert "it fails without an earthquake" in refuses("predict", *steep)
+    told = shell.json("predict", *steep)
+    assert told["probability"] == told["ci_low"] == told["ci_high"] == 1.0
+    assert "it fails without an earthquake" in told["warnings"][0]
     assert "rocking is free-standing" in refuses("predict", *steep, "--kind", "free")
 
 

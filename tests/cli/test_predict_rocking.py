@@ -26,8 +26,12 @@ def database(shell: Shell) -> None:
 
 
 def test_numbers_are_answered_as_from_python(shell: Shell) -> None:
-    told = shell.json(*ASKED, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION)
-    own = predict(7.0, 0.2, kind="rocking", restitution=0.9, pgv_m_s=0.6, pga_g=0.5, db="own.db")
+    told = shell.json(*ASKED, "--p2", "7", "--kr", "0.2", "--restitution", "0.9", *MOTION,
+                      "--component", "single")  # fmt: skip
+    own = predict(
+        7.0, 0.2, kind="rocking", restitution=0.9, pgv_m_s=0.6, pga_g=0.5, db="own.db",
+        component="single",
+    )  # fmt: skip
     assert told.pop("answers")[0]["probability"] == own.probability
     assert told == own.as_dict()
     assert (told["kind"], told["failure"]) == ("rocking", "overturning")
@@ -41,7 +45,7 @@ def test_a_rectangle_is_its_numbers(shell: Shell) -> None:
         told = shell.json(*asked, *MOTION)
         assert told["kind"] == "rocking"
         assert told["probability"] == pytest.approx(numbers["probability"], rel=1e-9)
-        assert "taken not to slip" in told["warnings"][0]
+        assert any("assumed not to slip" in text for text in told["warnings"])
     factor = shell.json(*ASKED, *shape, "--restitution", "0.8", *MOTION)
     assert factor["probability"] < numbers["probability"]
 

@@ -20,7 +20,8 @@ from tests.cli.conftest import Shell
 
 
 def words(p: float, low: float, high: float, **more: Any) -> tuple[str, ...]:
-    document = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high, "event_low": None}
+    document = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high}
+    document |= {"event_low": None, "warnings": []}
     return prediction_in_words({**document, "mode": "topple", **more})
 
 

@@ -16,11 +16,11 @@ from tests.cli.conftest import Shell
 CURVE = "pgv_m_s,annual_rate\n0.05,0.03\n0.1,0.012\n0.2,0.004\n0.5,0.0008\n1,0.00017\n2,0.00002\n"
 BLOCKS = """\
 block_id,base,back,face,s1_m,s2_m,height_m,width_m,phi_deg,lon,lat,x,y,z,crs,strike_length_m,\
-density_kg_m3
-A,4/150,78/095,80/090,2,0.4,,,40,8.5,46.5,,,,,3,2650
-B,,,,,,2,0.5,40,8.5,46.5,2700000,1200000,812.5,EPSG:2056,,2650
-wedge,35/140,78/095,80/090,2,0.4,,,40,8.5,46.5,,,,,3,2650
-C,,,,,,2,0.4,40,8.6,46.5,,,,,1.5,
+density_kg_m3,dip_deg
+A,4/150,78/095,80/090,2,0.4,,,40,8.5,46.5,,,,,3,2650,
+B,,,,,,2,0.5,40,8.5,46.5,2700000,1200000,812.5,EPSG:2056,,2650,0
+wedge,35/140,78/095,80/090,2,0.4,,,40,8.5,46.5,,,,,3,2650,
+C,,,,,,2,0.4,40,8.6,46.5,,,,,1.5,,0
 """
 COLUMNS = [
     "release_id",
@@ -97,7 +97,7 @@ def test_python_writes_the_same(shell: Shell) -> None:
     with pytest.raises(InputError, match="2 rates and the table 1 blocks"):
         write_release_rates(answer, {"height_m": [2.0], "width_m": [0.5]}, "python.csv")
     columns = {"height_m": [2.0, 2.0], "width_m": [0.5, 0.4]}
-    with pytest.raises(InputError, match="x and y need crs"):
+    with pytest.raises(InputError, match="x and y need a coordinate reference system"):
         write_release_rates(answer, {**columns, "x": [1.0, 2.0], "y": [1.0, 2.0]}, "python.csv")
     with pytest.raises(InputError, match="strike_length_m = -1"):
         write_release_rates(answer, {**columns, "strike_length_m": [1.0, -1.0]}, "python.csv")

@@ -130,7 +130,7 @@ def test_a_free_standing_rectangle_needs_no_friction(
 ) -> None:
     sides = ("--height", "1.2", "--width", "0.3")
     free = shell("respond", record, *sides, "--no-back", "--json")
-    assert "taken not to slip" in free.stdout
+    assert "assumed not to slip" in free.stdout
     asked = shell.json("respond", record, *sides, "--kind", "rocking")
     assert asked["kind"] == "rocking"
     less = shell.json("respond", record, *sides, "--kind", "rocking", "--restitution", "0.6")

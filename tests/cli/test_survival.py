@@ -58,7 +58,7 @@ def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
     assert "if all rates of the hazard were multiplied by" in second
     calm = shell("survival", curve, *BLOCK, "--age", "50").stdout
     assert "Standing does not contradict it" in calm
-    safe = ("--p2", "3", "--kr", "500", "--component", "single")
+    safe = ("--p2", "3", "--kr", "500", "--kind", "toppling", "--component", "single")
     assert (
         "the blocks say nothing against it" in shell("survival", curve, *safe, "--age", "9").stdout
     )

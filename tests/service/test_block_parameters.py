@@ -40,9 +40,9 @@ def test_a_shape_is_answered_as_its_numbers(client, shape):
 def test_a_rectangle_without_friction_is_taken_to_topple_and_says_so(client):
     query = {**RECTANGLE, "pgv": 0.6}
     taken = client.get("/v1/predict", params=query).json()
-    assert "taken to topple" in taken["warnings"][0]
+    assert "assumed to topple" in taken["warnings"][0]
     checked = client.get("/v1/predict", params={**query, "phi": 30}).json()
-    assert not [words for words in checked["warnings"] if "taken to topple" in words]
+    assert not [words for words in checked["warnings"] if "assumed to topple" in words]
     assert checked["probability"] == pytest.approx(taken["probability"], rel=1e-9)
 
 

@@ -85,14 +85,13 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
     Raises:
         InputError: no workbook, one without that sheet, or with a formula that was never computed.
     """
+    library = None if origin.suffix.lower() == ".ods" else openpyxl()
     with _damage(origin):
         _check(origin)
-        if origin.suffix.lower() == ".ods":
+        if library is None:
             sheets = _open_document_rows(origin)
         else:
-            book = openpyxl().load_workbook(
-                origin, read_only=True, data_only=True, keep_links=False
-            )
+            book = library.load_workbook(origin, read_only=True, data_only=True, keep_links=False)
             stack.callback(book.close)
             for each in book.worksheets:
                 each.reset_dimensions()  # what programs state there is not always so
