@@ -58,7 +58,9 @@ _FEWEST_LETTERS = 5
 WRITTEN = frozenset((
     "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain",
     "how", "warnings", "reason", "block_sd", "model", "term", "method", "level", "years",
-    "numerical_error", "site", "state", "yield_g", "kct", "azimuth_deg",
+    "numerical_error", "site", "state", "yield_g", "kct", "azimuth_deg", "kr_forward",
+    "kr_backward", "p2_forward_1_s2", "p2_backward_1_s2", "restitution_forward",
+    "restitution_backward",
 ))  # fmt: skip
 """Columns of answers, which a table that is read again has as well."""
 
@@ -370,9 +372,10 @@ class Header(NamedTuple):
             field = sounds_like(text)
             if field is None or not {field, *INSTEAD_OF.get(field, ())}.isdisjoint(present):
                 continue
+            what = "back fracture" if field == "back_fracture" else declared()[field].what
             raise InputError(
                 f"{source}: the column {text[:60]!r} is not understood and may be the "
-                f"{declared()[field].what}: call it {column_of(field)!r}, or pass "
+                f"{what}: call it {column_of(field)!r}, or pass "
                 f"ignore_columns {text[:60]!r}",
                 fields=("ignore_columns",),
             )

@@ -131,7 +131,6 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
         ((*SIDES, "--dip", "3", "--beta", "3"), "--beta does not go with --dip"),
         (("--dip", "3"), "or by its shape, such as --height and --width"),
         ((*ALPHA1, "--dip", "3"), "--phi is missing"),
-        ((*SIDES, "--dip", "20"), "unstable at rest"),
         ((*SIDES, "--p2", "3"), "--p2 does not go with --height"),
         ((*SIDES, *ALPHA1), "--alpha1 does not go with --height"),
         ((*SIDES, "--block", "b.toml"), "--height does not go with --block"),

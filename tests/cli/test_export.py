@@ -181,11 +181,8 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (
-            ("--p2", "3", "--kr", "0.1", "--imt", "SA(3)"),
-            "--sa30 is given: a prediction needs --pgv, or --sa10",
-        ),
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "PGV, PGA, SA(0.3), SA(1), SA(3)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(3)"), "use one of PGV, PGA, SA(1)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "use one of PGV, PGA, SA(1)"),
         (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
         (

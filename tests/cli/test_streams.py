@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-COMMAND = (sys.executable, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv")
+COMMAND = (sys.executable, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1",
+           "--component", "single", "--pgv")  # fmt: skip
 
 
 @pytest.mark.parametrize(

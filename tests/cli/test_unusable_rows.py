@@ -69,8 +69,8 @@ def without_texts(document: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("command", "value"),
     [
-        (("predict", "--batch"), "probability"),
-        (("hazard", "curve.csv", *SINGLE, "--blocks"), "annual_rate"),
+        (("predict", *UNUSED, "--batch"), "probability"),
+        (("hazard", "curve.csv", *SINGLE, *UNUSED, "--blocks"), "annual_rate"),
         (("shakemap", "grid.xml", *SINGLE, "--blocks"), "probability"),
     ],
 )
@@ -132,8 +132,17 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
 ) -> None:
     Path("b.csv").write_text(HEAD + SOUND["A"] + "".join(BAD.values()) + SOUND["C"])
     asked: dict[str, tuple[str, ...]] = {
-        "survival": ("survival", "curve.csv", *SINGLE, "--age", "100"),
-        "export": ("export", "nrml", "--out", "a.xml"),
+        "survival": (
+            "survival",
+            "curve.csv",
+            *SINGLE,
+            *UNUSED,
+            "--kind",
+            "toppling",
+            "--age",
+            "100",
+        ),
+        "export": ("export", "nrml", *UNUSED, "--out", "a.xml"),
     }
     message = refuses(*asked[command], "--blocks", "b.csv")
     assert "7 of 9 blocks cannot be used" in message

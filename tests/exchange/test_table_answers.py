@@ -164,8 +164,8 @@ def test_an_empty_column_says_nothing(
     assert answer(source, target, pgv_m_s=0.6)["answered"] == 3  # the option fills the empty cells
     model = str(tmp_path / "model.db")
     filled, _, own = (float(row["probability"]) for row in rows_of(target))
-    assert filled == predict(3.0, 0.1, pgv_m_s=0.6, db=model).probability
-    assert own == predict(3.0, 0.1, pgv_m_s=0.5, db=model).probability
+    assert filled == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.6, db=model).probability)
+    assert own == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.5, db=model).probability)
     monkeypatch.setattr(parts, "ROWS", 2)
     source.write_text(head + rows.replace(",,", ",0.6,") + "3,0.1,0.6,0.5\n")
     with pytest.raises(InputError, match="pga_g is empty in the first rows and filled"):

@@ -157,7 +157,7 @@ def test_what_is_not_json_is_refused(service, body, words):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        ({"p2": 1e308, "kr": 1e308, "pgv": 1e308}, None),
+        ({"p2": 1e308, "kr": 1e308, "pgv": 1e308}, "beyond any block"),
         ({"p2": 3, "kr": [[0.1]], "pgv": 0.6}, "kr[0]"),
         ({"p2": 3, "kr": "0.1", "pgv": 0.6}, "kr = '0.1' is not a number"),
         ({"p2": 3, "kr": True, "pgv": 0.6}, "kr = True is not a number"),
@@ -169,10 +169,7 @@ def test_what_is_not_json_is_refused(service, body, words):
 )
 def test_values_of_any_kind_are_answered(service, body, words):
     found = ask(service, "POST", "/v1/predict", json.dumps(body).encode())
-    if words is None:
-        assert found[0] == 200
-    else:
-        assert words in refused(found, 422)
+    assert words in refused(found, 422)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999", "1e-999", "-0", "0x10", "١"])

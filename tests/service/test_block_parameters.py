@@ -72,7 +72,6 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
         ("height=2&width=0", "width = 0 is not above 0"),
         ("height=2&width=0.5&kr=0.1", "kr does not go with height"),
         ("height=2&width=0.5&r3=2", "r3 does not go with height"),
-        ("height=2&width=0.5&dip=20", "unstable at rest"),
         ("height=2&width=0.5&dip=3&beta=3", "dip does not go with beta"),
         ("alpha1=-15&alpha3=24&r3=2.5", "beta is missing"),
         ("alpha1=-15&alpha3=24&r3=2.5&beta=18", "phi is missing"),

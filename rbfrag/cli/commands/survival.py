@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer
 
 EXAMPLE = (
-    "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kind rocking "
+    "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kind toppling "
     "--kr-sigma 0.1 --age 10000 --age-sd 2000 --component rotd50"
 )
 
