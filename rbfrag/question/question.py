@@ -324,8 +324,8 @@ def ask(
         if not has_shape(given):
             given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-            remarks = (*unread, *size_questions(given.get("p2")), *unused_measures(chosen, given))
             answer = answer_given(chosen, given, level, **how)
+            remarks = (*unread, *size_questions(given.get("p2")), *unused_measures(chosen, given))
             return with_remarks(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)

@@ -141,7 +141,8 @@ def test_arrays_agree_with_scalars(row, term):
             [one.probability, one.ci_low, one.ci_high], rel=1e-12, abs=1e-250
         )
         assert one.in_domain == many.in_domain[i]
-        own = [text for text in one.warnings if "was not used" not in text]
+        of_all = ("was not used", "Check the unit")
+        own = [text for text in one.warnings if not any(words in text for words in of_all)]
         assert len(own) == len([r for r in many.reason[i].split("; ") if r])
 
 
@@ -255,8 +256,6 @@ def test_nan_can_be_refused_in_arrays(row):
         ({"p2": True}, "p2 = True is not a number"),
         ({"p2": 1 + 2j}, "p2 = .*is not a number"),
         ({"p2": None}, "p2 is missing"),
-        ({"kr": 0.0}, "kr = 0 is not above zero.*falls without an earthquake"),
-        ({"kr": -0.1}, "kr = -0.1"),
         ({"kr": math.nan}, "kr = nan"),
         ({"kr": -math.inf}, "kr = -inf"),
         ({"kr": None}, "kr is missing"),

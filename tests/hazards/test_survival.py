@@ -260,7 +260,7 @@ def test_blocks_that_nothing_fells_have_no_factor() -> None:
 def test_refusals(changes: dict[str, Any], words: str) -> None:
     asked = {"curves": power_law(), "fragility": lognormal, "age_years": YEARS, **changes}
     if asked["fragility"] is None:
-        asked["model"] = model_row()
+        asked |= {"model": model_row(), "kind": "toppling"}
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         survival(asked.pop("curves"), **asked)
 
