@@ -152,7 +152,7 @@ UNCERTAINTY = tuple(
 )  # fmt: skip
 
 BLOCKS = (
-    b"block_id,p2_1_s2,kr,weight,lon,lat,mode\na,3.0,0.1,1,20.1,40.1,topple\n"
+    b"block_id,p2_1_s2,kr,count,lon,lat,mode\na,3.0,0.1,1,20.1,40.1,topple\n"
     b'"b, 2",1.5,0.2,2,20.2,40.2,\nc,0.3,0.05,1,20.3,40.3,topple\n',
     b"block_id,height_m,width_m,dip_deg\na,3.0,0.5,5\nb,2.0,0.4,0\n",
     b"\xef\xbb\xbfblock_id;height_m;width_m\na;3,0;0,5\nb;2,0;0,4\n",

@@ -36,6 +36,7 @@ NO_READERS = {
     "rockmasses/file.py:rock_mass_of_toml": "is given the text",
     "service/app.py:lifespan": "opens the pool of processes",
     "service/app.py:make_app": "its inner function opens the pool of processes",
+    "service/predict.py:answer_table": "hands on the table, and reads the answer",
     "service/work.py:run": "opens the pool of processes",
 }
 """Functions that open files and make nothing of a file from outside."""
