@@ -455,12 +455,14 @@ def test_a_direction_that_is_guessed_is_a_warning(tmp_path: Path, db: Path) -> N
     assert told.startswith("the direction of 1 of 1 motions is guessed")
 
 
-SAMPLE = Path(__file__).parents[3] / "shared" / "cases4" / "records" / "csmip_sta_chn.v2"
+@pytest.fixture
+def sample(cases_dir: Path) -> Path:
+    """A CSMIP file of one instrument in the free field and one on a roof."""
+    return cases_dir / "records" / "csmip_sta_chn.v2"
 
 
-@pytest.mark.skipif(not SAMPLE.exists(), reason="no shared samples")
-def test_a_sensor_on_a_structure_is_excluded_by_default(tmp_path: Path, db: Path) -> None:
-    report = add_motions([SAMPLE], db=db)
+def test_a_sensor_on_a_structure_is_excluded_by_default(sample: Path, db: Path) -> None:
+    report = add_motions([sample], db=db)
     told = [(row.is_vertical, row.orientation_deg, "structure" in row.flags) for row in rows(db)]
     assert told == [
         (True, None, False), (False, 0.0, False), (False, 270.0, True),
@@ -486,10 +488,8 @@ def test_a_sensor_on_a_structure_is_excluded_by_default(tmp_path: Path, db: Path
         ) == (1, 0)
 
 
-def test_only_records_of_structures(tmp_path: Path, db: Path) -> None:
-    text = SAMPLE.read_text() if SAMPLE.exists() else ""
-    if not text:
-        pytest.skip("no shared samples")
+def test_only_records_of_structures(sample: Path, tmp_path: Path, db: Path) -> None:
+    text = sample.read_text()
     (tmp_path / "roof.v2").write_text(text.replace("FREEFIELD", "DECK     "))
     add_motions([tmp_path / "roof.v2"], db=db)
     with pytest.raises(

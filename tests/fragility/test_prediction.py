@@ -155,6 +155,16 @@ def test_measures_that_the_model_does_not_read_are_named(row):
     assert not any("not used" in each for each in predict(3.0, 0.1, pgv_m_s=0.6).warnings)
 
 
+@pytest.mark.parametrize("kr", [0.0, -0.1])
+def test_what_falls_without_shaking_has_p_1_alone_and_in_arrays(row, kr):
+    one = predict(3.0, kr, pgv_m_s=0.6, model=row())
+    assert (one.probability, one.ci_low, one.ci_high) == (1.0, 1.0, 1.0)
+    assert any("unstable without shaking" in text for text in one.warnings)
+    many = predict(3.0, np.array([kr, 0.1]), pgv_m_s=0.6, model=row())
+    assert many.probability[0] == 1.0
+    assert many.probability[1] < 1.0
+
+
 def test_an_interval_may_be_left_out(row):
     kr = np.array([0.1, 0.2, np.nan, -1.0])
     whole = predict(3.0, kr, pgv_m_s=0.6, model=row())
