@@ -24,7 +24,6 @@ from rbfrag.question.fields import (
     option_of,
     word_of,
 )
-from rbfrag.question.table import number_with_unit
 from rbfrag.results.diagnostic import Diagnostic
 
 
@@ -305,6 +304,9 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
     try:
         number = kind(value)
     except ValueError:
+        # the vocabulary of tables, which plain numbers do not load
+        from rbfrag.question.table import number_with_unit
+
         wanted = _NEEDS[kind]
         about = declared().get(name_of(parameter.name)) if kind is float else None
         read = None if about is None else number_with_unit(value, about.unit)
