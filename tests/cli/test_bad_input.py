@@ -169,7 +169,7 @@ def test_suspicious_dt_is_answered_with_a_warning(shell: Shell, tmp_path: Path) 
     ("command", "words"),
     [
         (("predict", "--p2", "abc"), "--p2': 'abc' cannot be used: give a number, with a point"),
-        (("predict", "--p2", "0,5"), "'0,5' cannot be used: give a number, with a point before"),
+        (("predict", "--p2", "1,234"), "'1,234' cannot be used: give a number, with a point"),
         (("db", "check", "--sample", "1.5"), "'1.5' cannot be used: give a whole number"),
         (("db", "check", "--sample", "-3"), "'-3' cannot be used: give 0 or more"),
     ],
