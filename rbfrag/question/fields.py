@@ -492,6 +492,14 @@ class WholeFields(SpaceFields, total=False):
     back_fracture: Annotated[
         bool | None, Field("There is no fracture behind the block", word="no_back", is_flag=True)
     ]
+    drainage: Annotated[
+        str | None,
+        Field(
+            "Drainage of the water in the back fracture, with {water_m}: undrained (its pressure "
+            "keeps acting while the block moves) or drained (it vanishes); default: undrained",
+            is_text=True,
+        ),
+    ]
     cohesion_pa: Annotated[
         float | None, Field("Cohesion of the base, with {density_kg_m3}", "Pa", least=0.0)
     ]
@@ -711,7 +719,7 @@ BY_ROW = ("back_fracture", "cohesion_pa", "density_kg_m3")
 def columns_declared() -> tuple[str, ...]:
     """Return the fields that may be columns of tables."""
     classes = (BlockFields, ShakingFields, ComponentFields, RowFields, SpaceFields)
-    return names_of(*classes, *BY_ROW, "mechanism")
+    return names_of(*classes, *BY_ROW, "mechanism", "drainage")
 
 
 def column_of(name: str) -> str:

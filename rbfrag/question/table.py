@@ -25,6 +25,7 @@ from rbfrag.question.fields import (
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KINDS
+from rbfrag.solver.stability.joint import DRAINED, UNDRAINED
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
 
@@ -135,6 +136,7 @@ class _Vocabulary(NamedTuple):
     quiet: tuple[str, ...]
     kinds: Mapping[str, str]
     answers: Mapping[str, bool]
+    drainages: Mapping[str, str]
 
 
 @cache
@@ -159,6 +161,7 @@ def _vocabulary() -> _Vocabulary:
         tuple(data["quiet"]["words"]),
         kinds | {kind.replace("_", " "): kind for kind in KINDS},
         {w: name == "yes" for name, words in data["answers"].items() for w in words},
+        {w: name for name, words in data["drainage"].items() for w in words},
     )
 
 
@@ -236,6 +239,17 @@ def kind_named(text: str) -> str | None:
 def yes_or_no(text: str) -> bool | None:
     """Return whether a cell says yes; None where it says neither yes nor no."""
     return _vocabulary().answers.get(" ".join(normalized_words(text)))
+
+
+def drainage_named(text: str) -> str:
+    """Return the drainage that a cell names, in any of five languages; yes means drained.
+
+    What names none is returned as it is.
+    """
+    word = " ".join(normalized_words(text))
+    answer = yes_or_no(text)
+    named = _vocabulary().drainages.get(word, text)
+    return named if answer is None else DRAINED if answer else UNDRAINED
 
 
 def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | None:

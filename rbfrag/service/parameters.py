@@ -48,7 +48,7 @@ Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, f
 COLUMNS = frozenset(names_of(BlockFields, ShakingFields, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
-_TEXTS = frozenset(names_of(SpaceFields, ComponentFields))
+_TEXTS = frozenset(names_of(SpaceFields, ComponentFields, "drainage"))
 """Texts of which many blocks have one each."""
 
 _NOT_SENT = frozenset({"block", "db", "gmm"})
@@ -129,7 +129,9 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (*names_of(ShapeFields, PlaneFields, SpaceFields, JointFields), "back_fracture")
+_SHAPE = (
+    *names_of(ShapeFields, PlaneFields, SpaceFields, JointFields, "drainage"), "back_fracture",
+)  # fmt: skip
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
 _AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
 _BLOCK = names_of(BlockFields, WholeFields)
