@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.errors import InputError, spelled
 from rbfrag.fragility import words
 from rbfrag.question.fields import declared, option_of
+from rbfrag.results.diagnostic import with_diagnostics
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 def print_json(document: object) -> None:
     """Print one JSON document on standard output."""
+    document = with_diagnostics(document)
     print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
 
 

@@ -90,6 +90,7 @@ class Remark:
         name: the value concerned.
         text: what is wrong and what to do.
         how: what answers there, in place of the model; empty where the model does.
+        code: of the warning, one of :data:`rbfrag.results.diagnostic.CODES`.
     """
 
     holds: Any
@@ -97,6 +98,7 @@ class Remark:
     value: Any
     text: str
     how: str = ""
+    code: str = "note"
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
@@ -235,17 +237,18 @@ def answer_with_findings(
     above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
     model.with_ratios(values, above_zero)
     no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
-    say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS))
+    say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS, "no_shaking"))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
     for bound in model.bounds(given):
         holds = bound.holds(values) & _not(ruled)
-        say(holds, Remark(holds, bound.about, values.get(bound.about), bound.text, bound.how))
+        value = values.get(bound.about)
+        say(holds, Remark(holds, bound.about, value, bound.text, bound.how, "by_mechanics"))
         ruled = ruled | holds
     answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:
         partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
-        say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE))
+        say(partly, Remark(partly, "", answer.outside, PARTLY_OUTSIDE, code="extrapolation"))
     in_domain = _not(missing)
     if model.scattered and answer.outside is not None:
         in_domain = in_domain & _not(partly)
@@ -255,7 +258,7 @@ def answer_with_findings(
         in_domain = in_domain & _not(holds)
     if model.spread is not None and not model.scattered:
         together = _not(model.spread.holds(above_zero, ns)) & in_domain & _not(ruled)
-        say(together, Remark(together, "", 0.0, model.spread.sentence))
+        say(together, Remark(together, "", 0.0, model.spread.sentence, code="extrapolation"))
         in_domain = in_domain & _not(together)
     for finding in doubts(model, values, ns):
         say(finding.holds & _not(unanswered), finding)
@@ -279,7 +282,9 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         value = values[ratio.name]
         outside = (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
         fitted = model.row.domain.get(ratio.name)
-        yield Contradiction(outside, "", value, "", ratio=ratio, values=values, fitted=fitted)
+        yield Contradiction(
+            outside, "", value, "", "", "extrapolation", ratio=ratio, values=values, fitted=fitted
+        )
     for name, (low, high) in model.row.domain.items():
         if name not in values or name in _RATIO_NAMES:
             continue
@@ -294,6 +299,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
                 value,
                 f"is outside the fitted range {low:.4g} to {high:.4g} {unit} (nearest edge "
                 f"{edge:.4g}): the answer is an extrapolation",
+                code="extrapolation",
             )
 
 
@@ -301,8 +307,9 @@ def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Ite
     """Yield where the model stops making sense, and suspicious values."""
     if model.method.doubts is not None:
         for holds, name, text in model.method.doubts(model.parameters, values, ns):
-            yield Remark(holds, name, values[name], text)
+            yield Remark(holds, name, values[name], text, code="extrapolation")
     for name, (low, high, text) in CREDIBLE.items():
         if name in values:
             value = values[name]
-            yield Remark((value < low) | (value > high), name, value, f"is {text}")
+            strange = (value < low) | (value > high)
+            yield Remark(strange, name, value, f"is {text}", code="suspicious_value")

@@ -28,6 +28,7 @@ from rbfrag.fragility.measures import (
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.results.diagnostic import Diagnostic
 
 SHIPPED = "the reference that is shipped with rbfrag"
 """What answers are said to come from where no other database is named, or is there."""
@@ -184,7 +185,10 @@ def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[str,
     """Return what is to be said of measures that are given and that a model does not read."""
     read = model.term.inputs
     return tuple(
-        f"{name} was not used: model {model.name} reads {' and '.join(read)}"
+        Diagnostic(
+            f"{name} was not used: model {model.name} reads {' and '.join(read)}",
+            "unused_measures",
+        )
         for name in given
         if name in MEASURES and name not in read
         if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read

@@ -16,6 +16,7 @@ from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, Bound, Form, Method, Numbers
 from rbfrag.fragility.methods import method_named, method_names
+from rbfrag.results.diagnostic import Diagnostic
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
@@ -59,9 +60,10 @@ class Answer(NamedTuple):
     outside: Any = None
 
 
-SYNTHETIC = (
+SYNTHETIC = Diagnostic(
     "the model is fitted to synthetic pulses, without any recorded earthquake: its probabilities "
-    "do not hold for earthquakes"
+    "do not hold for earthquakes",
+    "synthetic_data",
 )
 
 

@@ -392,16 +392,16 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
 
 def _answer_with_diagnostics(
     model: FragilityModel, given: dict[str, float], quantiles: Quantiles
-) -> tuple[Judgement, list[str], str]:
+) -> tuple[Judgement, list[Diagnostic], str]:
     # Kept apart: most questions need no words.
     from rbfrag.fragility.checks import answer_with_findings
 
-    sentences: list[str] = []
+    sentences: list[Diagnostic] = []
     ruled: list[str] = []
 
     def say(holds: bool, finding: Remark) -> None:
         if holds:
-            sentences.append(finding.about(finding.value))
+            sentences.append(Diagnostic(finding.about(finding.value), finding.code))
             ruled.append(finding.how)
 
     def refuse(holds: bool, finding: Remark) -> None:
@@ -411,14 +411,14 @@ def _answer_with_diagnostics(
     def unstable(holds: bool, finding: Remark) -> None:
         if holds:
             text = f"{finding.name} = {finding.value:.4g}: {AT_REST}"
-            sentences.append(Diagnostic(text, "unstable_at_rest", severity="warning"))
+            sentences.append(Diagnostic(text, "unstable_at_rest"))
             ruled.append(BY_MECHANICS)
 
     judgement = answer_with_findings(
         model, given, tuple(given), quantiles, SINGLE,
         say=say, refuse=refuse, unstable=unstable, nothing=False,
     )  # fmt: skip
-    if any(isinstance(text, Diagnostic) for text in sentences):
+    if any(text.code == "unstable_at_rest" for text in sentences):
         certain = judgement.answer._replace(probability=1.0, low=1.0, high=1.0)
         judgement = judgement._replace(answer=certain)
     return judgement, sentences, "".join(ruled)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Remark, refusals
 from rbfrag.fragility.method import BlockParameters, arrays
+from rbfrag.results.diagnostic import Diagnostic
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"
 """What becomes of such blocks where numbers of several are added."""
@@ -80,9 +81,10 @@ def unusable_in_words(
         return ()
     number = f"{count:,} of {total:,} blocks could not be used{effect}"
     if effect == FROM_MEAN:
-        return (f"{number}: {in_list(places, reasons)}",)
+        return (Diagnostic(f"{number}: {in_list(places, reasons)}", "rows_rejected"),)
     which = "it is" if count == 1 else "the first is"
-    return (f"{number}; the reasons stand in the column reason; {which} {places[0]}: {reasons[0]}",)
+    text = f"{number}; the reasons stand in the column reason; {which} {places[0]}: {reasons[0]}"
+    return (Diagnostic(text, "rows_rejected"),)
 
 
 def refuse(

@@ -50,6 +50,7 @@ from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
 from rbfrag.question.fields import AnsweringFields, BlockFields
 from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 
@@ -538,9 +539,10 @@ def _numbers_in_words(result: Rates) -> Iterator[str]:
     outside = np.nan_to_num(result.outside)
     if (outside > NOTABLE).any():
         of = "" if outside.size == 1 else f" of {int((outside > NOTABLE).sum()):,} blocks"
-        yield (
+        yield Diagnostic(
             f"up to {100.0 * outside.max():.3g} % of the rate{of} comes from blocks and shaking "
-            "outside the ranges that the model was fitted on"
+            "outside the ranges that the model was fitted on",
+            "extrapolation",
         )
 
 
@@ -555,7 +557,8 @@ def counted(texts: Iterable[str]) -> tuple[str, ...]:
     kinds: dict[str, dict[str, None]] = {}
     for text in texts:
         kinds.setdefault(_NUMBER.sub("#", text), {})[text] = None
+    firsts = [(diagnostics(alike)[0], len(alike) - 1) for alike in kinds.values()]
     return tuple(
-        next(iter(each)) + (f" (and {len(each) - 1:,} more of the kind)" if len(each) > 1 else "")
-        for each in kinds.values()
+        first.replaced(text=f"{first} (and {more:,} more of the kind)") if more else first
+        for first, more in firsts
     )

@@ -181,12 +181,14 @@ def ends_in_words(
         name = f"the curve of {curve.place}" if len(curves) > 1 and curve.place else "the curve"
         others = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
         if size is more:
-            yield (
+            yield Diagnostic(
                 f"{name} ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
-                f"{float(more[worst]):.3g} failures a year to the answer{others}"
+                f"{float(more[worst]):.3g} failures a year to the answer{others}",
+                "curve_ends",
             )
         else:
-            yield (
+            yield Diagnostic(
                 f"{name} begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
-                f"is already {float(below[worst]):.3g}: weaker shaking is not counted{others}"
+                f"is already {float(below[worst]):.3g}: weaker shaking is not counted{others}",
+                "curve_ends",
             )

@@ -78,7 +78,10 @@ class Component:
         """Return what values are of, after "the curve is", for example."""
         if self.name == SINGLE_COMPONENT:
             return f"{subject} of {self.title}, as the models are"
-        return f"{subject} of {self.title}, converted to a single component ({self.source})"
+        return Diagnostic(
+            f"{subject} of {self.title}, converted to a single component ({self.source})",
+            "component_converted",
+        )
 
     @property
     def source(self) -> str:

@@ -313,7 +313,7 @@ def ask_at_rest(
     names = (*facts_of(group.kind).parameters, *measures)
     chosen = find_model(model, names, db, kind=group.kind, rotation_deg=rotation_deg)
     text = f"{blocks.at_rest} ({AT_REST})"
-    warning = Diagnostic(text, "unstable_at_rest", severity="warning")
+    warning = Diagnostic(text, "unstable_at_rest")
     return Prediction(
         group.kind, 1.0, 1.0, 1.0, None, None, level, chosen.row.name, chosen.term.name,
         chosen.method.name, group.kind, None, 0.0, True, (warning,), data=chosen.data,

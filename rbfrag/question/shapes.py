@@ -64,7 +64,7 @@ DENSITY_NOTE = Diagnostic(ASSUMED_DENSITY, "density_assumed")
 
 UNDRAINED_NOTE = Diagnostic(STAYS_UNDRAINED, "undrained")
 
-DRAINED_NOTE = Diagnostic(IS_DRAINED, "drained", severity="warning")
+DRAINED_NOTE = Diagnostic(IS_DRAINED, "drained")
 
 COHESION_NOTE = Diagnostic(NO_EFFECT_OF_COHESION, "cohesion_without_effect")
 

@@ -2,11 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 ROWS_LISTED = 1_000
 """Most rows of a warning that a document lists."""
+
+NOTE, WARNING = SEVERITIES = ("note", "warning")
+
+CODES: Mapping[str, tuple[str, str]] = {
+    "back_friction_neglected": (NOTE, "friction on the back face is neglected (conservative)"),
+    "by_mechanics": (NOTE, "mechanics decides in place of the fitted model"),
+    "check_unit": (WARNING, "a value that is seldom meant: another unit may have been typed"),
+    "cohesion_not_given": (NOTE, "rows without cohesion in a table that gives it elsewhere"),
+    "cohesion_without_effect": (NOTE, "cohesion does not act on a base that opens"),
+    "component_converted": (NOTE, "measures or a curve converted to a single component"),
+    "curve_ends": (WARNING, "the hazard curve ends before the fragility does"),
+    "decimal_comma": (NOTE, "a number with a decimal comma was understood"),
+    "density_assumed": (NOTE, "the density of the rock is assumed"),
+    "drained": (WARNING, "water pressure is assumed to vanish (unconservative)"),
+    "example_only": (WARNING, "the only row of a table is the example of the template"),
+    "example_skipped": (NOTE, "the example of the template was skipped"),
+    "extrapolation": (WARNING, "block or shaking outside the fitted range"),
+    "friction_not_given": (NOTE, "the friction angle is assumed to prevent sliding"),
+    "heel_tips": (WARNING, "pulses into the slope tip a sliding block (unconservative)"),
+    "ignored_columns": (WARNING, "columns of a table that the answer does not depend on"),
+    "no_drained_bound": (NOTE, "the question without water has no answer"),
+    "no_shaking": (NOTE, "P = 0 without shaking"),
+    "note": (NOTE, "any other note; its text says all"),
+    "rows_rejected": (WARNING, "rows of a table that have no answer"),
+    "rotd50_component": (NOTE, "the measures are assumed to be RotD50"),
+    "single_component": (NOTE, "the measures are assumed to be of a single component"),
+    "suspicious_value": (WARNING, "a value outside its credible range"),
+    "synthetic_data": (WARNING, "the model is fitted to synthetic pulses, not to earthquakes"),
+    "table_layout": (NOTE, "how the layout of a table was understood"),
+    "toe_slips": (WARNING, "the toe of a toppling block slips"),
+    "undrained": (NOTE, "water pressure keeps acting while the block moves (conservative)"),
+    "unit_converted": (NOTE, "a column was converted to the unit of its field"),
+    "unstable_at_rest": (WARNING, "the block fails without an earthquake"),
+    "unused_measures": (NOTE, "intensity measures that the model does not use"),
+    "water_not_given": (NOTE, "rows without water in a table that gives it elsewhere"),
+}
+"""Severity and meaning of each code."""
 
 
 class Diagnostic(str):
@@ -14,14 +51,12 @@ class Diagnostic(str):
 
     Args:
         text: the fact and its consequence.
-        code: what programs tell it by.
-        severity: ``note`` or ``warning``.
+        code: what programs tell it by, one of `CODES`.
         fields: input fields in the text, which each interface spells in its own way.
         rows: indices of the rows of a table that it holds for; empty for all of them.
     """
 
     code: str
-    severity: str
     fields: tuple[str, ...]
     rows: Sequence[int]
 
@@ -30,14 +65,19 @@ class Diagnostic(str):
         text: str,
         code: str = "note",
         *,
-        severity: str = "note",
         fields: tuple[str, ...] = (),
         rows: Sequence[int] = (),
     ) -> Diagnostic:
         """Return a warning with its code."""
+        assert code in CODES, code
         self = super().__new__(cls, text)
-        self.code, self.severity, self.fields, self.rows = code, severity, fields, rows
+        self.code, self.fields, self.rows = code, fields, rows
         return self
+
+    @property
+    def severity(self) -> str:
+        """``note`` or ``warning``."""
+        return CODES[self.code][0]
 
     def replaced(self, **about: Any) -> Diagnostic:
         """Return the warning with another text, or for other rows."""
@@ -54,15 +94,24 @@ def as_documents(warnings: Iterable[str]) -> list[dict[str, Any]]:
     """Return warnings under the keys of the JSON contract."""
     return [
         {
-            "code": each.code,
-            "severity": each.severity,
-            "text": str(each),
-            "fields": list(each.fields),
-            "rows": [int(row) for row in each.rows[:ROWS_LISTED]],
-            "row_count": len(each.rows),
+            "code": warning.code,
+            "severity": warning.severity,
+            "text": str(warning),
+            "fields": list(warning.fields),
+            "rows": [int(row) for row in warning.rows[:ROWS_LISTED]],
+            "row_count": len(warning.rows),
         }
-        for each in diagnostics(warnings)
+        for warning in diagnostics(warnings)
     ]
+
+
+def with_diagnostics(document: Any) -> Any:
+    """Return a JSON document with ``diagnostics`` beside its ``warnings``, or each of a list."""
+    if isinstance(document, list):
+        return [with_diagnostics(part) for part in document]
+    if not isinstance(document, Mapping) or "warnings" not in document:
+        return document
+    return {**document, "diagnostics": as_documents(document["warnings"])}
 
 
 def codes_by_row(warnings: Iterable[str], size: int) -> Any:
@@ -70,10 +119,10 @@ def codes_by_row(warnings: Iterable[str], size: int) -> Any:
     import numpy as np
 
     texts = np.full(size, "", dtype=object)
-    for each in diagnostics(warnings):
-        rows = np.unique(np.asarray(each.rows, dtype=np.intp))
+    for warning in diagnostics(warnings):
+        rows = np.unique(np.asarray(warning.rows, dtype=np.intp))
         texts[rows] = [
-            text if each.code in text.split() else f"{text} {each.code}".strip()
+            text if warning.code in text.split() else f"{text} {warning.code}".strip()
             for text in texts[rows].tolist()
         ]
     return texts

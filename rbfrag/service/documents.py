@@ -92,6 +92,23 @@ class Problem(_Document):
     traces: list[str] | None = None
 
 
+class DiagnosticDocument(_Document):
+    """A warning about a table; `rows` are the first it holds for, from 0, none for all."""
+
+    code: str
+    severity: str
+    text: str
+    fields: list[str]
+    rows: list[int]
+    row_count: int
+
+
+class _Answer(_Document):
+    """An answer; `diagnostics` are its warnings with their codes."""
+
+    diagnostics: list[DiagnosticDocument]
+
+
 @keys_of(Prediction, names=OF_EACH_MODEL)
 class ModelAnswer(_Document):
     """The answer of one model that the measures suffice for."""
@@ -100,7 +117,7 @@ class ModelAnswer(_Document):
 
 
 @keys_of(Prediction)
-class PredictAnswer(_Document):
+class PredictAnswer(_Answer):
     """Probability that one block fails: what `rbfrag predict` prints as JSON.
 
     `probability` is the share of such blocks that fail over all earthquakes and sites with these
@@ -126,7 +143,7 @@ OF_ARRAYS = (
 
 
 @keys_of(PredictionArray, names=OF_ARRAYS)
-class PredictArrays(_Document):
+class PredictArrays(_Answer):
     """Probabilities of many blocks or motions; null where the input cannot be used.
 
     `drained` has `probability`, `ci_low` and `ci_high` without water pressure, null for dry blocks.
@@ -135,18 +152,7 @@ class PredictArrays(_Document):
     drained: dict[str, list[float | None]] | None
 
 
-class Note(_Document):
-    """A warning about a table; `rows` are the first it holds for, from 0, none for all."""
-
-    code: str
-    severity: str
-    text: str
-    fields: list[str]
-    rows: list[int]
-    row_count: int
-
-
-class TableAnswers(_Document):
+class TableAnswers(_Answer):
     """A table of blocks with its answers: what `rbfrag predict --blocks` prints as JSON.
 
     `table` is the CSV file that is written, with the notes below it.
@@ -164,7 +170,6 @@ class TableAnswers(_Document):
     term: str
     method: str
     warnings: list[str]
-    notes: list[Note]
     table: str
 
 
@@ -183,7 +188,12 @@ class JointAnswer(_Document):
 
 @keys_of(Stability, Block, names=KEYS)
 class BlockAnswer(_Document):
-    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply."""
+    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply.
+
+    `diagnostics`, the warnings with their codes, are missing in the answer of /v1/drawing.
+    """
+
+    diagnostics: list[DiagnosticDocument] | None = None
 
     ky: float | None
     yield_acceleration: float | None
@@ -237,7 +247,7 @@ class Health(_Document):
     version: str
 
 
-class SpectrumAnswer(_Document):
+class SpectrumAnswer(_Answer):
     """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum` prints as JSON."""
 
     motion: str
@@ -258,13 +268,13 @@ class MapRow(_Document):
 
 
 @keys_of(CriticalResult, names=(*STRENGTH_VALUES, "polarity", "pga_g", "warnings"))
-class CriticalAnswer(_Document):
+class CriticalAnswer(_Answer):
     """The largest k_r/PGA that topples: what `rbfrag critical` prints as JSON."""
 
     map: list[MapRow] | None = None
 
 
-class RockmassAnswer(_Document):
+class RockmassAnswer(_Answer):
     """Blocks by mode: what `rbfrag rockmass` prints as JSON."""
 
     realisations: int
@@ -301,7 +311,7 @@ class SiteRate(_Document):
     drained: dict[str, float] | None
 
 
-class HazardDocument(_Document):
+class HazardDocument(_Answer):
     """Annual rates of toppling [1/a]: what `rbfrag hazard` prints as JSON."""
 
     model: str

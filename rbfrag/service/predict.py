@@ -17,7 +17,7 @@ from rbfrag.fragility.lookup import models_in_memory
 from rbfrag.question.document import answer_block
 from rbfrag.question.fields import ShakingFields, names_of
 from rbfrag.question.question import ask, with_drained_bound
-from rbfrag.results.diagnostic import as_documents, diagnostics
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays, TableAnswers
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows, TableQuery
 from rbfrag.service.problem import READ, SENT
@@ -123,7 +123,7 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
             )
         answers = target.read_text(encoding="utf-8-sig")
         answers += notes_below(summary["warnings"], dialect_of(target).delimiter)
-    return json_text({**summary, "notes": as_documents(summary["warnings"]), "table": answers})
+    return json_text({**summary, "table": answers})
 
 
 def notes_below(warnings: Sequence[str], delimiter: str) -> str:

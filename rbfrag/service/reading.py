@@ -18,6 +18,7 @@ from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
 from rbfrag.question.fields import parameter_of
 from rbfrag.question.table import field_of
+from rbfrag.results.diagnostic import with_diagnostics
 from rbfrag.service.problem import (
     BUSY,
     GONE,
@@ -271,8 +272,8 @@ _WRITER: TypeAdapter[Any] = TypeAdapter(Any)
 
 
 def json_text(document: object) -> bytes:
-    """Return a document as JSON; NaN is null."""
-    return _WRITER.dump_json(document)
+    """Return a document as JSON, with the codes of its warnings; NaN is null."""
+    return _WRITER.dump_json(with_diagnostics(document))
 
 
 def query_of(request: Request) -> dict[str, str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import (
@@ -180,9 +181,10 @@ def _about_back_plane(block: Block, finding: MarginFacts) -> Iterator[str]:
             "be free of pre-stress"
         )
     if finding.mode == "topple" and block.gamma_deg + finding.phi_back_deg > 90.0:
-        yield (
+        yield Diagnostic(
             "friction against the rock behind could hold the block beyond k_r; the answer leaves "
-            "this help out"
+            "this help out",
+            "back_friction_neglected",
         )
     if finding.mode == "slide" and finding.beta_deg < block.alpha1_deg:
         yield (

@@ -37,7 +37,6 @@ HEEL_TIPS = Diagnostic(
     "pulses into the slope above {threshold:.2f} g tip the block: it slides 1.4 times as far on "
     "average (1.0–2.7), so P is too low; rbfrag respond follows it",
     "heel_tips",
-    severity="warning",
 )
 NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
 
