@@ -259,8 +259,8 @@ class FitData:
         if self.least_y_m_s is None or not (n := int(np.isfinite(self.least_y_m_s).sum())):
             return []
         return [
-            f"{n} critical values are not certified and are intervals wider than {NARROW:.0%} "
-            f"of their lower end; they {treated}"
+            f"{n} critical values are not certified and are intervals wider than "
+            f"{100 * NARROW:g} % of their lower end; they {treated}"
         ]
 
     @property
