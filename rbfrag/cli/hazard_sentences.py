@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.sentences import rounded
-from rbfrag.fragility.words import percent, with_interval
 from rbfrag.hazards import between_measures
-from rbfrag.hazards.report import once_in
+from rbfrag.results.numbers import confidence, interval, percent, return_period, rounded
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
@@ -34,18 +32,16 @@ def place_in_words(lon: float, lat: float) -> str:
 
 
 def most_often(names: Sequence[str | None], rates: Sequence[float], most: int = 3) -> str:
-    """Return which of several blocks fail most often, the first of them, each with its rate.
+    """Return which of several blocks fail most often, each with its return period.
 
     Args:
         names: identifiers of the blocks; a block without one is called by its number.
-        rates: how often each fails [1/a].
+        rates: how often each fails [1/yr].
         most: how many are named at most.
     """
     first = sorted(range(len(rates)), key=lambda i: -rates[i])[:most]
-    named = [f"{names[i] or f'block {i + 1}'} ({once_in(rates[i])})" for i in first]
-    if len(named) == 1:
-        return f"Most often fails {named[0]}."
-    return f"Most often fail {', '.join(named[:-1])} and {named[-1]}."
+    named = [f"{names[i] or f'block {i + 1}'} ({return_period(rates[i])})" for i in first]
+    return f"Shortest return periods: {', '.join(named)}"
 
 
 def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:
@@ -73,80 +69,83 @@ def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:
 
 
 def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
-    """Yield how likely the blocks stand, and what that says of the hazard."""
-    one = answer.blocks == 1
-    who = "the block stands" if one else f"all {answer.blocks} blocks stand"
-    sd = f" (standard deviation {answer.age_sd_years:,.6g})" if answer.age_sd_years else ""
-    rate = answer.annual_rate_any
-    often = "never fails" if rate == 0.0 else f"fails {once_in(rate)} on average"
+    """Yield how likely the blocks are still standing, and what that says of the hazard curve."""
+    who = "" if answer.blocks == 1 else f"all {answer.blocks} blocks "
+    sd = f" ± {answer.age_sd_years:,.6g}" if answer.age_sd_years else ""
+    ends = confidence(answer.level, interval(answer.ci_low, answer.ci_high))
     yield (
-        f"{_condition(answer)}, {who} for {answer.age_years:,.6g} years{sd} with a probability of "
-        f"{with_interval(answer.probability_standing, answer.ci_low, answer.ci_high)}; "
-        f"{'it' if one else 'one of them'} {often}."
+        f"P({who}still standing after {answer.age_years:,.6g}{sd} years) = "
+        f"{percent(answer.probability_standing)}   ({ends})"
     )
-    five = answer.factor_5_percent
+    yield f"Return period of {'failure' if not who else 'a failure'} {_period(answer)}"
+    curve, five = _curve_of(answer), answer.factor_5_percent
+    factor = None if five is None else f"{float(f'{five:.2g}'):,.15g}"
     if five is None:
-        yield "No factor on its rates makes that improbable: the blocks say nothing against it."
+        yield f"{curve} is not rejected: no factor on its rates makes P less than 5 %"
+    elif answer.ci_low < 0.05 < answer.ci_high:
+        yield (
+            f"{curve} is neither rejected nor accepted at the 5 % level: the interval includes "
+            f"5 %; P would be 5 % with all rates multiplied by {factor}"
+        )
     elif five < 1.0:
         yield (
-            "That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
-            f"{float(f'{five:.2g}'):,.15g}."
+            f"{curve} is rejected at the 5 % level: consistent only if all its rates are "
+            f"multiplied by {factor} or less"
         )
     else:
         yield (
-            f"Standing does not contradict it: all rates of the hazard would have to be about "
-            f"{float(f'{five:.2g}'):,.15g} times as high to leave 5 %."
+            f"{curve} is not rejected at the 5 % level: P would be 5 % with all rates multiplied "
+            f"by {factor}"
         )
 
 
-def _condition(answer: SurvivalAnswer) -> str:
+def _period(answer: SurvivalAnswer) -> str:
+    rate = answer.annual_rate_any
+    return "infinite: no failure" if rate == 0.0 else return_period(rate)
+
+
+def _curve_of(answer: SurvivalAnswer) -> str:
     if len(answer.branches) == 1:
-        return "If the hazard is right"
+        return "The hazard curve"
     weighted = answer.branches[0].name != answer.hazard
-    return f"Over {answer.hazard}" if weighted else f"If the hazard of {answer.hazard} is right"
+    return f"The hazard of {answer.hazard}" if weighted else f"The hazard curve {answer.hazard}"
 
 
 def losses_in_words(answer: LossAnswer) -> Iterator[str]:
-    """Yield how many blocks fail, how often one does, what it costs, and what is not known."""
+    """Yield the loss, the failures, how often one fails, and what is not known of them."""
     failures, rate = answer.average_annual_failures, answer.annual_rate_any
     blocks = several(int(answer.portfolio.count.sum()), "block")
     if answer.events.is_scenario:
-        yield f"{rounded(failures)} of {blocks} are expected to fail."
+        yield f"{'Expected failures':<28}{rounded(failures)} of {blocks}"
         if rate is not None:
-            yield f"At least one fails with a probability of {percent(rate)}."
+            yield f"{'P(at least one failure)':<28}{percent(rate)}"
     else:
-        yield (
-            f"{rounded(failures)} failures a year are expected of {blocks}; the events cover "
-            f"{answer.events.effective_years:,.0f} years."
-        )
-        if rate is not None:
-            often = f"{once_in(rate)} on average" if rate > 0.0 else "never"
-            yield f"An earthquake fails at least one of them {often}."
         if answer.average_annual_loss is not None:
-            yield f"The average annual loss is {rounded(answer.average_annual_loss)}."
-    yield from _not_known(answer)
+            yield f"{'Average annual loss':<28}{rounded(answer.average_annual_loss)}"
+        events = f"{answer.events.effective_years:,.0f}-year event set"
+        yield f"{'Expected failures':<28}{rounded(failures)} /yr    {blocks}, {events}"
+        if rate is not None:
+            often = f"return period {return_period(rate)}" if rate > 0.0 else "none"
+            yield f"{'At least one failure':<28}{often}"
+    yield "Uncertainty of expected failures by source (not combined):"
+    yield f"  {' · '.join(_sources(answer))}"
 
 
-def _not_known(answer: LossAnswer) -> Iterator[str]:
-    """Yield what is not known of the failures expected, a sentence each: they do not add up."""
-    of, level = answer.uncertainty["average_annual_failures"], f"{100.0 * answer.level:g} %"
+def _sources(answer: LossAnswer) -> Iterator[str]:
+    """Yield what the expected failures are uncertain by, source by source."""
+    of = answer.uncertainty["average_annual_failures"]
 
-    def ends(interval: tuple[float, float]) -> str:
-        return f"between {rounded(interval[0])} and {rounded(interval[1])}"
+    def ends(source: tuple[float, float]) -> str:
+        return f"{rounded(source[0])}–{rounded(source[1])}"
 
-    another = "other ground motions of it" if answer.events.is_scenario else "another event set"
-    yield f"Counting: {another} as long would give {ends(of.counting)} ({level})."
+    yield f"event-set sampling {ends(of.counting)}"
     if of.knowledge is not None:
-        yield f"Knowledge: the data leave the model open {ends(of.knowledge)} ({level})."
-    if answer.tau is not None:
-        yield between_measures.in_words(answer.tau)
+        yield f"fragility parameters {ends(of.knowledge)}"
     if of.branches is not None:
-        yield f"Branches: 90 % of the logic tree lies {ends(of.branches)}."
-    elif len(answer.events.realization_weights) > 1:
-        yield (
-            "Branches: counting makes most of what the realizations differ by; hazard curves of "
-            "them tell more."
-        )
+        yield f"logic tree {ends(of.branches)} (5th–95th)"
+    if answer.tau is not None:
+        low, high = between_measures.factors_between(answer.tau)
+        yield f"choice of intensity measure × {low:.2f}–{high:.2f}"
 
 
 def campaign_in_words(report: Mapping[str, Any]) -> str:

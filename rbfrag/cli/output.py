@@ -33,12 +33,6 @@ def print_sentences(sentences: Iterable[str]) -> None:
     print()
 
 
-def print_glossary(*texts: str) -> None:
-    """Print, below an answer, what words of its texts mean, where one needs it."""
-    if meaning := words.glossary(*texts):
-        print(f"\n({meaning})")
-
-
 def print_pairs(pairs: Mapping[str, object]) -> None:
     """Print names and values in two columns; None is shown as a dash."""
     width = max(map(len, pairs), default=0)
@@ -87,11 +81,15 @@ def _cut(text: str, size: int) -> str:
     return text if len(text) <= size else f"{text[: size - 1]}…"
 
 
+def print_labelled(label: str, text: str) -> None:
+    """Print a line of an answer with its label: "Model     bounded-pgv_kr, …"."""
+    print(f"{label:<10}{text}")
+
+
 def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
-    """Print warnings on standard error, one a line, with fields as options."""
+    """Print warnings as notes of the answer, one a line, with fields as options."""
     for warning in warnings:
-        text = spelled(warning, ("excel_text", *fields), option_of)
-        print(f"warning: {text}", file=sys.stderr)
+        print_labelled("Note", spelled(warning, ("excel_text", *fields), option_of))
 
 
 def write_table(
@@ -263,19 +261,22 @@ def show_prediction(
         return
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
-    sentences = (
-        *words.prediction_in_words(document),
-        *words.block_in_words(document["method"], given),
-        *words.drained_in_words(document),
+    warnings = document["warnings"]
+    questions = words.units_to_check(warnings)
+    print_sentences((*questions, words.headline(document)))
+    for label, text in words.lines(document, given):
+        print_labelled(label, text)
+    print_warnings(
+        [text for text in warnings if text not in questions],
+        [name for name in declared() if "_" in name],
     )
-    warnings = [text for text in document.pop("warnings") if text not in sentences]
-    print_sentences(sentences)
     if verbose:
-        shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
-        shown.pop("drained")
-    else:
-        shown = _short(document)
-    print_pairs(shown)
+        print()
+        apart = ("drained", "warnings", "shaking")
+        print_pairs({
+            key: value for key, value in document.items()
+            if key not in apart and (value or key not in _LEFT_OUT)
+        })  # fmt: skip
     if polarities:
         print()
         print_table(
@@ -286,29 +287,6 @@ def show_prediction(
         print()
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
-    print_glossary(*sentences, *shown)
-    print_warnings(warnings, [name for name in declared() if "_" in name])
-
-
-def _short(document: Mapping[str, Any]) -> dict[str, object]:
-    """Return what is shown without --verbose."""
-    ends = {
-        "interval": (document["ci_low"], document["ci_high"]),
-        "at the sites": (document["event_low"], document["event_high"]),
-    }
-    return {
-        "probability": words.percent(document["probability"]),
-        **{name: words.interval(*pair) for name, pair in ends.items() if None not in pair},
-        **{name: document[name] for name in _IF_KNOWN if document.get(name)},
-        "in domain": document["in_domain"],
-        "model": words.model_in_words(document),
-        **({} if document["how"].startswith("model") else {"how": document["how"]}),
-        "data": document["data"],
-    }
-
-
-_IF_KNOWN = ("median_displacement_m",)
-"""Keys that are shown without --verbose where they apply."""
 
 
 _OF_POLARITY = (

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.words import interval, percent, with_interval
+from rbfrag.results.numbers import interval, percent, rounded, with_interval
 
 STATUS = {
-    "below_limit": "This motion topples no block of this size down to the search limit.",
-    "no_motion": "This motion lifts no block of this size down to the search limit off its base.",
-    "outside_model": "The motion throws blocks off their base, which the model does not follow.",
+    "below_limit": "The record topples no block of this size down to the search limit",
+    "no_motion": "The record uplifts no block of this size down to the search limit",
+    "outside_model": "The motion throws blocks off their base, which the model does not follow",
 }
 
 SCALED_STATUS = {
-    "below_limit": "No factor on the motion up to scale_limit brings the block down, as far as it "
-    "was looked at.",
-    "no_motion": "No factor on the motion up to scale_limit moves the block.",
+    "below_limit": "The block does not fail at any factor on the record up to scale_limit that "
+    "was tried",
+    "no_motion": "The block does not move at any factor on the record up to scale_limit",
 }
 
 SLIDING_STATUS = {
@@ -27,14 +27,6 @@ SLIDING_STATUS = {
 }
 
 
-def rounded(value: float) -> str:
-    """Return a number with three digits and without an exponent where people write none."""
-    if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
-        return f"{value:.2g}"
-    text = f"{value:#.3g}"
-    return f"{float(text):,.0f}" if abs(value) >= 100.0 else text.rstrip(".")
-
-
 def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
     """Yield how a run ended, with the number that decides.
 
@@ -43,48 +35,51 @@ def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
         advice: what its outcome means.
     """
     at_s = answer.get("toppled_s")
+    drained = _drained_yield(answer).replace("; drained", "Drained yield acceleration")
     if "started_s" in answer and answer["started_s"] is None and answer["outcome"] == "stable":
-        yield "The motion does not move the block: it never exceeds its strength."
-        return
-    yield (advice if at_s is None else f"At {at_s:.2f} s the block topples. {advice}") + (
-        _drained_yield(answer)
-    )
+        yield "The block does not move: the motion never exceeds its yield acceleration"
+    else:
+        yield advice if at_s is None else f"The block topples at {at_s:.2f} s. {advice}"
     if answer.get("peak_theta_n") is not None:
-        ratio = answer["peak_theta_n"]
-        yield f"Its greatest rotation is {percent(ratio)} of the critical angle."
+        yield f"Peak rotation {percent(answer['peak_theta_n'])} of the critical angle"
     if answer.get("displacement_m") is not None:
-        yield f"It is displaced by {rounded(answer['displacement_m'])} m."
+        yield f"Displacement {rounded(answer['displacement_m'])} m"
+    if drained:
+        yield drained
 
 
-MOVES = {
-    "slide": "slides",
-    "topple": "topples",
-    "slump": "slumps",
-    "confined_topple": "topples against its back plane",
+YIELDS = {
+    "slide": "Yield acceleration of sliding {k} g",
+    "topple": "Uplift acceleration {k} g (toppling): above it the block lifts off its base, and it "
+    "topples only if the pulse lasts long enough",
+    "slump": "Yield acceleration of slumping {k} g",
+    "confined_topple": "Yield acceleration of confined toppling {k} g",
 }
-"""What a block does by its failure mode."""
+"""Headline of a block that stands, by its failure mode."""
+
+MODES = {
+    "slide": "sliding", "topple": "toppling", "slump": "slumping",
+    "confined_topple": "confined toppling",
+}  # fmt: skip
 
 
 def block_in_words(answer: Mapping[str, Any]) -> str:
-    """Return how a block fails, and from which acceleration on.
+    """Return how a block fails, and its yield acceleration.
 
     Args:
         answer: an answer of `rbfrag block` under the keys of the JSON contract.
     """
-    moves = MOVES.get(answer["mode"], answer["mode"])
+    mode = answer["mode"]
     if answer["state"] == "locked":
-        return f"The block {moves} if at all: no horizontal acceleration moves it."
+        return f"The block is locked in {MODES[mode]}: no horizontal acceleration moves it"
     if answer["state"] == "unstable":
-        return f"The block {moves} at rest, without any earthquake."
-    return (
-        f"The block {moves} where the ground's horizontal acceleration exceeds "
-        f"{rounded(answer['yield_acceleration'])} g.{_drained_yield(answer)}"
-    )
+        return f"The block is unstable at rest ({MODES[mode]}): it fails without an earthquake"
+    return YIELDS[mode].format(k=rounded(answer["yield_acceleration"])) + _drained_yield(answer)
 
 
 def _drained_yield(answer: Mapping[str, Any]) -> str:
     bound = (answer.get("drained") or {}).get("yield_acceleration")
-    return "" if bound is None else f" Drained, the yield acceleration is {rounded(bound)} g."
+    return "" if bound is None else f"; drained {rounded(bound)} g"
 
 
 def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
@@ -95,62 +90,65 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     """
     shares = {name: tally["share"] for name, tally in document["modes"].items()}
     most = sorted((name for name in shares if shares[name] > 0.0), key=lambda n: -shares[n])
-    parts = [f"{percent(shares[name])} would {_MODE_VERBS.get(name, name)}" for name in most]
-    yield f"Of {document['blocks']:,} blocks {' and '.join(parts) or 'none could fail'}."
+    parts = [f"{MODES.get(name, name)} {percent(shares[name])}" for name in most]
+    yield f"Failure modes of {document['blocks']:,} blocks: {', '.join(parts) or 'none'}"
     answer, shaking = document["scenario"], document["shaking"]
     if answer is not None and answer["covered_only"]["probability"] is not None:
         total = answer["covered_only"]
         yield (
-            f"Of the blocks that there is a model for, {percent(answer['covered_share'])} of all, "
-            f"{with_interval(total['probability'], total['ci_low'], total['ci_high'])} fail under "
-            "this shaking."
+            "Mean P(failure) = "
+            f"{with_interval(total['probability'], total['ci_low'], total['ci_high'])} for the "
+            f"{percent(answer['covered_share'])} of the blocks that a fragility model covers"
         )
     for scale in () if shaking is None else shaking["scales"]:
         of_all = scale["all"]["fails_of_all"]
         unknown = scale["all"]["open_of_all"]
         yield (
-            f"{shaking['motion']} times {scale['scale']:g}: of the blocks "
-            f"{with_interval(of_all['share'], of_all['ci_low'], of_all['ci_high'])} fail"
-            + (f"; of another {percent(unknown)} it is open whether they do." if unknown else ".")
+            f"{shaking['motion']} × {scale['scale']:g}: "
+            f"{with_interval(of_all['share'], of_all['ci_low'], of_all['ci_high'])} of the blocks "
+            f"fail" + (f"; {percent(unknown)} undetermined" if unknown else "")
         )
 
 
-_MODE_VERBS = {
-    "slide": "slide",
-    "topple": "topple",
-    "slump": "slump",
-    "confined_topple": "topple against their back plane",
-}
-
-
-def critical_in_words(answer: Mapping[str, Any]) -> str:
-    """Return what a search has found.
+def critical_in_words(answer: Mapping[str, Any], block_kr: float | None = None) -> Iterator[str]:
+    """Yield what a search has found: the block that was asked about, and the critical value.
 
     Args:
         answer: a critical value under the keys of the JSON contract: k_r/PGA, or a scale.
+        block_kr: k_r of the block whose p² was searched; None for no such block.
     """
     if "scale" in answer:
-        return _scale_in_words(answer)
-    pga_g, certified = answer["pga_g"], answer["certified"]
+        yield _scale_in_words(answer)
+        return
+    pga_g, upper = answer["pga_g"], answer["upper"]
+    highest = None if upper is None else upper * pga_g
+    about = f"p² = {answer['p2']:.3g} s⁻²; PGA {rounded(pga_g)} g, {answer['polarity']} polarity"
     if answer["status"] != "found":
-        if certified or answer["upper"] is None:
-            return STATUS[answer["status"]]
-        return (
-            "No block of this size was seen to topple down to the search limit; not certified: "
-            f"only above k_r = {rounded(answer['upper'] * pga_g)} is it proven."
+        yield (
+            STATUS[answer["status"]]
+            if answer["certified"] or highest is None
+            else f"No block of this size was seen to topple down to the search limit: not "
+            f"certified below k_r = {rounded(highest)}"
         )
-    ratio = rounded(answer["kr_over_pga"])
-    if certified:
-        half_width = 0.5 * (answer["upper"] - answer["lower"]) * pga_g
-        value = f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, certified)"
+        yield about
+        return
+    kr, ratio = rounded(answer["kr"]), rounded(answer["kr_over_pga"])
+    if answer["certified"]:
+        half_width = 0.5 * (upper - answer["lower"]) * pga_g
+        value, precision = f"k_r = {kr}", f"certified to ±{half_width:.0e}"
     else:
-        ends = f"{rounded(answer['kr'])} and {rounded(answer['upper'] * pga_g)}"
-        value = f"a k_r between {ends}, not certified"
-        ratio = f"{ratio} to {rounded(answer['upper'])}"
-    return (
-        f"The strongest block of p² = {answer['p2']:.3g} 1/s² that this motion topples has "
-        f"{value}, {ratio} of the PGA of {rounded(pga_g)} g."
-    )
+        value = f"k_r between {kr} and {rounded(upper * pga_g)}"
+        precision = f"not certified ({kr} is the strongest block seen to topple)"
+    if block_kr is None:
+        yield f"Critical {value}: {precision}"
+    else:
+        weaker, stronger = block_kr <= answer["kr"], block_kr > upper * pga_g
+        topples = "topples" if weaker else "does not topple" if stronger else "may topple"
+        yield (
+            f"The block (k_r = {rounded(block_kr)}) {topples}: the critical value of this record "
+            f"is {value}"
+        )
+    yield f"k_r/PGA = {ratio}, {precision}; {about}"
 
 
 def _scale_in_words(answer: Mapping[str, Any]) -> str:
@@ -158,7 +156,7 @@ def _scale_in_words(answer: Mapping[str, Any]) -> str:
         return SCALED_STATUS[answer["status"]]
     factor, pga = answer["scale"], answer["scale"] * answer["pga_g"]
     return (
-        f"This motion times {rounded(factor)} brings the block down, at a PGA of {rounded(pga)} g."
+        f"The block fails if the record is multiplied by {rounded(factor)} (PGA {rounded(pga)} g)"
     )
 
 
@@ -167,12 +165,12 @@ def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     first = document["thresholds"][0]
     if first["status"] == "found":
         yield (
-            f"On a level plane, blocks of k_y below {rounded(first['ky'])} slide further than "
-            f"{first['displacement_m']:g} m."
+            f"Critical k_y = {rounded(first['ky'])} for a displacement of "
+            f"{first['displacement_m']:g} m on a level plane"
         )
     else:
         yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
-    yield "On a base that dips, displacements are cos(phi - beta)/cos(phi) times these."
+    yield "On a dipping base, displacements are larger by cos(φ − β)/cos φ"
 
 
 def strongest_kr(spectrum: Mapping[str, Any]) -> list[float]:
@@ -199,10 +197,7 @@ def spectrum_in_words(spectra: Sequence[Mapping[str, Any]]) -> str:
         f"{rounded(kr)} at p² = {p2:g} 1/s²" for p2, kr in zip(first["p2"], largest, strict=True)
     ]
     ends = sizes[0] if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
-    return (
-        f"{first['name']} (PGV {rounded(first['pgv_m_s'])} m/s) topples no block whose k_r is more "
-        f"than 2 % above that of its size: {ends}."
-    )
+    return f"{first['name']} (PGV {rounded(first['pgv_m_s'])} m/s): critical k_r, to 2 %, {ends}"
 
 
 def motion_in_words(document: Mapping[str, Any], *, flags: int) -> str:

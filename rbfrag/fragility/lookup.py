@@ -30,7 +30,7 @@ from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.results.diagnostic import Diagnostic
 
-SHIPPED = "the reference that is shipped with rbfrag"
+SHIPPED = "the built-in data set"
 """What answers are said to come from where no other database is named, or is there."""
 
 _Stamp = tuple[int, ...]

@@ -289,8 +289,8 @@ TOPPLING_BLOCK = BlockParameters(
     ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
     # the stored grid ends at 4 PGV, and no excursion from rest exceeds 2 PGV
     safe_steps=10,
-    support="the block is taken to be backed by a slope; one that stands free rocks about both "
-    "edges and overturns in weaker shaking",
+    support="assumed backed by a rock face; a free-standing block overturns in weaker shaking "
+    "(kind rocking)",
 )  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 

@@ -41,7 +41,7 @@ class Prediction:
             fail over all earthquakes and sites is known.
         ci_high: upper end of it.
         event_low: lower end of the share of like blocks, facing all sides, that fails at the sites
-            asked for in one earthquake; None where none are, as one block falls or stands, and
+            asked for in one earthquake; None where none are, and
             where the model does not know what its blocks share.
         event_high: upper end of it.
         level: confidence level of the interval, and probability of that range.

@@ -1,89 +1,92 @@
-"""What a probability means, in sentences and rounded as people say it."""
+"""Answers about probabilities in words: the headline, labelled lines, and names of models."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rbfrag.results.numbers import confidence, interval, percent, with_interval
 from rbfrag.solver.kinds import BY_MECHANICS
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
 
 
-def percent(share: float) -> str:
-    """Return a share in percent with two digits."""
-    if 0.0 < share < 5e-5:
-        return "below 0.01 %"
-    if 0.9995 <= share < 1.0:
-        return "above 99.9 %"
-    digits = 0 if share in (0.0, 1.0) or 0.0995 <= share < 0.995 else 1 if share >= 0.001 else 2
-    return f"{100.0 * share:.{digits}f} %"
+LIMIT_STATES = {"toppling": "toppling", "rocking": "overturning", "confined_toppling": "toppling"}
+"""Limit states of blocks that turn over, by kind; others are named by the answer itself."""
 
 
-def interval(low: float, high: float) -> str:
-    """Return an interval of shares in percent; one share where its ends read alike."""
-    return " to ".join(dict.fromkeys((percent(low), percent(high))))
-
-
-def with_interval(share: float, low: float, high: float) -> str:
-    """Return a share in percent with its interval, unless that says no more."""
-    ends = interval(low, high)
-    return ends if ends == percent(share) else f"{percent(share)} ({ends})"
-
-
-def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what P, its interval and the range at some sites mean, in counts of blocks.
+def headline(document: Mapping[str, Any]) -> str:
+    """Return the probability with its interval: "P(toppling) = 15 %   (95 % confidence …)".
 
     Args:
         document: an answer under the keys of the JSON contract.
     """
-    p, level = document["probability"], f"{100.0 * document['level']:g} %"
-    low, high = document["ci_low"], document["ci_high"]
-    event_low, sites = document["event_low"], document.get("sites")
-    questions = units_to_check(document["warnings"])
-    if p == 1.0 and document["how"] == BY_MECHANICS:
-        return (*questions, "P(failure) = 1   the block is unstable without shaking (by mechanics)")
-    of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
-    if high == 0.0:
-        return (*questions, "No such block fails.")
-    of_block = document.get("block_sd")
-    # what slides too far or slumps past a limit does not fall
-    fall = "fall" if document["mode"] == "topple" else "fail"
-    count, ends = _count(p, of), _range(low, high, of)
-    one = "s" if count in ("1", "fewer than 1") else ""
-    known = f"{'' if ends == count else f'{ends} '}as far as the data tell it"
-    sentences = [
-        *questions,
-        f"This block {fall}s or stands; of {of:,} such cases {count} {fall}{one} ({known}, "
-        f"{level}).",
+    p, how = document["probability"], document["how"]
+    state = LIMIT_STATES.get(document["kind"], document["failure"])
+    if p in (0.0, 1.0) and how == BY_MECHANICS:
+        reason = "   the block is unstable without shaking" if p == 1.0 else ""
+        return f"P({state}) = {p:g}{reason}   (by mechanics)"
+    ends = confidence(document["level"], interval(document["ci_low"], document["ci_high"]))
+    return f"P({state}) = {percent(p)}   ({ends})"
+
+
+def lines(document: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield label and text of what was asked and of what the answer holds besides P.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+        given: numbers of the block and measures that it is the answer for.
+    """
+    if shaking := shaking_in_words(document.get("shaking") or {}, given):
+        yield "Shaking", shaking
+    if (sites := document.get("sites")) is not None:
+        yield "Sites", _at_sites_in_words(document, sites)
+    if block := block_in_words(document["method"], given):
+        yield "Block", block
+    if (sd := document.get("block_sd")) is not None:
+        yield "", f"block uncertainty: standard deviation of P {sd:.2g}"
+    if drained := drained_in_words(document):
+        yield "Drained", drained
+    inside = "within" if document["in_domain"] else "outside"
+    answers = document["model"] if document["how"] != BY_MECHANICS else "mechanics, not the model"
+    yield "Model", f"{answers}, {document['data']}; inputs {inside} the fitted range"
+
+
+def shaking_in_words(shaking: Mapping[str, Any], given: Mapping[str, Any]) -> str:
+    """Return the measures of a question: "PGV 0.9 m/s, PGA 0.6 g"; medians where they scatter."""
+    from rbfrag.fragility.measures import STATED
+
+    parts = [
+        f"{_measure(name)} {given[name]:.4g} {_unit(name)}".rstrip()
+        for name in STATED
+        if isinstance(given.get(name), int | float) and name not in shaking
+        and not name.endswith(("_sigma", "_tau"))
+    ]  # fmt: skip
+    parts += [
+        f"median {_measure(name)} {about['median']:.2g} {_unit(name)}, σ_ln {about['sigma']:.2g}, "
+        "integrated"
+        for name, about in shaking.items()
     ]
-    if sites is not None:
-        where = f"At {at_sites(sites)}"
-        sentences.append(
-            f"{where} it is not known what share of such blocks {fall}s together."
-            if event_low is None
-            else f"{where}, facing all sides, {_range(event_low, document['event_high'], 100)} of "
-            f"100 such blocks {fall} ({level})."
-        )
-    if of_block is not None:
-        sentences.append(
-            "The block is uncertain: among what it may be, P differs with a standard deviation of "
-            f"{of_block:.2g}."
-        )
-    for name, about in (document.get("shaking") or {}).items():
-        low, high = (about["median"] * math.exp(end * about["sigma"]) for end in (-1.0, 1.0))
-        measure, _, unit = name.partition("_")
-        sentences.append(
-            f"The shaking is uncertain: the median of {measure.upper()} is {about['median']:.3g} "
-            f"{unit.replace('_', '/')} with a scatter of {about['sigma']:.2f} in ln, {low:.2g} to "
-            f"{high:.2g} in two of three cases."
-        )
-    return tuple(sentences)
+    return ", ".join(parts)
 
 
-def drained_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
+def _unit(name: str) -> str:
+    return name.partition("_")[2].replace("m_s", "m/s")
+
+
+def _at_sites_in_words(document: Mapping[str, Any], sites: float) -> str:
+    where = f"in one earthquake at {sites:,g} such site{'s' if sites > 1 else ''}"
+    if document["event_low"] is None:
+        return f"{where}: unknown which fraction of the blocks fails"
+    ends = interval(document["event_low"], document["event_high"])
+    verb = {"toppling": "topple", "rocking": "overturn", "sliding": "slide too far",
+            "slumping": "slump", "confined_toppling": "topple"}  # fmt: skip
+    level = f"{100.0 * document['level']:g} %"
+    return f"{where}, {ends} of the blocks {verb[document['kind']]} ({level} prediction interval)"
+
+
+def drained_in_words(document: Mapping[str, Any]) -> str:
     """Return the drained bound of a block with water behind it; empty for a dry block.
 
     Args:
@@ -91,10 +94,10 @@ def drained_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     """
     bound = document.get("drained")
     if bound is None:
-        return ()
+        return ""
     yields = [f"{SYMBOLS[n]} = {bound[n]:.3g}, " for n in SYMBOLS if bound.get(n) is not None]
     p = with_interval(bound["probability"], bound["ci_low"], bound["ci_high"])
-    return (f"Drained, without water pressure: {''.join(yields)}P = {p}.",)
+    return f"{''.join(yields)}P = {p}, without water pressure"
 
 
 def units_to_check(warnings: Iterable[str]) -> list[str]:
@@ -107,20 +110,8 @@ def at_sites(number: float) -> str:
     return f"{number:,g} site{'s' if number > 1 else ''} of one earthquake"
 
 
-def _count(share: float, of: int) -> str:
-    count = round(share * of)
-    if count in (0, of) and 0.0 < share < 1.0:
-        return "fewer than 1" if count == 0 else f"more than {of - 1:,}"
-    return f"{count:,}"
-
-
-def _range(low: float, high: float, of: int) -> str:
-    ends = _count(low, of), _count(high, of)
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
-
-
-def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what is asked about: the numbers of a block, and how it is taken to stand.
+def block_in_words(method: str, given: Mapping[str, Any]) -> str:
+    """Return the numbers of a block and how it stands: "p² = 7.21 s⁻², k_r = 0.2; rock …".
 
     Args:
         method: the one that the model which answers is fitted by.
@@ -131,36 +122,15 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     block = method_named(method).block
     values = {name: given.get(name) for name in (block.size, block.strength) if name is not None}
     if not all(isinstance(value, (int, float)) for value in values.values()):
-        return ()
-    units = {block.size: " 1/s²"}
-    too_far = given.get("displacement_m")
-    limit = (
-        (f"It has failed when it has slid further than {too_far:g} m.",)
-        if isinstance(too_far, (int, float))
-        else ()
-    )
-    numbers = " and ".join(
-        f"{SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
+        return ""
+    numbers = [
+        f"{SYMBOLS.get(name, name)} = {value:.3g}{' s⁻²' if name == block.size else ''}"
         for name, value in values.items()
-    )
-    stands = (f"{block.support[:1].upper()}{block.support[1:]}.",) if block.support else ()
-    return (f"The block has {numbers}.", *limit, *stands)
-
-
-GLOSSARY = {
-    "p²": "15/p² m is a rectangle's diagonal",
-    "k_r": "acceleration in g that lifts it",
-    "k_y": "acceleration in g that moves it",
-    "in domain": "such as the data",
-    "copula": "how the failures of one earthquake go together",
-}
-"""What a geologist cannot know of the words in answers."""
-
-
-def glossary(*texts: str) -> str:
-    """Return what words of some texts mean, each once; empty where none needs it."""
-    meanings = (f"{word}: {GLOSSARY[word]}" for word in GLOSSARY if any(word in t for t in texts))
-    return "; ".join(meanings)
+    ]
+    limit_m = given.get("displacement_m")
+    if isinstance(limit_m, (int, float)):
+        numbers.append(f"displacement limit {limit_m:g} m")
+    return "; ".join(filter(None, (", ".join(numbers), block.support)))
 
 
 def model_in_words(document: Mapping[str, Any]) -> str:

@@ -64,9 +64,6 @@ def as_dict(tau: float | None) -> dict[str, float] | None:
 
 
 def in_words(tau: float) -> str:
-    """Return the spread between measures in a sentence."""
+    """Return the factors by which another intensity measure may change a rate, in words."""
     low, high = factors_between(tau)
-    return (
-        f"Measures: other measures of the same shaking would give {low:.2f} to {high:.2f} times as "
-        "many, beside all intervals."
-    )
+    return f"Not included in the interval: choice of intensity measure, × {low:.2f}–{high:.2f}"

@@ -8,9 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.fragility.words import percent
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.results.numbers import (
+    NEVER,
+    confidence,
+    return_period,
+    return_periods,
+    with_interval,
+    years,
+)
 from rbfrag.solver.kinds import by_model
 from rbfrag.solver.results import FloatArray
 
@@ -144,38 +151,40 @@ def _in_common(answer: HazardAnswer, places: Sequence[str | None]) -> dict[str, 
     }
 
 
-def once_in(annual_rate: float) -> str:
-    """Return a rate as people say it: once in so many years."""
-    if not annual_rate > 1e-8:
-        return "less than once in a hundred million years"
-    return f"once in {float(f'{1.0 / annual_rate:.2g}'):,.15g} years"
-
-
-def rate_in_words(document: Mapping[str, Any]) -> str:
-    """Return how often one block fails.
+def rate_in_words(document: Mapping[str, Any], ends_early: str = "") -> tuple[str, ...]:
+    """Return the return period of a block with its interval, its rate, and the drained bound.
 
     Args:
         document: an answer of `rbfrag hazard` for one block under the keys of the JSON contract.
+        ends_early: what :func:`range_in_words` says of a curve that ends too early.
     """
-    rate, ends = document["annual_rate"], (document["ci_high"], document["ci_low"])
-    most, least = (once_in(end).removeprefix("once in ").removesuffix(" years") for end in ends)
-    interval = f" ({most} to {least}, {100.0 * document['level']:g} %)"
-    bound = document.get("drained")
-    drained = "" if bound is None else f" Drained: {once_in(bound['annual_rate'])}."
-    return (
-        f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
-        f"probability of {percent(document['probability'])} in {document['years']:g} years."
-        f"{drained}"
+    rate, low, high = (document[name] for name in ("annual_rate", "ci_low", "ci_high"))
+    length_years, bound = document["years"], document.get("drained")
+    ends = confidence(document["level"], return_periods(low, high))
+    chances = [1.0 - math.exp(-end * length_years) for end in (low, high)]
+    sentences = [ends_early or f"Return period of failure {return_period(rate)}   ({ends})"]
+    sentences.append(
+        f"Mean annual rate {rate:.2g} /yr; P(failure in {length_years:g} years) = "
+        f"{with_interval(document['probability'], *chances)}"
     )
+    if bound is not None:
+        sentences.append(f"Drained return period {return_period(bound['annual_rate'])}")
+    return tuple(sentences)
 
 
-def beyond_in_words(answer: HazardAnswer) -> tuple[str, ...]:
-    """Return what shaking beyond the end of a curve may do to one block, where that is much."""
+def range_in_words(answer: HazardAnswer) -> str:
+    """Return the range of the return period where the curve ends too early; empty elsewhere.
+
+    Stronger shaking than the last level may more than double the rate of the one block.
+    """
     rate = float(answer.annual_rate[0])
     most = rate + float(answer.above_at_most[0] - answer.above[0])
     if not most > 2.0 * rate:
-        return ()
+        return ""
+    curve = answer.curves[0]
+    unit = {"pgv_m_s": "m/s"}.get(curve.measure, "g")
+    least = f"between {years(most)} and {return_period(rate)}"
     return (
-        "The curve ends too early to tell: with the stronger shaking that it leaves out it may be "
-        f"up to {once_in(most)}.",
+        f"Return period of failure {least if rate > NEVER else f'at least {years(most)} years'}: "
+        f"the hazard curve ends at {curve.imt} = {curve.levels[-1]:g} {unit}"
     )

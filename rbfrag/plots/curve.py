@@ -170,11 +170,11 @@ def draw_curve(
     if sites is not None and not np.isnan(answer.event_low).all():
         axes.fill_between(
             x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,
-            label=f"share failing at {at_sites(sites)} ({percent})",
+            label=f"{percent} prediction interval, {at_sites(sites)}",
         )  # fmt: skip
     axes.fill_between(
         x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,
-        label=f"interval of P, as far as the data tell it ({percent})",
+        label=f"{percent} confidence interval",
     )  # fmt: skip
     if not known.all():
         outside = "outside the fitted range"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.words import with_interval
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.standing import Standing
@@ -16,6 +15,7 @@ from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
 from rbfrag.plots import canvas
 from rbfrag.plots.hazard import measure_title
 from rbfrag.plots.labels import as_written, write_near
+from rbfrag.results.numbers import with_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

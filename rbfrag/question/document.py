@@ -202,7 +202,8 @@ def _as_rotd50(
     model: FragilityModel, inputs: Mapping[str, ArrayLike], weights: ArrayLike | None
 ) -> Diagnostic:
     """Return the note that a single component is assumed, with P for RotD50."""
-    from rbfrag.fragility.words import measures_in_words, percent
+    from rbfrag.fragility.words import measures_in_words
+    from rbfrag.results.numbers import percent
 
     rotd50 = answer_given(model, to_single_component(inputs, "rotd50"), 0.95, weights=weights)
     assert isinstance(rotd50, Prediction)

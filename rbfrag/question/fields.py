@@ -541,7 +541,7 @@ class AnsweringFields(TypedDict, total=False):
         str | PathLike[str] | None,
         Field(
             "Database: a path or an SQLAlchemy URL; default: RBFRAG_DB, else rbfrag.db in the "
-            "current folder, else the reference that is shipped",
+            "current folder, else the built-in data set",
             is_text=True,
         ),
     ]
@@ -554,7 +554,7 @@ class RangeFields(AnsweringFields, total=False):
         float | None,
         Field(
             "Number of sites shaken so in one earthquake: adds what share of such blocks, facing "
-            "all sides, fails there; default: one block, which falls or stands",
+            "all sides, fails there; default: none",
             least=1.0,
             most=10_000.0,
         ),

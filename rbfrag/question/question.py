@@ -74,7 +74,7 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     F(eta ± t s) says how well that is known, s being the standard error of eta from the fits that
     each leave an earthquake out and t Student's quantile for as many earthquakes as tell of this
     block. With ``sites`` a range says what share of like blocks fails at so many sites of one
-    earthquake; one block falls or stands. Without shaking, and where mechanics forbids failure
+    earthquake. Without shaking, and where mechanics forbids failure
     (k >= PGA, say), P is 0 whatever the model says.
 
     A block is given by p2 and kr (it topples, or rocks if `kind` says so), by ky and displacement_m

@@ -120,13 +120,12 @@ class ModelAnswer(_Document):
 class PredictAnswer(_Answer):
     """Probability that one block fails: what `rbfrag predict` prints as JSON.
 
-    `probability` is the share of such blocks that fail over all earthquakes and sites with these
-    measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
-    `event_low` and `event_high` between which shares of like blocks fail at `sites` of one
-    earthquake; null where no sites are asked for (one block falls or stands) and where that is not
-    known. `block_sd` is the standard deviation of P over what an uncertain block may be;
-    null where it is certain. `drained` is the answer without water pressure, with the yield
-    acceleration; null for a dry block.
+    `probability` is the mean over all earthquakes and sites with these intensity measures, `ci_low`
+    and `ci_high` its confidence interval. `event_low` and `event_high` are the prediction interval
+    of the fraction of such blocks that fails at `sites` of one earthquake; null where no sites are
+    asked for and where that is unknown. `block_sd` is the standard deviation of P over what an
+    uncertain block may be; null where it is certain. `drained` is the answer without water
+    pressure, with the yield acceleration; null for a dry block.
     """
 
     mode: str

@@ -2,83 +2,73 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
 
-import rbfrag
 from rbfrag.fragility.words import (
     block_in_words,
-    glossary,
+    headline,
+    lines,
     model_in_words,
-    percent,
-    prediction_in_words,
-    with_interval,
 )
+from rbfrag.results.numbers import percent, with_interval
 from tests.cli.conftest import Shell
 
 
-def words(p: float, low: float, high: float, **more: Any) -> tuple[str, ...]:
-    document = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high}
-    document |= {"event_low": None, "warnings": []}
-    return prediction_in_words({**document, "mode": "topple", **more})
+def document(p: float, low: float, high: float, **more: Any) -> dict[str, Any]:
+    answer = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high, "how": "model m"}
+    answer |= {"kind": "toppling", "failure": "toppling", "model": "m", "data": "a file"}
+    answer |= {"method": "bounded", "in_domain": True, "event_low": None, "event_high": None}
+    return answer | more
 
 
-def test_one_block_falls_or_stands() -> None:
-    assert words(0.13, 0.11, 0.152) == (
-        "This block falls or stands; of 100 such cases 13 fall "
-        "(11 to 15 as far as the data tell it, 95 %).",
+def test_the_headline_is_the_probability_with_its_interval() -> None:
+    assert headline(document(0.148, 0.074, 0.261)) == (
+        "P(toppling) = 15 %   (95 % confidence interval 7.4–26 %)"
     )
-    assert words(0.13, 0.11, 0.152, sites=5, event_low=0.0, event_high=0.4)[1:] == (
-        "At 5 sites of one earthquake, facing all sides, 0 to 40 of 100 such blocks fall (95 %).",
+    rocking = document(0.148, 0.074, 0.261, kind="rocking", level=0.9)
+    assert headline(rocking) == "P(overturning) = 15 %   (90 % confidence interval 7.4–26 %)"
+    slide = document(0.5, 0.4, 0.6, kind="sliding", failure="displacement above 0.1 m")
+    assert headline(slide).startswith("P(displacement above 0.1 m) = 50 %")
+    ruled = {"how": "by mechanics"}
+    assert headline(document(0.0, 0.0, 0.0, **ruled)) == "P(toppling) = 0   (by mechanics)"
+    assert headline(document(1.0, 1.0, 1.0, **ruled)) == (
+        "P(toppling) = 1   the block is unstable without shaking   (by mechanics)"
     )
-    (_, unknown) = words(0.13, 0.11, 0.152, sites=1)
-    assert unknown == (
-        "At 1 site of one earthquake it is not known what share of such blocks falls together."
+
+
+def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
+    given = {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6, "pga_g": 0.5}
+    found = dict(lines(document(0.2, 0.1, 0.3), given))
+    assert found["Shaking"] == "PGV 0.6 m/s, PGA 0.5 g"
+    assert found["Block"].startswith("p² = 7.14 s⁻², k_r = 0.25; assumed backed by a rock face")
+    assert found["Model"] == "m, a file; inputs within the fitted range"
+    about = {"pgv_m_s": {"median": 0.17, "sigma": 0.67, "tau": None}}
+    more = document(0.2, 0.1, 0.3, shaking=about, sites=5, event_low=0.0, event_high=0.1,
+                    in_domain=False, block_sd=0.12)  # fmt: skip
+    found = dict(lines(more, given))
+    assert found["Shaking"] == "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67, integrated"
+    assert found["Sites"] == (
+        "in one earthquake at 5 such sites, 0–10 % of the blocks topple (95 % prediction interval)"
     )
-    (slide,) = words(0.13, 0.11, 0.152, mode="slide")
-    assert slide.startswith("This block fails or stands; of 100 such cases 13 fail (11")
+    assert found[""] == "block uncertainty: standard deviation of P 0.12"
+    assert found["Model"].endswith("inputs outside the fitted range")
 
 
-@pytest.mark.parametrize(
-    ("p", "low", "high", "said"),
-    [
-        (0.004, 0.001, 0.008, "of 1,000 such cases 4 fall (1 to 8 "),
-        (0.9996, 0.99, 1.0, "of 10,000 such cases 9,996 fall (9,900 to 10,000 "),
-        (1e-7, 1e-9, 1e-6, "cases fewer than 1 falls (as far as"),
-        (0.99999, 0.99998, 0.999999, "of 10,000 such cases more than 9,999 fall (as far as"),
-        (0.0101, 0.01, 0.02, "cases 1 falls (1 to 2 as"),
-        (0.5, 0.5, 0.5, "50 fall (as"),
-    ],
-)
-def test_counts_tell_p_from_0_and_1(p: float, low: float, high: float, said: str) -> None:
-    (sentence,) = words(p, low, high)
-    assert said in sentence
-
-
-def test_what_cannot_fail_is_said_once() -> None:
-    assert words(0.0, 0.0, 0.0) == ("No such block fails.",)
-
-
-def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
-    numbers, backed = block_in_words("bounded", {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6})
-    assert numbers == "The block has p² = 7.14 1/s² and k_r = 0.25."
-    assert backed.startswith("The block is taken to be backed by a slope")
-    assert "stand free" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})[1]
-    assert block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3}) == (
-        "The block has k_y = 0.1.",
-        "It has failed when it has slid further than 0.3 m.",
-    )
-    assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ()
+def test_the_block_is_named_with_how_it_is_assumed_to_stand() -> None:
+    assert "free-standing" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})
+    slide = block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3})
+    assert slide == "k_y = 0.1, displacement limit 0.3 m"
+    assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ""
 
 
 @pytest.mark.parametrize(
     ("share", "said"),
     [
-        (0.0, "0 %"), (1e-9, "below 0.01 %"), (3e-4, "0.03 %"), (0.0123, "1.2 %"),
-        (0.1161, "12 %"), (0.996, "99.6 %"), (0.9999, "above 99.9 %"), (1.0, "100 %"),
-        (199 / 200, "99.5 %"), (0.9949, "99 %"),
+        (0.0, "0 %"), (1e-9, "<0.01 %"), (3e-4, "0.030 %"), (0.0123, "1.2 %"),
+        (0.1161, "12 %"), (0.996, "99.6 %"), (0.99995, ">99.99 %"), (1.0, "100 %"),
+        (199 / 200, "99.5 %"), (0.9949, "99 %"), (0.0996, "10 %"), (0.0994, "9.9 %"),
     ],
 )  # fmt: skip
 def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
@@ -86,8 +76,8 @@ def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
 
 
 def test_an_interval_that_says_no_more_is_left_out() -> None:
-    assert with_interval(1e-5, 1e-6, 3e-5) == "below 0.01 %"
-    assert with_interval(0.13, 0.11, 0.152) == "13 % (11 % to 15 %)"
+    assert with_interval(1e-5, 1e-6, 3e-5) == "<0.01 %"
+    assert with_interval(0.13, 0.11, 0.152) == "13 % (11–15 %)"
     assert with_interval(0.13, 0.131, 0.1312) == "13 %"
 
 
@@ -111,20 +101,6 @@ def test_models_of_the_reference_are_told_apart(shell: Shell) -> None:
     of = [(row["kind"], model_in_words({**row, "model": row["name"]})) for row in rows]
     same = [each for each in of if of.count(each) > 1]
     assert {kind for kind, _ in same} == {"slumping"}  # which differ by what counts as failure
-
-
-def test_words_that_a_geologist_cannot_know_are_told_once(shell: Shell) -> None:
-    assert glossary("The block has p_s² = 3.") == ""
-    assert glossary("p² = 3", "p² and k_r").count("p²:") == 1
-    printed = shell("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6").stdout
-    assert printed.splitlines()[-1].startswith("(p²: 15/p² m is a rectangle's diagonal; k_r: ")
-    assert "model        PGV, size-dependent" in printed
-    named = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")["model"]
-    assert named == "bounded-pgv_kr"
-    # 15/p²: a rectangle's p² is 3 g/2 over its diagonal
-    assert 1.5 * 9.80665 / rbfrag.Block.rectangle(2.4, 0.5).p2 == pytest.approx(
-        math.hypot(2.4, 0.5)
-    )
 
 
 def test_other_suited_models_are_listed_and_none_is_said_to_be_wrong(shell: Shell) -> None:

@@ -5,22 +5,29 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words, most_often
-from rbfrag.cli.sentences import rock_mass_in_words, rounded, table_in_words
-from rbfrag.hazards.report import once_in, rate_in_words
+from rbfrag.cli.sentences import rock_mass_in_words, table_in_words
+from rbfrag.hazards.report import rate_in_words
+from rbfrag.results.numbers import return_period, return_periods, rounded
 
 
 @pytest.mark.parametrize(
     ("rate", "said"),
     [
-        (1.0 / 4158.2, "once in 4,200 years"),
-        (1.0 / 847.0, "once in 850 years"),
-        (1.0 / 24340.0, "once in 24,000 years"),
-        (0.4, "once in 2.5 years"),
-        (0.0, "less than once in a hundred million years"),
+        (1.0 / 4158.2, "4,200 years"),
+        (1.0 / 847.0, "850 years"),
+        (1.0 / 24340.0, "24,000 years"),
+        (0.4, "2.5 years"),
+        (0.0, "over 100 million years"),
     ],
 )
-def test_once_in_so_many_years(rate: float, said: str) -> None:
-    assert once_in(rate) == said
+def test_return_periods_have_two_digits(rate: float, said: str) -> None:
+    assert return_period(rate) == said
+
+
+def test_an_interval_of_return_periods_starts_with_the_shorter() -> None:
+    assert return_periods(1.0 / 5312.0, 1.0 / 3704.0) == "3,700–5,300"
+    assert return_periods(0.0, 1.0 / 3704.0) == "3,700–over 100 million"
+    assert return_periods(0.001, 0.001001) == "1,000"
 
 
 def test_a_rate_with_its_interval_from_the_shorter_time_to_the_longer() -> None:
@@ -29,9 +36,12 @@ def test_a_rate_with_its_interval_from_the_shorter_time_to_the_longer() -> None:
         "years": 50.0, "level": 0.95,
     }  # fmt: skip
     assert rate_in_words(document) == (
-        "The block fails once in 4,200 years on average (3,400 to 5,300, 95 %), with a probability "
-        "of 1.2 % in 50 years."
+        "Return period of failure 4,200 years   (95 % confidence interval 3,400–5,300)",
+        "Mean annual rate 0.00024 /yr; P(failure in 50 years) = 1.2 % (0.94–1.5 %)",
     )
+    drained = {**document, "drained": {"annual_rate": 1e-4}}
+    assert rate_in_words(drained)[2] == "Drained return period 10,000 years"
+    assert rate_in_words(drained, "Return period between")[0] == "Return period between"
 
 
 @pytest.mark.parametrize(
@@ -75,8 +85,8 @@ def test_how_many_rows_are_answered() -> None:
 def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
     fails = {"share": 0.2, "ci_low": 0.15, "ci_high": 0.26}
     for unknown, end in (
-        (0.0, "26 %) fail."),
-        (0.3, "; of another 30 % it is open whether they do."),
+        (0.0, "20 % (15–26 %) of the blocks fail"),
+        (0.3, "20 % (15–26 %) of the blocks fail; 30 % undetermined"),
     ):
         document = {
             "modes": {"slide": {"share": 1.0}}, "blocks": 200, "scenario": None,
@@ -93,6 +103,5 @@ def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
 def test_the_blocks_that_fail_most_often_come_first() -> None:
     rates = [1e-3, 0.0, 4e-3, 2e-3, 1e-4]
     assert most_often(["a", "b", None, "d", "e"], rates) == (
-        "Most often fail block 3 (once in 250 years), d (once in 500 years) and a (once in 1,000 "
-        "years)."
+        "Shortest return periods: block 3 (250 years), d (500 years), a (1,000 years)"
     )

@@ -16,7 +16,8 @@ import rbfrag
 from rbfrag.fragility.lookup import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.report import sheet
-from rbfrag.plots.report.contents import RateQuestion, contents_of, return_period
+from rbfrag.plots.report.contents import RateQuestion, contents_of
+from rbfrag.results.numbers import return_period
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 
 __all__ = ["refuses", "shell"]
@@ -64,7 +65,7 @@ def test_a_report_says_what_was_asked_and_answered(shell: Shell, suffix: str) ->
     for text in (
         "Rock above the mill", "1 May 2026", "2.4 m", "0.5 m", "3°", "35°", "0.6 m/s",
         "probability in 100 years", f"rbfrag {rbfrag.__version__}", told["model"], "curve.csv",
-        "100 earthquakes", "the reference that is shipped",
+        "100 earthquakes", "the built-in data set",
     ):  # fmt: skip
         assert text in words, text
     for warning in told["warnings"][:-1]:

@@ -20,7 +20,6 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import Prediction
-from rbfrag.fragility.words import percent
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import hazard_curves_in
 from rbfrag.hazards.shaking import LevelShaking
@@ -33,6 +32,7 @@ from rbfrag.question.components import (
 from rbfrag.question.document import prediction_document
 from rbfrag.question.fields import option_of, parameter_of
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.numbers import percent
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 

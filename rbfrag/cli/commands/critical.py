@@ -89,6 +89,7 @@ def critical(
 
     rotation, displacement = searched.rotation, searched.displacement
     block, about = _searched_block(given, searched.kind)
+    block_kr = _strength_of(block) if "block" in block else None
     model = _chosen_kind(searched.kind, block, displacement)
     _refuse_options_of_other_kinds(
         model,
@@ -133,7 +134,8 @@ def critical(
         return
     warnings = answer.pop("warnings")
     rows = answer.pop("map", [])
-    print(critical_in_words(answer))
+    for sentence in critical_in_words(answer, block_kr):
+        print(sentence)
     print()
     print_pairs(
         answer if printing.verbose else {name: answer[name] for name in SHORT if name in answer}
@@ -218,6 +220,14 @@ def _searched_block(given: Given, kind: str | None) -> tuple[dict[str, Any], tup
                 )
     read = {name: value for name, value in planes.items() if name in PLANES or name not in JOINT}
     return {"block": shape.block, **read}, after
+
+
+def _strength_of(block: dict[str, Any]) -> float | None:
+    """Return k_r of the block of a search; None of one that does not topple."""
+    from rbfrag.solver.stability.single import stability
+
+    planes = {name: value for name, value in block.items() if name != "block"}
+    return stability(block["block"], **planes).kr
 
 
 def _slides(

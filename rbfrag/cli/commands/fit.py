@@ -16,8 +16,8 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.sentences import rounded
 from rbfrag.fragility.words import fitted_in_words
+from rbfrag.results.numbers import rounded
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport

@@ -10,7 +10,6 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
-    print_glossary,
     print_json,
     print_pairs,
     print_rows,
@@ -22,10 +21,11 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import model_in_words, percent
-from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
+from rbfrag.fragility.words import model_in_words
+from rbfrag.hazards.report import range_in_words, rate_in_words
 from rbfrag.question.fields import BlockFields, WholeFields
 from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.numbers import confidence, percent, return_period
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -229,10 +229,9 @@ def _print(
         if len(shown) < len(rows):
             print(f"{len(rows) - len(shown):,} more: --out FILE writes all, --verbose prints them")
     else:
-        print(rate_in_words(document))
-        del document["contributions"], document["drained"]
-        for sentence in beyond_in_words(answer):
+        for sentence in rate_in_words(document, range_in_words(answer)):
             print(sentence)
+        del document["contributions"], document["drained"]
         if spread is not None:
             print(spread)
         print()
@@ -243,8 +242,7 @@ def _print(
         if branches:
             print()
             print_table(list(branches[0]), [list(row.values()) for row in branches])
-    if verbose:
-        print_glossary(str(document.get("joint_law")))
+    print()
     print_warnings(warnings)
 
 
@@ -258,31 +256,27 @@ def _of_all(answer: HazardAnswer) -> Iterator[str]:
     """Yield what all blocks do, in sentences."""
     size, sites = int(answer.count.sum()), len(answer.curves)
     expected = answer.expected_failures_per_year
-    ends = f"{answer.total_low:.2g} to {answer.total_high:.2g}, {100.0 * answer.level:g} %"
+    ends = confidence(answer.level, f"{answer.total_low:.2g}–{answer.total_high:.2g}")
     where = f" at {sites:,} sites" if sites > 1 else ""
-    yield (
-        f"{expected:.2g} failures a year ({ends}, by what is not known of the model) are expected "
-        f"of all {size:,} blocks{where}, several of them in one earthquake."
-    )
+    yield f"Expected failures {expected:.2g} /yr of {size:,} blocks{where}   ({ends})"
     for curve, joint in zip(answer.curves, answer.joints, strict=True):
         if joint is None:
             continue
         place = f"{curve.place}: at" if curve.place else "At"
+        period = f"P in {answer.years:g} years"
         rate, chance = joint.annual_rate_any, joint.probability_any
         if rate is not None and chance is not None:
             yield (
-                f"{place} least one of the blocks fails in an earthquake {once_in(rate)} on "
-                f"average, with a probability of {percent(chance)} in {answer.years:g} years."
+                f"{place} least one failure: return period {return_period(rate)}; {period} "
+                f"{percent(chance)}"
             )
             continue
         least, most = (
             percent(joint.bounds[name]["probability_any"])
             for name in ("fully_dependent", "independent")
         )
-        yield (
-            f"{place} least one of the blocks fails in {answer.years:g} years with a probability "
-            f"of {least} under full dependence and {most} if independent."
-        )
+        ends = f"{least} (full dependence) to {most} (independent)"
+        yield f"{place} least one failure: {period} {ends}"
 
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:

@@ -125,7 +125,7 @@ def plot_curve(
 ) -> None:
     """Draw the fragility curve of one block over a measure of the shaking.
 
-    The band is the interval of P as far as the data tell it; with --sites a second one is the share
+    The band is the confidence interval of P; with --sites a second one is the share
     of such blocks that fails at so many sites of one earthquake. The other measures are held at the
     values given.
     """

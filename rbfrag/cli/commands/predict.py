@@ -75,9 +75,9 @@ def predict(
 ) -> None:
     """Print the probability that a block fails.
 
-    P is the share of such blocks that fail over all earthquakes and sites with these measures, its
-    interval how well the data tell that share. One block falls or stands; with --sites a range says
-    what share of such blocks fails at so many sites of one earthquake.
+    P is the mean over all earthquakes and sites with these intensity measures, with its confidence
+    interval. With --sites a prediction interval gives the fraction of such blocks that fails at so
+    many sites of one earthquake.
 
     What is known of the motion decides which model answers: PGV, alone or with PGA, best with the
     spectral accelerations at 1 and 3 s or Tm, too; PGA with spectral accelerations; SA at 1 s or

@@ -20,7 +20,6 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import percent
 from rbfrag.question.fields import (
     FailureFields,
     JointFields,
@@ -29,6 +28,7 @@ from rbfrag.question.fields import (
     ShapeFields,
     WholeFields,
 )
+from rbfrag.results.numbers import percent
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block

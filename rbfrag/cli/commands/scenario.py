@@ -7,8 +7,8 @@ from typing import Annotated
 from rbfrag.cli.output import print_json, print_sentences, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, fields_of, stacked
-from rbfrag.cli.sentences import rounded
 from rbfrag.question.fields import SourceFields, declared
+from rbfrag.results.numbers import rounded
 
 EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse"
 

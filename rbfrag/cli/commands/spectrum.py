@@ -8,7 +8,8 @@ from rbfrag.cli.output import check_files, print_json, print_table, print_warnin
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.sentences import rounded, spectrum_in_words, strongest_kr
+from rbfrag.cli.sentences import spectrum_in_words, strongest_kr
+from rbfrag.results.numbers import rounded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -18,8 +18,8 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.cli.sentences import rounded
 from rbfrag.question.fields import BlockFields, WholeFields
+from rbfrag.results.numbers import rounded
 
 if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer

@@ -67,8 +67,8 @@ BLOCK = BlockParameters(
             "outside the model)",
         ),
     ),
-    support="the block is taken to stand free: a symmetric rectangle on level ground that rocks "
-    "about both edges, without vertical motion",
+    support="assumed free-standing: a symmetric rectangle on level ground that rocks about both "
+    "edges, without vertical motion",
 )
 """Free-standing blocks known by p² [1/s²], k_r = tan(critical angle) and, if given, restitution."""
 

@@ -42,7 +42,7 @@ class SiteProbability:
 
     Args:
         probability: P at each site, the mean over the blocks of a class, shape (n,).
-        ci_low: lower end of its interval, as far as the data tell the parameters of the model.
+        ci_low: lower end of its confidence interval (parameters of the model).
         ci_high: upper end.
         in_domain: whether every block and the site's shaking lie in the ranges fitted.
         level: confidence level.

@@ -22,7 +22,7 @@ from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.report import as_dict, beyond_in_words, rate_in_words
+from rbfrag.hazards.report import as_dict, range_in_words, rate_in_words
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
@@ -40,6 +40,7 @@ from rbfrag.question.fields import (
 from rbfrag.question.question import OF_SHAKING, described, without_water
 from rbfrag.question.words import number_in_words
 from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.numbers import interval, percent, return_period
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
@@ -162,14 +163,14 @@ def contents_of(
             answered.document["drained"] = {"annual_rate": bound.document["annual_rate"]}
     about_rate: tuple[str, ...] = ()
     if answered is not None:
-        about_rate = (rate_in_words(answered.document), *beyond_in_words(answered.answer))
+        about_rate = rate_in_words(answered.document, range_in_words(answered.answer))
     warnings = diagnostics(document["warnings"], answered.document["warnings"] if answered else ())
     return Contents(
         sentences=(
-            *words.prediction_in_words(document),
+            *words.units_to_check(document["warnings"]),
+            words.headline(document),
             *about_rate,
-            *words.block_in_words(document["method"], read),
-            *words.drained_in_words(document),
+            *(f"{label}: {text}" if label else text for label, text in words.lines(document, read)),
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
@@ -348,7 +349,7 @@ def _totals(
         law = "one block" if joint is None else joint.joint_law
         summary += [
             ("At least one failure", f"return period {return_period(any_rate)}"),
-            (f"P(at least one failure in {period})", f"{words.percent(chance)} ({law})"),
+            (f"P(at least one failure in {period})", f"{percent(chance)} ({law})"),
         ]
         totals |= {"annual_rate_any": any_rate, "probability_any": chance, "joint_law": law}
     elif joint is not None:
@@ -357,7 +358,7 @@ def _totals(
         ]
         summary.append(
             (f"P(at least one failure in {period})",
-             f"{words.interval(*ends)} (full dependence to independence)")
+             f"{interval(*ends)} (full dependence to independence)")
         )  # fmt: skip
         totals |= {"bounds": joint.bounds}
     return tuple(summary), totals, answer.warnings
@@ -441,24 +442,15 @@ def _block_rows(
     return tuple(rows)
 
 
-def return_period(annual_rate: float) -> str:
-    """Return a return period in years, with three digits."""
-    if not annual_rate > 1e-8:
-        return "above 100 million years"
-    return f"{float(f'{1.0 / annual_rate:.3g}'):,.15g} years"
-
-
 def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
     level = f"{100.0 * document['level']:g} %"
     answer = [
-        ("probability of failure", words.percent(document["probability"])),
-        (f"interval ({level})", words.interval(document["ci_low"], document["ci_high"])),
+        ("probability of failure", percent(document["probability"])),
+        (f"interval ({level})", interval(document["ci_low"], document["ci_high"])),
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append(
-            (f"share at {words.at_sites(document['sites'])} ({level})", words.interval(*ends))
-        )
+        answer.append((f"share at {words.at_sites(document['sites'])} ({level})", interval(*ends)))
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
@@ -473,7 +465,7 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
         ("annual rate of failure", f"{document['annual_rate']:.3g} 1/a"),
         (f"interval ({level})", f"{document['ci_low']:.2g} to {document['ci_high']:.2g} 1/a"),
         ("return period", return_period(document["annual_rate"])),
-        (f"probability in {document['years']:g} years", words.percent(document["probability"])),
+        (f"probability in {document['years']:g} years", percent(document["probability"])),
     )
 
 

@@ -53,17 +53,18 @@ def test_words_count_what_the_numbers_say(run):
         ]
     ]
     twelve, few, most, hardly, none = run("percent.js", "inOneSentence", [[a] for a in answers])
-    assert twelve.endswith("shaking like this, about 12 topple.")
-    assert few.endswith("about 4 overturn.")
-    assert most.endswith("about 9\u202f996 slide too far.")
-    assert hardly.endswith("fewer than 1 slump.")
-    assert none.startswith("No earthquake motion")
-    twelve, few, most, hardly, none = run("percent.js", "ranges", [[a] for a in answers])
-    assert "it is between 8 and 17. At 5 sites of one earthquake, facing all sides" in twelve
-    assert "earthquake" not in few
-    assert "almost all" in most
-    assert hardly.startswith("As far as the data tell, it is fewer than 1.")
-    assert none == ""
+    assert twelve == "95\u00a0% confidence interval 8.0–17\u00a0%"
+    assert few.endswith("interval 0.10–2.0\u00a0%")
+    assert most.endswith("interval 90–>99.99\u00a0%")
+    assert hardly.endswith("interval <0.01\u00a0%")
+    assert none.startswith("By mechanics")
+    twelve, few, *_, none = run("percent.js", "ranges", [[a] for a in answers])
+    assert twelve == (
+        "At 5 sites of one earthquake, 5.0–40\u00a0% of the blocks topple (95\u00a0% prediction "
+        "interval)."
+    )
+    assert (few, none) == ("", "At 5 sites of one earthquake, 0\u00a0% of the blocks topple "
+                               "(95\u00a0% prediction interval).")  # fmt: skip
 
 
 def test_a_decimal_comma_is_read_and_nothing_else_is_changed(run):

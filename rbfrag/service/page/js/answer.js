@@ -4,7 +4,7 @@ import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
 import { quantity, readable } from "./numbers.js";
 import { byId } from "./page.js";
-import { atSites, drainedBound, inOneSentence, percent, ranges, verbOf } from "./percent.js";
+import { atSites, drainedBound, inOneSentence, interval, percent, ranges, verbOf } from "./percent.js";
 import { writeText } from "./subscripts.js";
 
 const SPOKEN_AFTER_MS = 700;
@@ -46,7 +46,7 @@ const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
  * @param {any} answer
  */
 export function showAnswer(answer) {
-  const interval = `${percent(answer.ci_low)} to ${percent(answer.ci_high)}`;
+  const ends = interval(answer.ci_low, answer.ci_high);
   const range = answer.in_domain
     ? "within the fitted range"
     : "outside the fitted range: an extrapolation";
@@ -59,7 +59,7 @@ export function showAnswer(answer) {
   domain.dataset.inside = String(answer.in_domain);
   writeText(
     byId("about"),
-    `Model ${answer.model} of ${answer.data}. ` +
+    `Model ${answer.model}, ${answer.data}. ` +
       `Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
       (answer.y_m_s === null
         ? ""
@@ -72,15 +72,15 @@ export function showAnswer(answer) {
     answer.warnings.filter((/** @type {string} */ each) => !SAID.test(each)),
   );
   showOthers(answer.answers);
-  byId("strip").textContent = `${percent(answer.probability)} ${verbOf(answer)} (${interval})`;
+  byId("strip").textContent = `${percent(answer.probability)} ${verbOf(answer)} (${ends})`;
   mark("known");
   const event =
     answer.event_low === null
       ? ""
-      : ` At ${atSites(answer)} ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
+      : ` At ${atSites(answer)} ${interval(answer.event_low, answer.event_high)}.`;
   const failure = `Probability of ${answer.failure.replace("permanent displacement above", "sliding more than")}`;
   byId("answer-title").textContent = failure;
-  speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
+  speak(`${failure} ${percent(answer.probability)}, ${ends}, ${range}.${event}`);
 }
 
 /**

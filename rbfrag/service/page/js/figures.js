@@ -120,7 +120,7 @@ export function figures(moved, failed) {
       drawCurve(asked);
       if (hasChart) writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Share of such blocks that ${verbOf(answer)}. Dark band: as far as the data tell it.` +
+        `Fraction of blocks that ${verbOf(answer)}. Dark band: confidence interval.` +
         (answer.event_low === null ? "" : ` Light band: at ${atSites(answer)}.`) +
         ` (${percent(answer.level)}.)`;
     },

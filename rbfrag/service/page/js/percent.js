@@ -11,13 +11,11 @@ const GAP = "\u00a0";
 export function percent(p) {
   if (p === 0) return `0${GAP}%`;
   if (p === 1) return `100${GAP}%`;
-  if (p < SMALLEST) return `<${GAP}0.01${GAP}%`;
-  if (p > 1 - SMALLEST) return `>${GAP}99.99${GAP}%`;
-  if (p < 0.1) return `${Number((100 * p).toPrecision(2))}${GAP}%`;
-  if (p <= 0.99) return `${Math.round(100 * p)}${GAP}%`;
-  const missing = Number((100 * (1 - p)).toPrecision(2));
-  const decimals = missing >= 0.1 ? 2 : 3;
-  return `${Number((100 - missing).toFixed(decimals))}${GAP}%`;
+  if (p < SMALLEST) return `<0.01${GAP}%`;
+  if (p > 1 - SMALLEST) return `>99.99${GAP}%`;
+  if (p < 0.0995) return `${(100 * p).toPrecision(2)}${GAP}%`;
+  if (p < 0.995) return `${Math.round(100 * p)}${GAP}%`;
+  return `${Number((100 * p).toFixed(2))}${GAP}%`;
 }
 
 /** What blocks do, by the kind of an answer. */
@@ -44,41 +42,41 @@ export function verbOf({ kind }) {
  */
 
 /**
- * What a probability means, in counts of blocks.
+ * An interval in percent: 7.4–26 %.
+ * @param {number} low
+ * @param {number} high
+ */
+export function interval(low, high) {
+  const ends = [low, high].map((end) => percent(end).replace(`${GAP}%`, ""));
+  return `${[...new Set(ends)].join("\u2013")}${GAP}%`;
+}
+
+/**
+ * The confidence interval of an answer, or why there is none.
  * @param {Answer} answer
  * @returns {string}
  */
 export function inOneSentence(answer) {
-  const { probability: p, ci_high: high } = answer;
+  const { probability: p, ci_low: low, ci_high: high, level } = answer;
   if (p === 1 && answer.how === "by mechanics") {
     return "The block is unstable without shaking: check dip and friction.";
   }
-  if (p === 0 && high === 0) return "No earthquake motion with this shaking makes the block fail.";
-  const of = among(p);
-  return (
-    `This block fails or stands: of ${grouped(of)} such cases, over all earthquakes and sites with ` +
-    `shaking like this, ${about(p, of)} ${verbOf(answer)}.`
-  );
+  if (p === 0 && high === 0) return "By mechanics: this shaking cannot make the block fail.";
+  return `${percent(level)} confidence interval ${interval(low, high)}`;
 }
 
 /**
- * What its interval and the range at some sites of one earthquake mean.
+ * The prediction interval at some sites of one earthquake; empty where it is not asked for.
  * @param {Answer} answer
  * @returns {string}
  */
 export function ranges(answer) {
-  const { probability: p, ci_low: low, ci_high: high, event_low, event_high, level } = answer;
-  if ((p === 0 && high === 0) || low === 1) return "";
-  const of = among(p);
-  const between = (/** @type {number} */ a, /** @type {number} */ b) =>
-    count(a, of) === count(b, of) ? count(a, of) : `between ${count(a, of)} and ${count(b, of)}`;
-  const event =
-    event_low === null || event_high === null
-      ? ""
-      : ` At ${atSites(answer)}, facing all sides, ${percent(event_low)} to ${percent(event_high)} of ` +
-        `such blocks ${verbOf(answer)}.`;
-  const each = event ? "Each " : "";
-  return `As far as the data tell, it is ${between(low, high)}.${event} (${each}${percent(level)}.)`;
+  const { event_low, event_high, level } = answer;
+  if (event_low === null || event_high === null) return "";
+  return (
+    `At ${atSites(answer)}, ${interval(event_low, event_high)} of the blocks ${verbOf(answer)} ` +
+    `(${percent(level)} prediction interval).`
+  );
 }
 
 /** Yields of a block, by their keys. */
@@ -93,10 +91,9 @@ export function drainedBound({ drained }) {
   const strength = Object.entries(YIELDS)
     .filter(([key]) => typeof drained[key] === "number")
     .map(([key, symbol]) => `${symbol}${GAP}=${GAP}${Number(Number(drained[key]).toPrecision(3))}, `);
-  const [p, low, high] = [drained.probability, drained.ci_low, drained.ci_high].map((value) =>
-    percent(Number(value)),
-  );
-  return `Drained, without water pressure: ${strength.join("")}P${GAP}=${GAP}${p} (${low} to ${high}).`;
+  const ends = interval(Number(drained.ci_low), Number(drained.ci_high));
+  const p = percent(Number(drained.probability));
+  return `Drained: ${strength.join("")}P${GAP}=${GAP}${p} (${ends}), without water pressure.`;
 }
 
 /**
@@ -105,34 +102,4 @@ export function drainedBound({ drained }) {
  */
 export function atSites({ sites }) {
   return `${sites} site${sites === 1 ? "" : "s"} of one earthquake`;
-}
-
-/**
- * Of how many blocks a share is a count that tells something.
- * @param {number} p
- */
-function among(p) {
-  return [100, 1000, 10000].find((n) => p * n >= 1 && (1 - p) * n >= 1) ?? 10000;
-}
-
-/** @type {(p: number, of: number) => string} */
-function about(p, of) {
-  const text = count(p, of);
-  return /\d$/.test(text) && !text.startsWith("fewer") ? `about ${text}` : text;
-}
-
-/**
- * @param {number} p
- * @param {number} of
- */
-function count(p, of) {
-  const n = Math.round(p * of);
-  if (n === 0 && p > 0) return "fewer than 1";
-  if (n === of && p < 1) return "almost all";
-  return grouped(n);
-}
-
-/** @param {number} n */
-function grouped(n) {
-  return n.toLocaleString("en").replace(",", "\u202f");
 }

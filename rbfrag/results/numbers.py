@@ -1,0 +1,72 @@
+"""Numbers as answers print them: probabilities, intervals, return periods, rates.
+
+One rule for the command line, the web page, reports and figures: two significant digits of a
+probability, three of a return period. Documents have all digits.
+"""
+
+from __future__ import annotations
+
+SMALLEST = 1e-4
+"""Probabilities nearer to 0 or to 1 than this are printed as a bound."""
+
+NEVER = 1e-8
+"""Annual rates below this are printed as a bound [1/yr]."""
+
+
+def _in_percent(p: float) -> str:
+    if p in (0.0, 1.0):
+        return f"{100.0 * p:g}"
+    if p < SMALLEST:
+        return "<0.01"
+    if p > 1.0 - SMALLEST:
+        return ">99.99"
+    if p < 0.0995:
+        return f"{100.0 * p:#.2g}"
+    if p < 0.995:
+        return f"{100.0 * p:.0f}"
+    return f"{100.0 * p:.2f}".rstrip("0").rstrip(".")
+
+
+def percent(p: float) -> str:
+    """Return a probability in percent, with two significant digits: "8.4 %"."""
+    return f"{_in_percent(p)} %"
+
+
+def interval(low: float, high: float) -> str:
+    """Return an interval of probabilities in percent, "7.4–26 %"; one where both ends agree."""
+    return "–".join(dict.fromkeys((_in_percent(low), _in_percent(high)))) + " %"
+
+
+def with_interval(p: float, low: float, high: float) -> str:
+    """Return a probability with its interval, "15 % (7.4–26 %)", unless that adds nothing."""
+    ends = interval(low, high)
+    return percent(p) if ends == percent(p) else f"{percent(p)} ({ends})"
+
+
+def confidence(level: float, ends: str, name: str = "confidence") -> str:
+    """Return an interval with its level: "95 % confidence interval 7.4–26 %"."""
+    return f"{100.0 * level:g} % {name} interval {ends}"
+
+
+def years(rate: float, digits: int = 2) -> str:
+    """Return the return period of an annual rate [1/yr] without its unit: "4,400"."""
+    return f"{float(f'{1.0 / rate:.{digits}g}'):,.15g}"
+
+
+def return_period(rate: float) -> str:
+    """Return the return period of an annual rate [1/yr]: "4,400 years"."""
+    return f"{years(rate)} years" if rate > NEVER else "over 100 million years"
+
+
+def return_periods(low: float, high: float) -> str:
+    """Return the return periods of an interval of annual rates [1/yr]: "3,700–5,300"."""
+    ends = [years(rate) if rate > NEVER else "over 100 million" for rate in (high, low)]
+    return "–".join(dict.fromkeys(ends))
+
+
+def rounded(value: float) -> str:
+    """Return a number with three digits and without an exponent where people write none."""
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.2g}"
+    text = f"{value:#.3g}"
+    return f"{float(text):,.0f}" if abs(value) >= 100.0 else text.rstrip(".")
