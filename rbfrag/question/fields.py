@@ -329,7 +329,7 @@ class JointFields(TypedDict, Generic[V], total=False):
         V,
         _friction(
             "Friction angle of base and back that is left after the first slip, which ends "
-            "cohesion, water and roughness",
+            "cohesion and roughness",
             "phi_residual",
         ),
     ]

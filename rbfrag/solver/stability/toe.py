@@ -38,6 +38,7 @@ HEEL_TIPS = Diagnostic(
     "average (1.0–2.7), so P is too low; rbfrag respond follows it",
     "heel_tips",
 )
+TOE_FOLLOWED = "the toe gives way: its slip is followed step by step"
 NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
 
 
