@@ -71,7 +71,7 @@ class Session:
         return FROM_OUTSIDE.keys() & set(self.words)
 
     def answer(self, folder: Path) -> str:
-        """Return what the program prints, with its warnings where the page prints some."""
+        """Return what the program prints."""
         done = subprocess.run(
             [sys.executable, "-m", "rbfrag.cli.main", *self.words[1:]],
             cwd=folder, capture_output=True, text=True, check=False,
@@ -79,10 +79,7 @@ class Session:
         )  # fmt: skip
         if done.returncode != 0:
             raise RuntimeError(f"{self.page}: {self.typed}\n{done.stderr}")
-        warned = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
-        lines = done.stdout.splitlines()
-        lines += warned if "\nwarning: " in f"\n{self.printed}" else []
-        return "\n".join(line.rstrip() for line in lines).strip()
+        return "\n".join(line.rstrip() for line in done.stdout.splitlines()).strip()
 
     def agrees(self, answer: str) -> bool:
         """Return whether the page prints this answer, but for what it leaves out."""

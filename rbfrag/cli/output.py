@@ -87,9 +87,16 @@ def print_labelled(label: str, text: str) -> None:
 
 
 def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
-    """Print warnings as notes of the answer, one a line, with fields as options."""
-    for warning in warnings:
-        print_labelled("Note", spelled(warning, ("excel_text", *fields), option_of))
+    """Print warnings as notes below an answer, one a line, with fields as options."""
+    for i, warning in enumerate(warnings):
+        if i == 0:
+            print()
+        print_note(warning, fields)
+
+
+def print_note(warning: str, fields: Collection[str] = ()) -> None:
+    """Print a warning as a note, with fields as options."""
+    print_labelled("Note", spelled(warning, ("excel_text", *fields), option_of))
 
 
 def write_table(
@@ -266,10 +273,10 @@ def show_prediction(
     print_sentences((*questions, words.headline(document)))
     for label, text in words.lines(document, given):
         print_labelled(label, text)
-    print_warnings(
-        [text for text in warnings if text not in questions],
-        [name for name in declared() if "_" in name],
-    )
+    fields = [name for name in declared() if "_" in name]
+    for text in warnings:
+        if text not in questions:
+            print_note(text, fields)
     if verbose:
         print()
         apart = ("drained", "warnings", "shaking")

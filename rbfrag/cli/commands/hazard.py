@@ -242,7 +242,6 @@ def _print(
         if branches:
             print()
             print_table(list(branches[0]), [list(row.values()) for row in branches])
-    print()
     print_warnings(warnings)
 
 

@@ -182,8 +182,7 @@ def _about_back_plane(block: Block, finding: MarginFacts) -> Iterator[str]:
         )
     if finding.mode == "topple" and block.gamma_deg + finding.phi_back_deg > 90.0:
         yield Diagnostic(
-            "friction against the rock behind could hold the block beyond k_r; the answer leaves "
-            "this help out",
+            "friction on the back face is neglected (conservative)",
             "back_friction_neglected",
         )
     if finding.mode == "slide" and finding.beta_deg < block.alpha1_deg:

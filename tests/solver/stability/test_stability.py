@@ -278,8 +278,10 @@ def test_warnings_tell_what_is_taken_for_granted() -> None:
 
     assert said(at(-60.0, 20.0, 35.0, 10.0), "exceeds 180")
     assert not said(at(-40.0, 20.0, 30.0, 5.0), "exceeds 180")
-    assert said(at(-10.0, 25.0, 35.0), "friction against the rock behind")
-    assert not said(at(-10.0, 25.0, 35.0, phi_back_deg=0.0), "friction against the rock behind")
+    assert said(at(-10.0, 25.0, 35.0), "friction on the back face is neglected")
+    assert not said(
+        at(-10.0, 25.0, 35.0, phi_back_deg=0.0), "friction on the back face is neglected"
+    )
     assert said(at(20.0, 60.0, 35.0, 10.0), "leans on the back plane")
     assert not said(at(20.0, 60.0, 35.0, 20.0), "leans on the back plane")
     assert said(at(45.0, 65.0, 75.0, 40.0), "") == bool(at(45.0, 65.0, 75.0, 40.0).warnings)
