@@ -26,7 +26,13 @@ class Shell:
         return result
 
     def json(self, *arguments: str | Path) -> Any:
-        return json.loads(self(*arguments, "--json").stdout)
+        """Return a document without its diagnostics, which are its warnings with their codes."""
+        document = json.loads(self(*arguments, "--json").stdout)
+        for answer in document if isinstance(document, list) else [document]:
+            if isinstance(answer, dict) and "warnings" in answer:
+                texts = [each["text"] for each in answer.pop("diagnostics")]
+                assert texts == [*dict.fromkeys(answer["warnings"])]
+        return document
 
 
 @pytest.fixture

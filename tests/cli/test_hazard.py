@@ -14,7 +14,7 @@ from rbfrag.cli.hazard_sentences import place_in_words
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.hazards.answer import counted
-from rbfrag.hazards.report import once_in
+from rbfrag.results.numbers import return_period
 from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
@@ -110,7 +110,7 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
         "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "annual_rate_at_least",
         "joint_law", "bounds", "expected_failures_per_year", "expected_failures_low",
         "expected_failures_high", "years", "level", "how", "model", "term",
-        "method", "imt", "curve_kind", "between_measures", "blocks", "warnings", "diagnostics",
+        "method", "imt", "curve_kind", "between_measures", "blocks", "warnings",
     }  # fmt: skip
     assert found["how"] == f"model {found['model']}"
     each = [row["annual_rate"] for row in found["blocks"]]
@@ -120,13 +120,14 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
     assert any("blocks are taken as those of one site" in text for text in found["warnings"])
     printed = shell(*asked).stdout
-    assert f"{once_in(found['annual_rate_any'])} on average" in printed
-    assert f"{found['expected_failures_per_year']:.2g} failures a year (" in printed
-    assert "At least one of the blocks" in printed
+    assert f"return period {return_period(found['annual_rate_any'])}" in printed
+    assert f"Expected failures {found['expected_failures_per_year']:.2g} /yr of 2 blocks" in printed
+    assert "At least one failure: return period" in printed
     ends = found["expected_failures_low"], found["expected_failures_high"]
     assert ends[0] < sum(each) < ends[1]
     assert "numerical_error" not in printed
-    assert f"Most often fail A7 ({once_in(each[0])}) and B2 ({once_in(each[1])})." in printed
+    periods = f"A7 ({return_period(each[0])}), B2 ({return_period(each[1])})"
+    assert f"Shortest return periods: {periods}" in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:

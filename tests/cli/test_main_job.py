@@ -21,23 +21,22 @@ RESPOND_KEYS = {
     "toppled_s", "error_estimate", "steps", "samples_moved", "samples_total", "warnings",
     "final_theta_rad", "displacement_m", "peak_displacement_m", "centroid_displacement_m",
     "stopped_s", "mode_changes", "how", "mode", "final_mode", "toe_needs_deg", "toe_needs_s",
-    "toe_slips_g", "drained", "diagnostics",
+    "toe_slips_g", "drained",
 }  # fmt: skip
 CRITICAL_KEYS = {
     "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "certified", "k_up_over_pga",
     "undecided", "island_width", "kr_over_pga_resolved", "reentrant", "n_runs", "warnings",
-    "diagnostics",
 }  # fmt: skip
 PREDICT_KEYS = {
     "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s", "block_sd",
     "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s", "answers", "kind", "mode",
     "shaking", "failure", "median_displacement_m", "event_low", "event_high", "data", "how",
-    "drained", "diagnostics",
+    "drained",
 }  # fmt: skip
 SIMULATE_KEYS = {"combinations", "found", "below_limit", "runs", "seconds", "resumed"}
 FIT_KEYS = {
     "name", "term", "method", "coefficients", "standard_errors", "n", "n_censored", "events",
-    "scores", "warnings", "diagnostics",
+    "scores", "warnings",
 }  # fmt: skip
 MOTION_KEYS = {
     "id", "name", "event_id", "component", "dt_s", "npts", "pga_g", "pgv_m_s", "pgd_m", "tm_s",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 from pathlib import Path
 
 import pytest
@@ -49,9 +50,12 @@ def test_documents_have_a_diagnostic_for_each_warning(shell: Shell, tmp_path: Pa
     (tmp_path / "curve.csv").write_text("pgv_m_s,annual_rate\n0.1,0.03\n0.2,0.009\n0.4,0.002\n")
     shape = ("--height", "4", "--width", "2", "--dip", "20", "--phi", "40", "--water", "1")
     documents = [
-        shell.json("predict", *shape, "--pgv", "5", "--tm", "0.5"),
-        shell.json("hazard", tmp_path / "curve.csv", *shape),
-        shell.json("block", *shape),
+        json.loads(shell(*words, "--json").stdout)
+        for words in (
+            ("predict", *shape, "--pgv", "5", "--tm", "0.5"),
+            ("hazard", tmp_path / "curve.csv", *shape),
+            ("block", *shape),
+        )
     ]
     codes = []
     for document in documents:
