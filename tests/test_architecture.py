@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "rbfrag"
 
 LEVELS = (
+    {"vocabulary"},
     {"results"},
     {"motions"},
     {"solver"},

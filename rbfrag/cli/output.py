@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
 from rbfrag.fragility import words
-from rbfrag.question.fields import declared, option_of
+from rbfrag.vocabulary.quantities import INPUTS, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -283,7 +283,7 @@ def show_prediction(
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
     print_glossary(*sentences, *shown)
-    print_warnings(warnings, [name for name in declared() if "_" in name])
+    print_warnings(warnings, [name for name in INPUTS if "_" in name])
 
 
 def _short(document: Mapping[str, Any]) -> dict[str, object]:

@@ -18,8 +18,8 @@ from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reaso
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import many_blocks
-from rbfrag.question.shapes import SPACE
 from rbfrag.solver.kinds import BY_MECHANICS
+from rbfrag.vocabulary.quantities import SPACE
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",

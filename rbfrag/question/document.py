@@ -11,9 +11,9 @@ from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import AMPLIFIED, STATED
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
-from rbfrag.question.fields import SCENE
 from rbfrag.question.question import OF_SHAKING, ask_at_rest, described
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
+from rbfrag.vocabulary.quantities import SCENARIO
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -111,9 +111,9 @@ def prediction_document(
     """
     is_component_assumed = component is None and motion is None
     source = mechanism, gmm, component
-    if source != (None, None, None) or not SCENE.isdisjoint(given):
+    if source != (None, None, None) or not SCENARIO.isdisjoint(given):
         if motion is not None:
-            fields = (*SCENE, "mechanism", "gmm", "component")
+            fields = (*SCENARIO, "mechanism", "gmm", "component")
             raise InputError(BESIDE_A_MOTION, fields=fields)
         from rbfrag.question.scenario import SITE, Source, shaken
 

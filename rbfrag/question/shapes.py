@@ -11,15 +11,6 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    JointFields,
-    PlaneFields,
-    SpaceFields,
-    column_of,
-    declared,
-    names_of,
-    word_of,
-)
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
@@ -28,6 +19,7 @@ from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_res
 from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, slips_on_base
 from rbfrag.solver.stability.joint import ASSUMED_DENSITY, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
+from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.arrays import BlockArray
@@ -43,7 +35,6 @@ SHAPES = {
 
 WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
 
-PLANES = names_of(PlaneFields)
 
 LEAST_DEG, LEAST_DIP_DEG = 1.6, 0.8
 """Friction angles and dips below this are questioned [deg]: radians may have been meant."""
@@ -213,11 +204,8 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     return first
 
 
-SPACE = names_of(SpaceFields)
-
 BOND = ("cohesion_pa", "density_kg_m3")
 
-JOINT = names_of(JointFields)
 
 PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND, *JOINT)
 """Fields that describe a block only beside its shape; the dip stands with numbers too."""
@@ -239,7 +227,6 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
         listener: hears of it.
         columns: call fields as the columns of tables that are written.
     """
-    fields = declared()
     for name, value in stated.items():
         is_friction = name in ("phi_deg", "phi_back_deg")
         if is_friction or name == "beta_deg":
@@ -247,16 +234,16 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
             small = (abs(value) > 0.0) & (abs(value) < least) & (value % 0.25 != 0.0)
             text = Diagnostic(_RADIANS.format(name=name), "check_unit", fields=(name,))
             listener.remark(small, text, value=value)
-        usable = fields[name].usable(value)
+        usable = QUANTITIES[name].range.holds(value)
         if usable is True:  # a single number: no text is needed
             continue
-        about, unknown = fields[name], value != value
+        about, unknown = QUANTITIES[name], value != value
         shown = column_of(name) if columns else name
         if not is_friction and name != "displacement_m":
             why = "is empty" if columns else "is not a number"
             level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
             listener.refuse(unknown, f"{shown} {why}{level}", name)
-        wrong = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
+        wrong = f"{shown} = {{value:.10g}} is not {about.range.words} {about.unit}".rstrip()
         listener.refuse(usable ^ True ^ unknown, wrong, name, value=value)
 
 

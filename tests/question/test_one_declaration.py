@@ -13,15 +13,18 @@ import pytest
 import rbfrag
 
 PACKAGE = Path(rbfrag.__file__).parent
-DECLARED = (
-    '    hardness: Annotated[V, Field("Rebound hardness of the rock", "MPa", ("rebound",))]\n'
-)
+LINES = {
+    "failure": '        Quantity("hardness", "Rebound hardness of the rock", "MPa", '
+    'input=Input(aliases=("rebound",))),\n',
+    "measures": '        Quantity("csi_g", "Characteristic intensity", "g", "CI", NOT_NEGATIVE, '
+    'Input(), measure=Measure(power=1), credible=(0.0, 5.0, "larger than ever recorded")),\n',
+}
+"""A line by the group of quantities that it is added to."""
 
 ASKED = """
 import json, sys
 import numpy as np
 import rbfrag
-from rbfrag.question.fields import declared
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.db.location import REFERENCE
@@ -41,23 +44,22 @@ print(json.dumps({
 
 @pytest.fixture(scope="module")
 def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the package with one more line, which declares a field; its folder."""
+    """A copy of the package with two more lines, an input and an intensity measure; its folder."""
     folder = tmp_path_factory.mktemp("declared")
     package = folder / "rbfrag"
     package.mkdir()
     for each in PACKAGE.iterdir():
-        if each.name != "question":
+        if each.name != "vocabulary":
             (package / each.name).symlink_to(each)
-    (package / "question").mkdir()
-    for each in (PACKAGE / "question").glob("*.*"):
+    (package / "vocabulary").mkdir()
+    for each in (PACKAGE / "vocabulary").glob("*.*"):
         text = each.read_text(encoding="utf-8")
-        if each.name == "fields.py":
-            head, mark, rest = text.partition(
-                '"""What may be said of a block: numbers, or its sides and planes."""\n'
-            )
-            assert mark
-            text = f"{head}{mark}\n{DECLARED}{rest}"
-        (package / "question" / each.name).write_text(text, encoding="utf-8")
+        if each.name == "quantities.py":
+            for group, line in LINES.items():
+                head, mark, rest = text.partition(f'    "{group}": (\n')
+                assert mark
+                text = f"{head}{mark}{line}{rest}"
+        (package / "vocabulary" / each.name).write_text(text, encoding="utf-8")
     return folder
 
 

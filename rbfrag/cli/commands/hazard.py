@@ -24,8 +24,8 @@ from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stac
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import model_in_words, percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
-from rbfrag.question.fields import BlockFields, WholeFields
 from rbfrag.results.diagnostic import diagnostics
+from rbfrag.vocabulary.quantities import BLOCK, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -87,7 +87,7 @@ def hazard(
         "logic tree.",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     blocks: BlocksOptions,
     meaning: options.Curve,
     answering: options.Answering,
