@@ -30,6 +30,7 @@ BLOCKS = (
     "--p2 3 --kr .1 --kind rocking --restitution .9 --restitution-sigma .02",
     "--base 25/102 --back 75/290 --face 70/100 --s1 1 --s2 .6 --phi 40",
     "--height 2 --width .4 --phi 40 --water .5 --density 2600",
+    "--height 2 --width .4 --phi 40 --water .5 --density 2600 --drainage drained",
     "--height 2 --width .4 --phi 28 --jrc 8 --jcs 60 --density 2600",
     "--block docs/examples/block-fractures.toml",
 )  # fmt: skip

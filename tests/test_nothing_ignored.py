@@ -19,6 +19,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
+from rbfrag.fragility.words import drained_in_words
 from rbfrag.question.table import field_of
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
@@ -93,6 +94,7 @@ CASES: dict[str, tuple[dict[str, Any], Any]] = {
     "back": (STANDING, "80/095"),
     "face": (STANDING, "80/085"),
     "water_m": (SLIDE | PGV, 0.3),
+    "drainage": (SLIDE | {"water_m": 0.3, **PGV}, "drained"),
     "jrc": (SLIDE | {"jcs_mpa": 60.0, **PGV}, 8.0),
     "jcs_mpa": (SLIDE | {"jrc": 8.0, **PGV}, 60.0),
     "joint_length_m": (SLIDE | {"jrc": 8.0, "jcs_mpa": 60.0, **PGV}, 2.0),
@@ -693,9 +695,18 @@ def test_field_notes_become_one_document(shell: Shell, cases_dir: Path) -> None:
         elif "unstable at rest" in "".join(rows[[r[0] for r in rows].index(name)]):
             assert found[name] == 1.0
         else:
-            assert found[name] == pytest.approx(p_of(**keywords(text), pgv_m_s=0.5), rel=1e-12)
+            asked = rbfrag.predict(**keywords(text), pgv_m_s=0.5)
+            assert found[name] == pytest.approx(asked.probability, rel=1e-12)
+            assert (asked.drained is None) == (name not in ("R8", "R9"))
+            (block,) = (block for block in told["blocks"] if block["block_id"] == name)
+            assert block["drained"] == (asked.drained and pytest.approx(asked.drained, rel=1e-12))
+            if name == "R12":
+                assert any("cohesion has no effect on k_r" in w for w in block["warnings"])
     for suffix in ("pdf", "html"):
-        document = words_of(Path(f"notes.{suffix}"), pages=7)
+        document = words_of(Path(f"notes.{suffix}"), pages=7).replace("kᵣ", "k_r")
+        for block in told["blocks"]:
+            for sentence in drained_in_words(block):
+                assert sentence in document, sentence
         for text in (*told["warnings"], *(reason["reason"] for reason in told["rejected"])):
             assert text[1:40] in document, text
         for block in told["blocks"]:

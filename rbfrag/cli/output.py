@@ -264,11 +264,13 @@ def show_prediction(
     sentences = (
         *words.prediction_in_words(document),
         *words.block_in_words(document["method"], given),
+        *words.drained_in_words(document),
     )
     warnings = [text for text in document.pop("warnings") if text not in sentences]
     print_sentences(sentences)
     if verbose:
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
+        shown.pop("drained")
     else:
         shown = _short(document)
     print_pairs(shown)

@@ -46,7 +46,9 @@ def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
     if "started_s" in answer and answer["started_s"] is None and answer["outcome"] == "stable":
         yield "The motion does not move the block: it never exceeds its strength."
         return
-    yield advice if at_s is None else f"At {at_s:.2f} s the block topples. {advice}"
+    yield (advice if at_s is None else f"At {at_s:.2f} s the block topples. {advice}") + (
+        _drained_yield(answer)
+    )
     if answer.get("peak_theta_n") is not None:
         ratio = answer["peak_theta_n"]
         yield f"Its greatest rotation is {percent(ratio)} of the critical angle."
@@ -76,8 +78,13 @@ def block_in_words(answer: Mapping[str, Any]) -> str:
         return f"The block {moves} at rest, without any earthquake."
     return (
         f"The block {moves} where the ground's horizontal acceleration exceeds "
-        f"{rounded(answer['yield_acceleration'])} g."
+        f"{rounded(answer['yield_acceleration'])} g.{_drained_yield(answer)}"
     )
+
+
+def _drained_yield(answer: Mapping[str, Any]) -> str:
+    bound = (answer.get("drained") or {}).get("yield_acceleration")
+    return "" if bound is None else f" Drained, the yield acceleration is {rounded(bound)} g."
 
 
 def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
@@ -220,12 +227,19 @@ def answer_in_short(row: Mapping[str, Any]) -> dict[str, object]:
         row: one of ``blocks`` of `rbfrag predict --blocks --json`.
     """
     ends = row["ci_low"], row["ci_high"]
+    columns = {"probability": "probability", "drained_probability": "drained"}
+    shown = {
+        word: None if row[name] is None else percent(row[name])
+        for name, word in columns.items()
+        if name in row
+    }
     return {
         "block": row["block_id"],
         "kind": row["kind"],
         "mode": row["mode"],
-        "probability": None if row["probability"] is None else percent(row["probability"]),
+        "probability": shown.pop("probability"),
         "interval": None if None in ends else interval(*ends),
+        **shown,
         "reason": row["reason"],
     }
 

@@ -18,10 +18,11 @@ from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
 from rbfrag.question.many import many_blocks
-from rbfrag.question.shapes import OF_A_SHAPE
+from rbfrag.question.question import is_wet, without_water
+from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.kinds import KINDS, facts_of
-from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, NUMBERS, SPACE, column_of
+from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, NUMBERS, column_of
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -44,6 +45,7 @@ class BlockRows:
         word: what ``line`` counts: lines, rows or features.
         named: whether the table names its blocks.
         remarks: which columns are converted, and which are not read.
+        wet: behind which rows water stands, shape (m,); None for none.
     """
 
     columns: Columns
@@ -52,6 +54,7 @@ class BlockRows:
     word: str
     named: bool
     remarks: tuple[str, ...] = ()
+    wet: NDArray[np.bool_] | None = None
 
     @cached_property
     def blocks(self) -> Columns:
@@ -177,6 +180,7 @@ def read_blocks(
     sheet: str | None = None,
     ignore_columns: Sequence[str] = (),
     crs: str | None = None,
+    dry: bool = False,
 ) -> BlockRows:
     """Return the blocks of a table, and its rows that cannot be used, each with its reason.
 
@@ -195,6 +199,7 @@ def read_blocks(
         sheet: of a workbook, the name of the sheet; None for the first.
         ignore_columns: columns to ignore, whatever they are called.
         crs: coordinate reference system of x and y of rows that name none, such as EPSG:2056.
+        dry: without the water behind the blocks.
 
     Returns:
         The blocks, by the columns of the numbers that their kinds read, NaN where a kind does not,
@@ -220,14 +225,16 @@ def read_blocks(
         columns, faults, lines = table.whole()
     name, size = table.name, len(lines)
     values: dict[str, Any] = {field: columns.pop(field) for field in fields if field in columns}
-    for field in SPACE:
+    for field in PLANE_TEXTS:
         if field in columns or field in for_all:
             cells = columns.pop(field, np.full(size, "", dtype=object))
             values[field] = np.where(cells == "", for_all.get(field, ""), cells)
     for field, value in for_all.items():
-        if field not in SPACE:
+        if field not in PLANE_TEXTS:
             cells = values.get(field, np.full(size, np.nan))
             values[field] = np.where(np.isnan(cells), value, cells)
+    if dry:
+        values = without_water(values)
     if of_place and "x" in table.stated.columns:
         _place_on_map(columns, crs, name)
     if ("lon" in columns) != ("lat" in columns):
@@ -267,7 +274,8 @@ def read_blocks(
     used = {*blocks.read, *TEXTS, *PLACE, *PORTFOLIO, *reads, *of_place}
     remarks = diagnostics(blocks.remarks, table.warnings(used))
     columns |= {"row": np.arange(size), "line": np.array(lines, dtype=np.int64)}
-    return BlockRows(columns, reasons, name, table.file.word, named, remarks).checked()
+    wet = values["water_m"] > 0.0 if is_wet(values) else None
+    return BlockRows(columns, reasons, name, table.file.word, named, remarks, wet).checked()
 
 
 def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str) -> None:

@@ -18,11 +18,12 @@ from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
 from rbfrag.question.sections import ANGLES
-from rbfrag.question.shapes import OF_A_SHAPE, RECTANGLE, SHAPES
+from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS, RECTANGLE, SHAPES
 from rbfrag.question.table import (
     Column,
     Header,
     columns_in,
+    drainage_named,
     kinds_in,
     sounds_like,
     yes_or_no,
@@ -35,11 +36,10 @@ from rbfrag.vocabulary.quantities import (
     INPUTS,
     QUANTITIES,
     SHAKING,
-    SPACE,
     column_of,
 )
 
-TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *SPACE)
+TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *PLANE_TEXTS)
 """Columns of texts."""
 
 SHAKING_TEXTS = ("component", "mechanism")
@@ -154,6 +154,8 @@ class BlockTable:
         column = self.stated.columns.get(name)
         if column is None:
             return None
+        if name == "drainage":
+            return [drainage_named(cell) for cell in self._cells(part, column)]
         what = f"{self.name}: a cell of {name}"
         return [checked_name(as_written(cell), what) for cell in self._cells(part, column)]
 

@@ -115,6 +115,24 @@ def blocks_at_sites(
     )  # fmt: skip
 
 
+def numbers_of_dry(dry: Mapping[str, Any], at: SitedBlocks) -> dict[str, Any]:
+    """Return what answers read of blocks without water, by field, and their kinds.
+
+    Args:
+        dry: columns of the blocks, of which rows may be missing: those have NaN.
+        at: the same blocks with water at their sites, whose order the numbers have.
+    """
+    size = at.site.size
+    if "row" in dry:
+        own, rows = np.asarray(dry["row"]), np.asarray(at.columns["row"])
+        index = np.minimum(np.searchsorted(own, rows), own.size - 1)
+        lost = own[index] != rows
+    else:  # one block at each site
+        index, lost = np.zeros((2, size), dtype=np.intp)
+    numbers = {n: np.where(lost, np.nan, np.asarray(v)[index]) for n, v in numbers_in(dry).items()}
+    return {**numbers, "kind": [str(dry["kind"][i]) for i in index.tolist()]}
+
+
 def _numbers(columns: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:
     """Return p² and k_r, and what else describes blocks of other kinds; NaN of a class."""
     known = numbers_in(columns)

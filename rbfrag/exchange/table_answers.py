@@ -27,10 +27,11 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.question.keywords import LEVEL
-from rbfrag.question.question import ask
+from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
+from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, SPACE, column_of
+from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, column_of
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
@@ -41,6 +42,9 @@ _SHAKING, _SCATTER = SHAKING, frozenset(SCATTER)
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
+
+OF_DRAINED = tuple(f"drained_{name}" for name in OF_BOUND)
+"""The columns that are appended too where water stands behind blocks."""
 
 MOST_PAIRED = 700
 """Rows that tell what pairs of blocks share; of a longer table so many drawn at random."""
@@ -116,7 +120,8 @@ def predict_table(
     ):
         table.check(given, kind)
         uncertain = not _SCATTER.isdisjoint((*table.stated.columns, *given))
-        columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
+        columns: tuple[str, ...] = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
+        columns += OF_DRAINED if "water_m" in (*table.stated.columns, *given) else ()
         if goal is None:
             write = _listed(table, columns, rows)
         else:
@@ -244,7 +249,7 @@ def _answer(
         else:
             # an option holds for the rows whose cell is empty
             inputs[name] = np.where(np.isnan(column), given.get(name, np.nan), column)
-    for name in SPACE:
+    for name in PLANE_TEXTS:
         if (cells := table.text(part, name)) is not None:
             inputs[name] = np.array([cell or given.get(name, "") for cell in cells], dtype=object)
     for name in SHAKING_TEXTS:
@@ -257,7 +262,9 @@ def _answer(
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
     with table.named():
-        predicted = ask(inputs, kind=requested, mode=modes, rows=True, **question)
+        predicted = with_drained_bound(
+            lambda rows: ask(rows, kind=requested, mode=modes, rows=True, **question), inputs
+        )
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")
@@ -270,8 +277,10 @@ def _answer(
         answer[name] = np.where(texts == "", own, texts)
     sd = predicted.block_sd
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape) if sd is None else sd
+    bound = predicted.drained or {}
+    answer |= {f"drained_{n}": bound.get(n, np.full(count.size, np.nan)) for n in OF_BOUND}
     bad = [*faults]
-    for name in (*_NUMBERS, OF_UNCERTAIN):
+    for name in (*_NUMBERS, OF_UNCERTAIN, *OF_DRAINED):
         answer[name][bad] = np.nan
     answer["in_domain"][bad] = False
     answer["how"][bad] = ""
@@ -305,7 +314,8 @@ def _written(
     doubled = next((name for name in table.file.header if table.file.header.count(name) > 1), None)
     if doubled is not None:
         raise InputError(f"{table.name}: the column {doubled} is there twice")
-    kept = [name for name in table.file.header if name not in (*ANSWERS, OF_UNCERTAIN)]
+    written = (*ANSWERS, OF_UNCERTAIN, *OF_DRAINED)
+    kept = [name for name in table.file.header if name not in written]
     write = table_writer(
         partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
         fast=True, notes=notes,

@@ -65,6 +65,9 @@ class Prediction:
         shaking: where the shaking is uncertain, the median of each measure that scatters, the
             standard deviation ``sigma`` of its logarithm, and ``tau``, the part of it that all
             sites of an earthquake share, where that is known; else None.
+        drained: of a block with water behind it the same answer without water pressure:
+            ``probability``, ``ci_low``, ``ci_high`` and the yield by its name, such as ``kr`` (None
+            of a block that is unstable at rest); None of a dry block.
     """
 
     kind: str
@@ -88,6 +91,7 @@ class Prediction:
     data: str | None = field(default=None, compare=False)
     shaking: dict[str, dict[str, float]] | None = None
     how: str = ""
+    drained: dict[str, float | None] | None = None
 
     @property
     def mode(self) -> str:
@@ -107,7 +111,8 @@ class Prediction:
         """Return the answer as a pandas table of one row."""
         from rbfrag.frames import columns_of, frame_of
 
-        return frame_of({"kind": self.kind, "mode": self.mode, **columns_of(self)})
+        drained = {f"drained_{name}": value for name, value in (self.drained or {}).items()}
+        return frame_of({"kind": self.kind, "mode": self.mode, **columns_of(self), **drained})
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
@@ -148,9 +153,14 @@ def with_remarks(answer: A, remarks: tuple[str, ...], last: tuple[str, ...] = ()
     if not remarks and not last:
         return answer
     field = "warnings" if isinstance(answer, Prediction) else "notes"
+    return with_values(answer, **{field: (*remarks, *getattr(answer, field), *last)})
+
+
+def with_values(answer: A, **values: Any) -> A:
+    """Return an answer with other values of some of its fields."""
     # a copy of the attributes: to make the object again takes as long as the answer
     result = object.__new__(type(answer))
-    vars(result).update(vars(answer), **{field: (*remarks, *getattr(answer, field), *last)})
+    vars(result).update(vars(answer), **values)
     return result
 
 

@@ -81,6 +81,8 @@ class PredictionArray(Tabular):
         mode_codes: failure mode of each, a place among all modes, -1 where it is not known.
         read: fields of the blocks that the answer depends on, where some stated more.
         ruled: what answered in place of a model; read it by :attr:`how`.
+        drained: ``probability``, ``ci_low`` and ``ci_high`` of the blocks without water pressure,
+            NaN for dry blocks; None where all are dry.
     """
 
     kind: str
@@ -105,6 +107,7 @@ class PredictionArray(Tabular):
     mode_codes: NDArray[np.int8] | None = None
     read: frozenset[str] = frozenset()
     ruled: Reasons | None = None
+    drained: Mapping[str, FloatArray] | None = None
 
     @property
     def how(self) -> NDArray[np.object_]:
@@ -149,7 +152,9 @@ class PredictionArray(Tabular):
         columns = super().table_columns()
         kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
         others = {n: each for n, each in columns.items() if not n.endswith("_codes")}
-        return {**others, **kinds, "how": self.how.ravel(), "reason": self.reason.ravel()}
+        drained = {f"drained_{n}": each.ravel() for n, each in (self.drained or {}).items()}
+        last = {"how": self.how.ravel(), "reason": self.reason.ravel()}
+        return {**others, **kinds, **drained, **last}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the answers as a pandas table, with the index of the Series that were given."""

@@ -83,6 +83,20 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def drained_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the drained bound of a block with water behind it; empty for a dry block.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+    """
+    bound = document.get("drained")
+    if bound is None:
+        return ()
+    yields = [f"{SYMBOLS[n]} = {bound[n]:.3g}, " for n in SYMBOLS if bound.get(n) is not None]
+    p = with_interval(bound["probability"], bound["ci_low"], bound["ci_high"])
+    return (f"Drained, without water pressure: {''.join(yields)}P = {p}.",)
+
+
 def units_to_check(warnings: Iterable[str]) -> list[str]:
     """Return the questions about units, which stand above an answer."""
     return [text for text in warnings if text.startswith("Check the unit")]

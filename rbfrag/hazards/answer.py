@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
 import numpy as np
@@ -49,6 +49,7 @@ from rbfrag.hazards.model_parts import RateKeywords, parts_by_model
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
+from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
@@ -129,6 +130,8 @@ class HazardAnswer(Tabular):
         count: number of identical blocks of each row, shape (m,).
         tau: standard deviation of ln rate between measures, beside all intervals; None where it is
             not known.
+        drained: rates of the blocks without water pressure [1/a], shape (m,), NaN where they have
+            none; None where all blocks are dry.
     """
 
     annual_rate: FloatArray
@@ -161,6 +164,7 @@ class HazardAnswer(Tabular):
     kinds: NDArray[np.object_]
     count: FloatArray
     tau: float | None = None
+    drained: FloatArray | None = None
 
     @property
     def modes(self) -> NDArray[np.object_]:
@@ -267,10 +271,34 @@ def hazard(
         numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
     curves, weight = branch_curves(curve, weights, meaning)
-    return hazard_at_sites(
-        [curves], None, given, meaning, answering, weight=weight, joint=joint, at_least=at_least,
-        years=years, one_class=one_class, count=count, run=run,
-    )  # fmt: skip
+
+    def answer(blocks: Mapping[str, Any]) -> HazardAnswer:
+        return hazard_at_sites(
+            [curves], None, blocks, meaning, answering, weight=weight, joint=joint,
+            at_least=at_least, years=years, one_class=one_class, count=count, run=run,
+        )  # fmt: skip
+
+    return with_drained_rates(answer, given)
+
+
+def with_drained_rates(
+    answer: Callable[[Mapping[str, Any]], HazardAnswer], given: Mapping[str, Any]
+) -> HazardAnswer:
+    """Return the rates of blocks; with those without water pressure where water stands.
+
+    Args:
+        answer: answers for fields of blocks.
+        given: these fields.
+    """
+    result = answer(given)
+    if not is_wet(given):
+        return result
+    try:
+        bound = answer(without_water(given))
+    except InputError as error:
+        return replace(result, warnings=(*result.warnings, no_drained_bound(error)))
+    wet = np.asarray(given["water_m"], dtype=np.float64) > 0.0
+    return replace(result, drained=np.where(wet, bound.annual_rate, np.nan))
 
 
 def hazard_at_sites(

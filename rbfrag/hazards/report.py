@@ -42,6 +42,9 @@ def as_dict(
             strict=True,
         )
     ]  # fmt: skip
+    for row in rows:
+        bound = row.pop("drained_annual_rate", None)
+        row["drained"] = None if bound is None else {"annual_rate": float(bound)}
     shared = {
         "years": answer.years,
         "level": answer.level,
@@ -83,6 +86,8 @@ def rate_columns(answer: HazardAnswer) -> dict[str, Any]:
         "numerical_error": answer.numerical_error,
         "probability": answer.probability,
     }
+    if answer.drained is not None:
+        columns["drained_annual_rate"] = answer.drained
     if answer.quantiles:
         columns |= {"branches_low": answer.branches_low, "branches_high": answer.branches_high}
     for q, values in answer.quantiles.items():
@@ -155,9 +160,12 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
     rate, ends = document["annual_rate"], (document["ci_high"], document["ci_low"])
     most, least = (once_in(end).removeprefix("once in ").removesuffix(" years") for end in ends)
     interval = f" ({most} to {least}, {100.0 * document['level']:g} %)"
+    bound = document["drained"]
+    drained = "" if bound is None else f" Drained: {once_in(bound['annual_rate'])}."
     return (
         f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
         f"probability of {percent(document['probability'])} in {document['years']:g} years."
+        f"{drained}"
     )
 
 

@@ -18,8 +18,8 @@ from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reaso
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import many_blocks
+from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.solver.kinds import BY_MECHANICS
-from rbfrag.vocabulary.quantities import SPACE
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -62,14 +62,18 @@ def ask_many(
     texts = {
         n: np.zeros(len(v)) for n, v in each.items() if v is not None and not isinstance(v, str)
     }
-    planes = {name: np.array(numbers.pop(name), dtype=object) for name in SPACE if name in numbers}
+    planes = {
+        name: np.array(numbers.pop(name), dtype=object) for name in PLANE_TEXTS if name in numbers
+    }
     texts |= {name: np.zeros(text.shape) for name, text in planes.items()}
     values, shape = flat({**numbers, **texts})
     size = int(np.prod(shape))
     written = {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
-    blocks = many_blocks({**block, **written}, size, kinds=kind, modes=mode, rows=rows)
+    blocks = many_blocks(
+        {**block, **written}, size, kinds=kind, modes=mode, rows=rows, pga_g=measures.get("pga_g")
+    )
     if not rows:
         _refuse_unread(blocks, block)
     if weights is not None:
@@ -111,7 +115,9 @@ def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
     if "block" in known:
         return one_block(known, kind), 1
     each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
-    planes = {name: np.array(known.pop(name), dtype=object) for name in SPACE if name in known}
+    planes = {
+        name: np.array(known.pop(name), dtype=object) for name in PLANE_TEXTS if name in known
+    }
     each_text = {name: np.zeros(text.shape) for name, text in planes.items()}
     values, shape = flat({**known, **each, **each_text})
     size = int(np.prod(shape))

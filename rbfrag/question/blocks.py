@@ -15,6 +15,8 @@ from rbfrag.fragility.lookup import block_of, check_numbers
 from rbfrag.question.shapes import (
     BOND,
     DENSITY_NOTE,
+    DRAINED_NOTE,
+    DRAINS_NOTHING,
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
@@ -36,7 +38,7 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
-from rbfrag.solver.stability.joint import ROCK_KG_M3
+from rbfrag.solver.stability.joint import ROCK_KG_M3, is_drained
 from rbfrag.vocabulary.quantities import (
     BLOCK,
     JOINT,
@@ -237,7 +239,10 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
         if name not in planes and not is_rectangle:
             raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
     bond = bond_of(planes)
-    needed = any(bond.get(name) for name in ("cohesion_pa", "water_m", "jrc"))
+    if planes.get("drainage") and "water_m" not in planes:
+        raise InputError(DRAINS_NOTHING, fields=("drainage", "water_m"))
+    wet = bond.get("water_m") and not is_drained(planes.get("drainage"))
+    needed = wet or any(bond.get(name) for name in ("cohesion_pa", "jrc"))
     if needed and "density_kg_m3" not in bond:
         bond["density_kg_m3"] = ROCK_KG_M3
         listener.remarks.append(DENSITY_NOTE)
@@ -391,11 +396,13 @@ def one_block(
             finding, on, _ = judged(shape.block, **planes)
     push = push_of(shape.block, on)
     listener = _One(shape.remarks)
+    if planes.get("water_m") and push is None:
+        listener.remarks.append(DRAINED_NOTE)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
     judged_shape = ModeShapes(
         shape.block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg,
         finding.phi_back_deg, taken, backed, bool(planes.get("cohesion_pa")),
-        bool(planes.get("jrc")), bool(planes.get("water_m")),
+        bool(planes.get("jrc")), push, pga_g,
     )  # fmt: skip
     limit_m = math.nan if displacement_m is None else displacement_m
     try:
@@ -410,21 +417,6 @@ def one_block(
     remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
     remarks += [*after, *listener.remarks]
     remarks += [*shape.remarks, *unread]
-    if (
-        pga_g is not None
-        and "kr" in numbers_read
-        and not facts.free_standing
-        and not taken
-        and pga_g > finding.k
-    ):
-        from rbfrag.solver.stability.toe import about_toe
-
-        remarks.append(about_toe(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push))
-    if pga_g is not None and "ky" in numbers_read:
-        from rbfrag.solver.stability.toe import about_heel
-
-        tips = about_heel(shape.block, finding.beta_deg, finding.phi_deg, pga_g, push)
-        remarks += [] if tips is None else [tips]
     across_m, size = 2.0 * shape.block.r3_m, _One()
     check_size(shape.block.p2, size)
     if across_m < LEAST_M:

@@ -11,7 +11,15 @@ from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import AMPLIFIED, STATED
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
-from rbfrag.question.question import OF_SHAKING, ask_at_rest, described
+from rbfrag.question.question import (
+    OF_SHAKING,
+    ask_at_rest,
+    bound_values,
+    described,
+    is_wet,
+    no_drained_bound,
+    without_water,
+)
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.vocabulary.quantities import SCENARIO
 
@@ -51,6 +59,20 @@ def answer_block(
     Raises:
         InputError: as of :func:`prediction_document`, and a block that is described in part.
     """
+    document, numbers = _answer_as_given(inputs, kind=kind, **how)
+    if is_wet(inputs):
+        how.pop("remarks", None)
+        try:
+            bound = _answer_as_given(without_water(inputs), kind=kind, **how)
+            document["drained"] = bound_values(*bound)
+        except InputError as error:
+            document["warnings"] = [*document["warnings"], no_drained_bound(error)]
+    return document, numbers
+
+
+def _answer_as_given(
+    inputs: Mapping[str, Any], *, kind: str | None, **how: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
     blocks = described(inputs, kind)
     (group,) = blocks.groups
     measures = {name: value for name, value in inputs.items() if name in OF_SHAKING}

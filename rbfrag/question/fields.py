@@ -153,6 +153,7 @@ class WholeFields(SpaceFields, total=False):
 
     block: Block | None
     back_fracture: bool | None
+    drainage: str | None
     cohesion_pa: float | None
     density_kg_m3: float | None
     kind: str | None

@@ -25,6 +25,8 @@ from rbfrag.question.blocks import (
 from rbfrag.question.shapes import (
     BOND,
     DENSITY_NOTE,
+    DRAINED_NOTE,
+    DRAINS_NOTHING,
     FRICTION_MISSING,
     LEAST_M,
     LENGTHS,
@@ -42,10 +44,19 @@ from rbfrag.question.shapes import (
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.arrays import REASONS, BlockArray
+from rbfrag.solver.block.formulas import array_elementwise, cot_gamma, tan_deg
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
 from rbfrag.solver.stability.first_slip import AFTER_SLIP, ENDED, SLIPS_ON
-from rbfrag.solver.stability.joint import NO_FRACTURE, ROCK_KG_M3
+from rbfrag.solver.stability.joint import (
+    DRAINAGES,
+    DRAINED,
+    NO_DRAINAGE,
+    NO_FRACTURE,
+    ROCK_KG_M3,
+    UNDRAINED,
+    water_at,
+)
 from rbfrag.solver.stability.modes import MODES, words_of_mode
 from rbfrag.vocabulary.quantities import JOINT, NUMBERS, PLANES, SPACE
 
@@ -64,6 +75,7 @@ def many_blocks(
     kinds: str | Sequence[str | None] | None = None,
     modes: Sequence[str | None] | None = None,
     rows: bool = False,
+    pga_g: NDArray[np.float64] | None = None,
 ) -> Blocks:
     """Return blocks as answers read them, each with its kind.
 
@@ -76,6 +88,8 @@ def many_blocks(
         modes: failure modes that are stated, empty for none.
         rows: they are rows of a table, which may state more than is needed: numbers go before a
             shape, and what is empty is not stated.
+        pga_g: PGA at which it is said whether heels or toes give way [g], of the number of blocks
+            or of one element; None for no such note.
 
     Raises:
         InputError: they are described twice or in part.
@@ -88,9 +102,10 @@ def many_blocks(
 
         given, wrong, notes = in_sections(given, size)
     known, unread = (given, ()) if rows else read_by_some(given)
-    sorting = _Sorted(known, size, rows)
+    sorting = _Sorted(known, size, rows, pga_g)
     for place, why in wrong.items():
         _Some(sorting, np.array([place])).refuse(True, "{why}", why=why)
+    sorting.state_drainage()
     blocks = sorting.blocks(kinds, modes)
     blocks = blocks._replace(remarks=(*notes, *blocks.remarks), read=blocks.read | planes)
     if rows:
@@ -140,12 +155,17 @@ class _Some:
 class _Sorted:
     """Many blocks while they are sorted by kind."""
 
-    def __init__(self, given: Mapping[str, Any], size: int, rows: bool) -> None:
-        self.size, self.rows = size, rows
+    def __init__(self, given: Mapping[str, Any], size: int, rows: bool, pga_g: Any) -> None:
+        self.size, self.rows, self.pga_g = size, rows, pga_g
         backed = np.asarray(given.get("back_fracture", 1.0), dtype=np.float64)
         self.backed = np.broadcast_to(backed != 0.0, (size,))
         """Behind which blocks a plane is; where that is not given, one is."""
-        self.given = {name: value for name, value in given.items() if name != "back_fracture"}
+        words = np.asarray(given.get("drainage", UNDRAINED), dtype=object)
+        words = np.broadcast_to(np.where((words == "") | (words == None), UNDRAINED, words), size)  # noqa: E711
+        self.drainage: NDArray[np.object_] = words
+        """What the water behind each block does while it moves; an empty word means undrained."""
+        others = ("back_fracture", "drainage")
+        self.given = {name: value for name, value in given.items() if name not in others}
         self.groups: list[Group] = []
         self.refused: list[Refused] = []
         self.unstable: list[Refused] = []
@@ -183,6 +203,16 @@ class _Sorted:
             tuple(self.unstable), self.kinds, self.modes,
             frozenset(self.read),
         )  # fmt: skip
+
+    def state_drainage(self) -> None:
+        """Reject words that are no drainage, and those of blocks without water."""
+        listener = _Some(self, np.arange(self.size))
+        for word in dict.fromkeys(self.drainage.tolist()):
+            if word not in DRAINAGES:
+                why = NO_DRAINAGE.format(f"{word}"[:40])
+                listener.refuse(self.drainage == word, "{why}", "drainage", why=why)
+        if "water_m" not in self.given and (self.drainage == DRAINED).any():
+            raise InputError(DRAINS_NOTHING, fields=("drainage", "water_m"))
 
     def _state(
         self, kinds: str | Sequence[str | None] | None, modes: Sequence[str | None] | None
@@ -317,6 +347,7 @@ class _Sorted:
         """Sort blocks that are given by their shape."""
         planes = [name for name in (*PLANES, *JOINT, *BOND) if name in self.given]
         self.read |= {*shape, *planes, "back_fracture"}
+        self.read |= {"drainage"} if "water_m" in planes else set()
         stated = {name: _at(self.given[name], places) for name in (*shape, *planes)}
         if shape != RECTANGLE:
             for name in ("beta_deg", "phi_deg"):
@@ -367,6 +398,11 @@ class _Sorted:
             strength["jcs_mpa"] = np.nan_to_num(jcs, nan=1.0)
         if free_standing and "water_m" in strength:
             listener.refuse(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
+        elif "water_m" in strength:
+            # the drained block is a dry one
+            drained = self.drainage[places] == DRAINED
+            listener.remark(drained & (strength["water_m"] > 0.0), DRAINED_NOTE)
+            strength["water_m"] = np.where(drained, 0.0, strength["water_m"])
         if strength:
             density = stated.get("density_kg_m3", np.full(1, np.nan))
             needed: Any = False
@@ -374,6 +410,9 @@ class _Sorted:
                 needed = needed | (strength.get(name, np.zeros(1)) > 0.0)
             listener.remark(np.isnan(density) & needed, DENSITY_NOTE)
             strength["density_kg_m3"] = np.where(np.isnan(density), ROCK_KG_M3, density)
+        push = None
+        if np.any(strength.get("water_m", 0.0) > 0.0):
+            push = _push(blocks, stated["beta_deg"], strength["water_m"], strength["density_kg_m3"])
         on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
         judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
         residual = stated.get("phi_residual_deg", np.full(1, np.nan))
@@ -427,7 +466,8 @@ class _Sorted:
                 _at(back, here), _at(taken, here), self.backed[of_these],
                 _at(np.asarray(strength.get("cohesion_pa", np.zeros(1))) > 0.0, here),
                 _at(np.asarray(strength.get("jrc", np.zeros(1))) > 0.0, here),
-                _at(np.asarray(strength.get("water_m", np.zeros(1))) > 0.0, here),
+                None if push is None else tuple(_at(each, here) for each in push),
+                None if self.pga_g is None else _at(self.pga_g, of_these),
             )  # fmt: skip
             names = [
                 name for name in _numbers_of(facts)
@@ -448,6 +488,23 @@ class _Sorted:
             if usable.size < places.size:
                 numbers = {name: _at(np.asarray(v), usable) for name, v in numbers.items()}
             self.groups.append(Group(facts.kind, numbers, places[usable]))
+
+
+def _push(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m3: Any) -> Any:
+    """Return the push of water on blocks, zeros on dry ones."""
+    t1, t3, h, beta, water, density = np.broadcast_arrays(
+        blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, beta_deg, water_m, density_kg_m3
+    )
+    functions = array_elementwise()
+    with np.errstate(all="ignore"):
+        wet, _ = water_at(
+            water_m=water, density_kg_m3=density, half_s1_m=h, tan_alpha1=t1, tan_alpha3=t3,
+            cot=cot_gamma(t1, t3), tan_beta=tan_deg(beta, functions), functions=functions,
+        )  # fmt: skip
+    along, normal, moment = (
+        np.where(water > 0.0, each, 0.0) for each in (wet.along, wet.normal, wet.moment)
+    )
+    return along, normal, moment * h
 
 
 def _at(values: Any, places: Places) -> Any:

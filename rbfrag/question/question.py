@@ -5,7 +5,7 @@ For a single block neither numpy nor any other library is loaded.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from os import PathLike
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
@@ -15,10 +15,12 @@ from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.prediction import (
     AT_REST,
+    A,
     Prediction,
     answer_given,
     is_single,
     with_remarks,
+    with_values,
 )
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
@@ -131,9 +133,92 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
             polarity = value
         else:
             given[name] = value
-    if motion is not None:
-        return _answer_motion(given, motion, kind, polarity, options)
-    return ask(given, kind=kind, **options)
+
+    def answer(inputs: Mapping[str, Any]) -> Prediction | PredictionArray:
+        if motion is not None:
+            return _answer_motion(inputs, motion, kind, polarity, options)
+        return ask(inputs, kind=kind, **options)
+
+    return with_drained_bound(answer, given, kind)
+
+
+def with_drained_bound(
+    answer: Callable[[Mapping[str, Any]], A], given: Mapping[str, Any], kind: Any = None
+) -> A:
+    """Return the answer to a question; with that without water pressure where water stands.
+
+    The drained bound is the answer to the same question without ``water_m``. It is missing where
+    that question has none, as of a block that slides when dry without a displacement limit.
+
+    Args:
+        answer: answers a question.
+        given: the question: fields of block and shaking.
+        kind: how the blocks are asked to fail.
+    """
+    result = answer(given)
+    if not is_wet(given):
+        return result
+    dry = without_water(given)
+    try:
+        bound = answer(dry)
+    except InputError as error:
+        return with_remarks(result, (), (no_drained_bound(error),))
+    if isinstance(bound, Prediction):
+        (group,) = described(dry, kind).groups
+        return with_values(result, drained=bound_values(bound.as_dict(), group.numbers))
+    import numpy as np
+
+    wet = np.asarray(given["water_m"], dtype=np.float64) > 0.0
+    answered = np.broadcast_to(wet, bound.probability.shape) & ~np.isnan(result.probability)
+    drained = {n: np.where(answered, getattr(bound, n), np.nan) for n in OF_BOUND}
+    lost = np.flatnonzero(answered & np.isnan(bound.probability))
+    if lost.size:
+        note = no_drained_bound(bound.reason.ravel()[lost[0]]).replaced(rows=lost)
+        result = with_remarks(result, (), (note,))
+    return with_values(result, drained=drained)
+
+
+def without_water(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a question about blocks behind which no water stands; arrays keep their number."""
+    dry = {n: value for n, value in given.items() if n not in ("water_m", "drainage")}
+    water: Any = given.get("water_m")
+    if water is not None and not isinstance(water, int | float):
+        import numpy as np
+
+        dry["water_m"] = np.zeros(np.shape(water))
+    return dry
+
+
+def no_drained_bound(reason: object) -> Diagnostic:
+    """Return the note that the question without water has no answer, and why."""
+    fields = reason.fields if isinstance(reason, InputError) else ()
+    return Diagnostic(f"no drained bound: {reason}", "no_drained_bound", fields=fields)
+
+
+def is_wet(given: Mapping[str, Any]) -> bool:
+    """Return whether water stands behind a block, or behind any of several."""
+    water: Any = given.get("water_m")
+    if water is None or isinstance(water, int | float):
+        return bool(water is not None and water > 0.0)
+    import numpy as np
+
+    return bool((np.asarray(water, dtype=np.float64) > 0.0).any())
+
+
+OF_BOUND = ("probability", "ci_low", "ci_high")
+
+
+def bound_values(
+    document: Mapping[str, Any], numbers: Mapping[str, Any]
+) -> dict[str, float | None]:
+    """Return the drained bound of an answer: its values, and the yield by its name.
+
+    Args:
+        document: the answer without water, under the keys of the JSON contract.
+        numbers: of the dry block; empty for one that is unstable at rest.
+    """
+    (name,) = {"kr", "ky", "ks", "kct"} & {*facts_of(document["kind"]).parameters}
+    return {n: document[n] for n in OF_BOUND} | {name: numbers.get(name)}
 
 
 def _keywords_in_words() -> str:

@@ -17,8 +17,14 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
 from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
 from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, slips_on_base
-from rbfrag.solver.stability.joint import ASSUMED_DENSITY, STAYS_UNDRAINED
+from rbfrag.solver.stability.joint import (
+    ASSUMED_DENSITY,
+    IS_DRAINED,
+    NO_EFFECT_OF_COHESION,
+    STAYS_UNDRAINED,
+)
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
+from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
 
 if TYPE_CHECKING:
@@ -46,6 +52,17 @@ been meant."""
 LENGTHS = ("height_m", "width_m", "s1_m", "s2_m", "r3_m")
 
 DENSITY_NOTE = Diagnostic(ASSUMED_DENSITY, "density_assumed")
+
+UNDRAINED_NOTE = Diagnostic(STAYS_UNDRAINED, "undrained")
+
+DRAINED_NOTE = Diagnostic(IS_DRAINED, "drained", severity="warning")
+
+COHESION_NOTE = Diagnostic(NO_EFFECT_OF_COHESION, "cohesion_without_effect")
+
+DRAINS_NOTHING = (
+    "drainage goes with water_m, the height of the water in the back fracture: give both, or "
+    "neither"
+)
 
 FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
 
@@ -152,7 +169,9 @@ class ModeShapes(NamedTuple):
         backed: whether, or behind which of them, a plane is.
         bonded: whether, or which of, their bases have cohesion.
         rough: whether, or which of, their bases are rough.
-        wet: whether, or in which of them, water stands behind them.
+        push: of water, as :class:`rbfrag.solver.stability.single.Stability` has it; zeros of dry
+            ones among several.
+        pga_g: PGA at which it is said whether heel or toe give way [g]; None for no such note.
     """
 
     body: Block | BlockArray
@@ -165,7 +184,16 @@ class ModeShapes(NamedTuple):
     backed: Any
     bonded: Any = False
     rough: Any = False
-    wet: Any = False
+    push: Any = None
+    pga_g: Any = None
+
+    @property
+    def wet(self) -> Any:
+        """Whether, or on which of them, water pushes."""
+        if self.push is None:
+            return False
+        along, off, _ = self.push
+        return (along != 0.0) | (off != 0.0)
 
 
 def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
@@ -207,7 +235,10 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
 BOND = ("cohesion_pa", "density_kg_m3")
 
 
-PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND, *JOINT)
+PLANE_TEXTS = (*SPACE, "drainage")
+"""Fields of planes that are words; of many blocks arrays of them."""
+
+PLANES_OF_A_SHAPE = (*PLANES[1:], "back_fracture", "kv", *BOND, *JOINT, "drainage")
 """Fields that describe a block only beside its shape; the dip stands with numbers too."""
 
 SIDES_AND_PLANES = (*(name for names in SHAPES for name in names), *PLANES_OF_A_SHAPE)
@@ -323,10 +354,14 @@ def numbers_of_shape(
         listener.refuse(True, NO_MODEL_OF_MODE, **words)
         return {}
     listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
-    listener.remark(judged.wet, STAYS_UNDRAINED)
+    listener.remark(judged.wet, UNDRAINED_NOTE)
+    if mode == "topple" and not facts.free_standing:
+        listener.remark(judged.bonded, COHESION_NOTE)
     if slips_on_base(facts):
         listener.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
         listener.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
+    if judged.pga_g is not None and mode in ("slide", "topple") and not facts.free_standing:
+        _say_what_gives_way(judged, listener)
     if "ky" in facts.parameters:
         listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
         dip_deg = _dip_of_factor(judged)
@@ -358,6 +393,16 @@ def numbers_of_shape(
     restitution = stated.get("restitution", own)
     restitution = functions.where(restitution == restitution, restitution, own)
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
+
+
+def _say_what_gives_way(judged: ModeShapes, listener: Listener) -> None:
+    """Say at which PGA a slide tips about its heel, or the toe of a topple slips."""
+    about, threshold_g = (
+        (HEEL_TIPS, heel_tips_g) if judged.mode == "slide" else (TOE_SLIPS, toe_slips_g)
+    )
+    at_g = threshold_g(judged.body, judged.beta_deg, judged.phi_deg, judged.push)
+    exceeded = (judged.pga_g > at_g) & (judged.pga_g > judged.k) & (judged.taken ^ True)
+    listener.remark(exceeded, about, threshold=at_g)
 
 
 def _dip_of_factor(judged: ModeShapes) -> Any:

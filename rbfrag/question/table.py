@@ -17,6 +17,7 @@ from typing import NamedTuple
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KINDS
+from rbfrag.solver.stability.joint import DRAINED, UNDRAINED
 from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, INTENSITY, QUANTITIES, column_of, word_of
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
@@ -128,6 +129,7 @@ class _Vocabulary(NamedTuple):
     quiet: tuple[str, ...]
     kinds: Mapping[str, str]
     answers: Mapping[str, bool]
+    drainages: Mapping[str, str]
 
 
 @cache
@@ -152,6 +154,7 @@ def _vocabulary() -> _Vocabulary:
         tuple(data["quiet"]["words"]),
         kinds | {kind.replace("_", " "): kind for kind in KINDS},
         {w: name == "yes" for name, words in data["answers"].items() for w in words},
+        {w: name for name, words in data["drainage"].items() for w in words},
     )
 
 
@@ -229,6 +232,17 @@ def kind_named(text: str) -> str | None:
 def yes_or_no(text: str) -> bool | None:
     """Return whether a cell says yes; None where it says neither yes nor no."""
     return _vocabulary().answers.get(" ".join(normalized_words(text)))
+
+
+def drainage_named(text: str) -> str:
+    """Return the drainage that a cell names, in any of five languages; yes means drained.
+
+    What names none is returned as it is.
+    """
+    word = " ".join(normalized_words(text))
+    answer = yes_or_no(text)
+    named = _vocabulary().drainages.get(word, text)
+    return named if answer is None else DRAINED if answer else UNDRAINED
 
 
 def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | None:

@@ -108,7 +108,8 @@ class PredictAnswer(_Document):
     `event_low` and `event_high` between which shares of like blocks fail at `sites` of one
     earthquake; null where no sites are asked for (one block falls or stands) and where that is not
     known. `block_sd` is the standard deviation of P over what an uncertain block may be;
-    null where it is certain.
+    null where it is certain. `drained` is the answer without water pressure, with the yield
+    acceleration; null for a dry block.
     """
 
     mode: str
@@ -119,13 +120,19 @@ class PredictAnswer(_Document):
 OF_ARRAYS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain", "how",
     "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
+    "drained",
 )  # fmt: skip
 """What is answered of many blocks."""
 
 
 @keys_of(PredictionArray, names=OF_ARRAYS)
 class PredictArrays(_Document):
-    """Probabilities of many blocks or motions; null where the input cannot be used."""
+    """Probabilities of many blocks or motions; null where the input cannot be used.
+
+    `drained` has `probability`, `ci_low` and `ci_high` without water pressure, null for dry blocks.
+    """
+
+    drained: dict[str, list[float | None]] | None
 
 
 class Note(_Document):
@@ -291,6 +298,7 @@ class SiteRate(_Document):
     ci_high: float
     numerical_error: float
     probability: float
+    drained: dict[str, float] | None
 
 
 class HazardDocument(_Document):
@@ -310,5 +318,6 @@ class HazardDocument(_Document):
     ci_high: float | None = None
     numerical_error: float | None = None
     probability: float | None = None
+    drained: dict[str, float] | None = None
     contributions: list[Contribution] | None = None
     answers: list[SiteRate] | None = None

@@ -48,7 +48,7 @@ Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, f
 COLUMNS = frozenset((*BLOCK, *SHAKING, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
-_TEXTS = frozenset((*SPACE, *COMPONENT))
+_TEXTS = frozenset((*SPACE, *COMPONENT, "drainage"))
 """Texts of which many blocks have one each."""
 
 _NOT_SENT = frozenset({"block", "db", "gmm"})
@@ -129,7 +129,7 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "back_fracture")
+_SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "drainage", "back_fracture")
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
 _AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *AT_REST)
 _BLOCK = (*BLOCK, *WHOLE)

@@ -15,7 +15,7 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
 from rbfrag.fragility.lookup import models_in_memory
 from rbfrag.question.document import answer_block
-from rbfrag.question.question import ask
+from rbfrag.question.question import ask, with_drained_bound
 from rbfrag.results.diagnostic import as_documents, diagnostics
 from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays, TableAnswers
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows, TableQuery
@@ -73,9 +73,12 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
         name: np.array(value, dtype=np.float64, ndmin=1) if name in COLUMNS else value
         for name, value in given.items()
     }
-    answers = ask(arrays, **how, db=db)
+    answers = with_drained_bound(lambda inputs: ask(inputs, **how, db=db), arrays)
     columns = {name: getattr(answers, name) for name in OF_ARRAYS}
-    return json_text({n: v.tolist() if hasattr(v, "tolist") else v for n, v in columns.items()})
+    document = {n: v.tolist() if hasattr(v, "tolist") else v for n, v in columns.items()}
+    if document["drained"]:
+        document["drained"] = {n: v.tolist() for n, v in document["drained"].items()}
+    return json_text(document)
 
 
 def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None) -> bytes:

@@ -130,7 +130,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     """Return what `rbfrag hazard` prints as JSON."""
     import numpy as np
 
-    from rbfrag.hazards.answer import hazard_at_sites
+    from rbfrag.hazards.answer import hazard_at_sites, with_drained_rates
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
@@ -150,13 +150,13 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         stated["kind"] = kind
     given = {name: [value] * len(curves) for name, value in stated.items()}
     sites = np.arange(len(curves))
-    rates = hazard_at_sites(
-        [[curve] for curve in curves],
-        sites,
+    places = [[curve] for curve in curves]
+    answering = cast("AnsweringFields", {**how, "db": db})
+    rates = with_drained_rates(
+        lambda blocks: hazard_at_sites(
+            places, sites, blocks, cast("CurveKeywords", meaning), answering, years=query.years
+        ),
         given,
-        cast("CurveKeywords", meaning),
-        cast("AnsweringFields", {**how, "db": db}),
-        years=query.years,
     )
     return json_text(as_dict(rates, [None] * len(curves)))
 

@@ -414,6 +414,13 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             input=Input(word="no_back", type=bool),
         ),
         Quantity(
+            "drainage", "Drainage of the water in the back fracture",
+            input=Input(
+                "with {water_m}: undrained (its pressure keeps acting while the block moves) or "
+                "drained (it vanishes); default: undrained", type=str,
+            ),
+        ),
+        Quantity(
             "cohesion_pa", "Cohesion of the base", "Pa", range=NOT_NEGATIVE,
             input=Input("with {density_kg_m3}"),
         ),
@@ -697,7 +704,9 @@ QUESTION = (*BLOCKS, *SHAKING, *RECORD, *REQUEST, *ARRAYS)
 AT_REST = _names("at rest")
 ROW = (*_names("names"), "kind", *_names("rows"))
 """What a row of a table holds in addition to its block and its shaking."""
-COLUMNS = tuple(dict.fromkeys((*BLOCK, *SHAKING, *COMPONENT, *ROW, *SPACE, *BY_ROW, "mechanism")))
+COLUMNS = tuple(
+    dict.fromkeys((*BLOCK, *SHAKING, *COMPONENT, *ROW, *SPACE, *BY_ROW, "mechanism", "drainage"))
+)
 """What may be a column of a table."""
 
 PANELS = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from rbfrag.cli.commands.simulate import WorkerOptions
@@ -118,13 +118,14 @@ def hazard(
     import numpy as np
 
     from rbfrag.exchange.release import RELEASE, SIDES, release_columns
-    from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
+    from rbfrag.exchange.site_rates import blocks_at_sites, numbers_of_dry, rate_columns
     from rbfrag.fragility.unusable import FROM_SUMS
     from rbfrag.hazards.answer import hazard_at_sites
     from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.kernel import rate_part
     from rbfrag.hazards.report import as_dict
+    from rbfrag.question.question import is_wet, no_drained_bound, without_water
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     check_files(table=release)
@@ -154,6 +155,22 @@ def hazard(
         at_least=wanted.counts(), years=wanted.years, one_class=is_class,
         count=None if is_class else at.columns.get("count"), run=run,
     )  # fmt: skip
+    if is_wet(given) if rows is None else rows.wet is not None:
+        try:
+            dry = blocks.given_blocks(
+                Given(without_water(given)), reads=(*RELEASE, "count"), dry=True
+            )
+            bound = hazard_at_sites(
+                at.sites, at.site, numbers_of_dry(dry.columns, at),
+                cast("CurveKeywords", vars(meaning)), cast("AnsweringFields", answering),
+                years=wanted.years, run=run,
+            )  # fmt: skip
+            drained = bound.annual_rate
+            if rows is not None and rows.wet is not None:
+                drained = np.where(rows.wet[at.columns["row"]], drained, np.nan)
+            answer = replace(answer, drained=drained)
+        except InputError as error:
+            remarks += (no_drained_bound(error),)
     notes = diagnostics(remarks, at.remarks, answer.warnings)
     if out is not None:
         table = rate_columns(answer, at.columns, rows)
@@ -198,6 +215,11 @@ def _print(
         counts = document.pop("annual_rate_at_least", None)
         print_pairs(document if verbose else _short(document))
         shown = rows[: len(rows) if verbose else MOST_ROWS]
+        wet = any(row["drained"] for row in rows)
+        for row in shown:
+            bound = row.pop("drained")
+            if wet:
+                row["drained_annual_rate"] = None if bound is None else bound["annual_rate"]
         for some in filter(None, (counts, branches, shown)):
             print()
             if not verbose:
@@ -207,8 +229,8 @@ def _print(
         if len(shown) < len(rows):
             print(f"{len(rows) - len(shown):,} more: --out FILE writes all, --verbose prints them")
     else:
-        del document["contributions"]
         print(rate_in_words(document))
+        del document["contributions"], document["drained"]
         for sentence in beyond_in_words(answer):
             print(sentence)
         if spread is not None:

@@ -61,6 +61,7 @@ class TableOptions:
         reads: Collection[str] = (),
         one_kind: bool = False,
         need_kind: str = "",
+        dry: bool = False,
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
@@ -70,6 +71,7 @@ class TableOptions:
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
             need_kind: why rows of a table need a kind, as for `read_blocks`.
+            dry: without the water that a table has behind blocks.
         """
         from rbfrag.exchange.block_rows import read_blocks
 
@@ -80,6 +82,7 @@ class TableOptions:
             rows = read_blocks(
                 table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet,
                 ignore_columns=column_names(self.ignore_columns), crs=self.crs, need_kind=need_kind,
+                dry=dry,
             )  # fmt: skip
             return GivenBlocks(rows.blocks, False, given.notes, rows)
         kind, numbers, remarks = numbers_of(given)
@@ -107,6 +110,7 @@ class BlocksOptions(TableOptions):
         one_kind: bool = False,
         need_kind: str = "",
         n: int | None = None,
+        dry: bool = False,
     ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
@@ -117,10 +121,11 @@ class BlocksOptions(TableOptions):
             one_kind: whether all must be of one kind, as for `read_blocks`.
             need_kind: why rows of a table need a kind, as for `read_blocks`.
             n: number of realisations of the rock mass; None for what its file says.
+            dry: without the water that a table has behind blocks.
         """
         if self.rockmass is None:
             return super().given_blocks(
-                given, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind
+                given, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind, dry=dry
             )
         from rbfrag.fragility.method import TOPPLING_BLOCK
 

@@ -29,7 +29,7 @@ from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
 from rbfrag.question.document import answer_block
 from rbfrag.question.fields import RangeFields
-from rbfrag.question.question import OF_SHAKING
+from rbfrag.question.question import OF_SHAKING, described, without_water
 from rbfrag.question.words import number_in_words
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.block.geometry import Block
@@ -148,6 +148,11 @@ def contents_of(
     measures = {name: value for name, value in read.items() if name in STATED} | medians
     model = find_model(document["model"], TERMS[document["term"]].inputs, how.get("db"))
     answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), how)
+    if answered is not None and document["drained"] is not None:
+        (group,) = described(without_water(inputs), options.get("kind")).groups
+        bound = _rate({**group.numbers, "kind": group.kind}, rate or RateQuestion(), how)
+        if bound is not None:
+            answered.document["drained"] = {"annual_rate": bound.document["annual_rate"]}
     about_rate: tuple[str, ...] = ()
     if answered is not None:
         about_rate = (rate_in_words(answered.document), *beyond_in_words(answered.answer))
@@ -157,6 +162,7 @@ def contents_of(
             *words.prediction_in_words(document),
             *about_rate,
             *words.block_in_words(document["method"], read),
+            *words.drained_in_words(document),
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),

@@ -235,6 +235,16 @@ class BlockArray(Tabular):
         return corner_distance(self.half_s1_m, self.tan_alpha3, array_elementwise())
 
     @property
+    def toe(self) -> tuple[FloatArray, FloatArray]:
+        """Toes from the centroids: along the bases, out of the slope, and off them [m]."""
+        return self.half_s1_m * self.tan_alpha3, -self.half_s1_m
+
+    @property
+    def heel(self) -> tuple[FloatArray, FloatArray]:
+        """Heels likewise [m]."""
+        return self.half_s1_m * self.tan_alpha1, -self.half_s1_m
+
+    @property
     def shape_factor(self) -> FloatArray:
         """F_s = m r3²/I_toe (eq. 4.27)."""
         return shape_factor(self.tan_alpha1, self.tan_alpha3)

@@ -52,11 +52,12 @@ class Toppling(Kind):
         # a block of another mode, asked about as a topple, is not followed: it would slide or slump
         if need is not None and need > phi_deg and site.yield_g is not None:
             answer = self._with_toe_slip(site, shaking)
-            slips = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
-            answer = replace(answer, warnings=(*answer.warnings, slips))
+            gives_way = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
+            answer = replace(answer, warnings=(*answer.warnings, gives_way))
             history = answer.history
+        slips = slips_g if slips_g < math.inf else None
         return replace(
-            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips_g, history=history
+            answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips, history=history
         )
 
     def _with_toe_slip(self, site: BlockOnPlanes, shaking: Shaking) -> Response:

@@ -55,6 +55,8 @@ ROCK_KG_M3 = 2650.0
 
 ASSUMED_DENSITY = f"the density is not given: {ROCK_KG_M3:,.0f} kg/m³ is assumed"
 
+NO_DRAINAGE = "drainage = {!r}: it must be undrained or drained"
+
 STAYS_UNDRAINED = (
     "water pressure keeps acting while the block moves (conservative); a joint under 1 mm without "
     "inflow behaves almost as drained; hydrodynamic pressure is neglected"
@@ -136,9 +138,7 @@ def is_drained(drainage: object) -> bool:
         InputError: neither of `DRAINAGES`.
     """
     if drainage is not None and drainage not in DRAINAGES:
-        raise InputError(
-            f"drainage = {drainage!r}: it must be undrained or drained", fields=("drainage",)
-        )
+        raise InputError(NO_DRAINAGE.format(f"{drainage}"[:40]), fields=("drainage",))
     return drainage == DRAINED
 
 

@@ -188,6 +188,9 @@ def stability(
     if planes.bond and finding.mode == "topple":
         assumed = (*assumed, NO_EFFECT_OF_COHESION)
     beta_deg, bond, k = finding.beta_deg, planes.bond or 0.0, finding.k
+    slips_g = math.inf
+    if finding.mode == "topple":
+        slips_g = toe_slips_g(block, beta_deg, finding.phi_deg, push)
     own = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
         mode=finding.mode,
@@ -213,9 +216,7 @@ def stability(
         warnings=(*warnings_about(block, finding), *assumed),
         joint=strength,
         water_m=water_m,
-        toe_slips_g=toe_slips_g(block, beta_deg, finding.phi_deg, push)
-        if finding.mode == "topple"
-        else None,
+        toe_slips_g=slips_g if slips_g < math.inf else None,
         push=push,
         drained=drained,
     )

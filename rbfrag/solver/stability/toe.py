@@ -6,36 +6,52 @@ q = F_s (k cos θc - sin θc + m0), θc = α3 - β and friction alone,
     tan φ = (sin β + k cos β + e_x - q cos α3)/(cos β - k sin β - e_y + q sin α3),
 
 where e is the push of water over the weight, down the base and off it, and m0 its forward moment
-about the toe over m g r3.
+about the toe over m g r3. Blocks are single ones, or arrays with pushes and angles of their shape.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.solver.block.formulas import SCALAR, array_elementwise
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import DRY, Push
 
 if TYPE_CHECKING:
+    from rbfrag.solver.block.arrays import BlockArray
     from rbfrag.solver.results import ResponseHistory
 
 # of 2,652 random blocks 16 % slip at the toe below their critical amplitude, ln of which then
 # differs by 0.036 +- 0.10 from that of pure toppling
-TOE_SLIPS = (
-    "the toe slips above {slips:.2f} g: P(toppling) changes little (critical amplitude ±10 %), but "
-    "the toe may move by centimetres"
+TOE_SLIPS = Diagnostic(
+    "the toe slips above {threshold:.2f} g: P(toppling) changes little (critical amplitude ±10 %), "
+    "but the toe may move by centimetres",
+    "toe_slips",
 )
 # followed blocks of a rock mass over Newmark's: 10, 90 % and geometric mean
-TIPS = (
-    "pulses into the slope above {tips:.2f} g tip the block: it slides 1.4 times as far on average "
-    "(1.0–2.7), so P is too low; rbfrag respond follows it"
+HEEL_TIPS = Diagnostic(
+    "pulses into the slope above {threshold:.2f} g tip the block: it slides 1.4 times as far on "
+    "average (1.0–2.7), so P is too low; rbfrag respond follows it",
+    "heel_tips",
+    severity="warning",
 )
 NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
 
 
-def moment_about_toe(block: Block, push: Push | None) -> float:
+def _trigonometry(block: Block | BlockArray) -> ModuleType:
+    """Return the module of functions for a single block, or for arrays."""
+    if isinstance(block, Block):
+        return math
+    import numpy as np
+
+    return np
+
+
+def moment_about_toe(block: Block | BlockArray, push: Push | None) -> Any:
     """Return the forward moment of water about the toe over m g r3, m0."""
     if push is None:
         return 0.0
@@ -43,16 +59,17 @@ def moment_about_toe(block: Block, push: Push | None) -> float:
     return (block.toe[0] * off - block.toe[1] * along - moment_m) / block.r3_m
 
 
-def _balance(block: Block, beta_deg: float, push: Push | None) -> tuple[float, float, float, float]:
+def _balance(block: Block | BlockArray, beta_deg: Any, push: Push | None) -> tuple[Any, ...]:
     """Return thrust and pressure at the toe over the weight, each a constant and per k."""
-    beta, alpha3 = math.radians(beta_deg), math.radians(block.alpha3_deg)
+    m = _trigonometry(block)
+    beta, alpha3 = m.radians(beta_deg), m.radians(block.alpha3_deg)
     turns, factor = alpha3 - beta, block.shape_factor
     along, off, _ = push or DRY
-    up = factor * math.cos(turns)
-    down = factor * (moment_about_toe(block, push) - math.sin(turns))
+    up = factor * m.cos(turns)
+    down = factor * (moment_about_toe(block, push) - m.sin(turns))
     return (
-        math.sin(beta) + along - down * math.cos(alpha3), math.cos(beta) - up * math.cos(alpha3),
-        math.cos(beta) - off + down * math.sin(alpha3), -math.sin(beta) + up * math.sin(alpha3),
+        m.sin(beta) + along - down * m.cos(alpha3), m.cos(beta) - up * m.cos(alpha3),
+        m.cos(beta) - off + down * m.sin(alpha3), -m.sin(beta) + up * m.sin(alpha3),
     )  # fmt: skip
 
 
@@ -70,67 +87,55 @@ def toe_needs_deg(block: Block, beta_deg: float, k: float, push: Push | None = N
 
 
 def toe_slips_g(
-    block: Block, beta_deg: float, phi_deg: float, push: Push | None = None
-) -> float | None:
+    block: Block | BlockArray, beta_deg: Any, phi_deg: Any, push: Push | None = None
+) -> Any:
     """Return the acceleration at which the toe gives way as a rotation starts [g].
 
-    None where it holds at any.
+    +inf where it holds at any.
 
     Args:
-        block: a block that topples.
+        block: a block that topples, or several.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         push: of water.
     """
+    m = _trigonometry(block)
     thrust, per_k, pressure, pressed_per_k = _balance(block, beta_deg, push)
-    friction = math.tan(math.radians(phi_deg))
+    friction = m.tan(m.radians(phi_deg))
     rises = per_k - friction * pressed_per_k
-    return (friction * pressure - thrust) / rises if rises > 0.0 else None
+    where = SCALAR.where if m is math else array_elementwise().where
+    return where(
+        rises > 0.0, (friction * pressure - thrust) / where(rises > 0.0, rises, 1.0), math.inf
+    )
 
 
-def heel_tips_g(block: Block, beta_deg: float, push: Push | None = None) -> float:
+def heel_tips_g(
+    block: Block | BlockArray, beta_deg: Any, phi_deg: Any, push: Push | None = None
+) -> Any:
     """Return the acceleration into the slope above which a block that has slid tips back [g].
 
-    tan(β - α1) less the backward moment of water; at most 0 for a block that leans at rest.
+    tan(β - α1) less the backward moment of water; 0 for a block that leans at rest, and +inf for
+    one that slides up its base first, α1 <= -φ.
 
     Args:
-        block: a block that slides.
+        block: a block that slides, or several.
         beta_deg: dip of the base [deg].
+        phi_deg: friction angle of the base [deg].
         push: of water.
     """
-    past_heel = math.radians(beta_deg - block.alpha1_deg)
-    along, off, moment_m = push or DRY
-    moment_m += block.heel[1] * along - block.heel[0] * off
-    return math.tan(past_heel) - moment_m / (block.r1_m * math.cos(past_heel))
+    m = _trigonometry(block)
+    where = SCALAR.where if m is math else array_elementwise().where
+    tips = (block.alpha1_deg > -phi_deg) & (beta_deg - block.alpha1_deg < 90.0)
+    past_heel = m.radians(where(tips, beta_deg - block.alpha1_deg, 0.0))
+    along, off, about_centroid = push or DRY
+    moment_m: Any = about_centroid + block.heel[1] * along - block.heel[0] * off
+    threshold = m.tan(past_heel) - moment_m / (block.r1_m * m.cos(past_heel))
+    return where(tips, where(threshold > 0.0, threshold, 0.0), math.inf)
 
 
-def about_heel(
-    block: Block, beta_deg: float, phi_deg: float, pga_g: float, push: Push | None = None
-) -> str | None:
-    """Return whether a PGA [g] tips a block that slides about its heel, as a sentence.
-
-    None for a block that slides up its base first, or whose PGA stays below the threshold.
-    """
-    if block.alpha1_deg <= -phi_deg or beta_deg - block.alpha1_deg >= 90.0:
-        return None
-    tips_g = heel_tips_g(block, beta_deg, push)
-    return TIPS.format(tips=max(tips_g, 0.0)) if pga_g > tips_g else None
-
-
-def about_toe(
-    block: Block, beta_deg: float, phi_deg: float, pga_g: float, push: Push | None = None
-) -> str:
-    """Return whether the toe of a block that topples holds at a PGA [g], as a sentence."""
-    need = toe_needs_deg(block, beta_deg, pga_g, push)
-    slips = toe_slips_g(block, beta_deg, phi_deg, push)
-    if slips is None or pga_g <= slips:
-        return f"{NEEDS.format(need=need, where=f'{pga_g:.3g} g')}, and phi is {phi_deg:g}"
-    return TOE_SLIPS.format(slips=slips)
-
-
-def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float | None) -> str:
+def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float) -> str:
     """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
-    at = "" if slips_g is None else f" at {slips_g:.2f} g"
+    at = "" if slips_g == math.inf else f" at {slips_g:.2f} g"
     consequence = f"phi = {phi_deg:g} gives way{at}: the slip of the toe is followed step by step"
     return f"{NEEDS.format(need=need_deg, where=where)}; {consequence}"
 

@@ -11,7 +11,7 @@ import pytest
 import rbfrag
 from rbfrag import Block, stability
 from rbfrag.motions.polarity import Polarity
-from rbfrag.solver.stability.toe import about_toe, toe_needs_deg, toe_needs_in_time, toe_slips_g
+from rbfrag.solver.stability.toe import toe_needs_deg, toe_needs_in_time, toe_slips_g
 from tests.physics.pulses import half_sines
 
 
@@ -27,7 +27,6 @@ def test_printed_oracle() -> None:
 def test_both_forms_agree_and_forces_balance(beta: float) -> None:
     block = Block.from_fractures(3.0, 0.8, 80.0)
     slips = toe_slips_g(block, beta, 25.0)
-    assert slips is not None
     assert toe_needs_deg(block, beta, slips) == pytest.approx(25.0, abs=1e-9)
     # moments about the toe give the rotation, and Newton's law for the centroid the reaction
     b = math.radians(beta)
@@ -41,8 +40,8 @@ def test_both_forms_agree_and_forces_balance(beta: float) -> None:
 def test_predict_says_so() -> None:
     asked = {"height_m": 4.0, "width_m": 1.0, "phi_deg": 16.0, "pgv_m_s": 0.6}
     said = rbfrag.predict(**asked, pga_g=0.5).warnings
-    assert about_toe(Block.rectangle(4.0, 1.0), 0.0, 16.0, 0.5) in said
     assert any("the toe slips above 0.40 g: P(toppling) changes little" in text for text in said)
+    assert not any("the toe" in text for text in rbfrag.predict(**asked, pga_g=0.4).warnings)
 
 
 @pytest.mark.parametrize(

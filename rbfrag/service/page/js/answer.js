@@ -4,7 +4,7 @@ import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
 import { quantity, readable } from "./numbers.js";
 import { byId } from "./page.js";
-import { atSites, inOneSentence, percent, ranges, verbOf } from "./percent.js";
+import { atSites, drainedBound, inOneSentence, percent, ranges, verbOf } from "./percent.js";
 import { writeText } from "./subscripts.js";
 
 const SPOKEN_AFTER_MS = 700;
@@ -53,7 +53,7 @@ export function showAnswer(answer) {
   byId("probability").textContent = percent(answer.probability);
   const questions = answer.warnings.filter((/** @type {string} */ text) => text.startsWith(UNIT));
   byId("sentence").textContent = [...questions, inOneSentence(answer)].join(" ");
-  byId("in-words").textContent = ranges(answer);
+  writeText(byId("in-words"), [ranges(answer), drainedBound(answer)].filter(Boolean).join(" "));
   const domain = byId("domain");
   domain.textContent = range;
   domain.dataset.inside = String(answer.in_domain);

@@ -81,6 +81,24 @@ export function ranges(answer) {
   return `As far as the data tell, it is ${between(low, high)}.${event} (${each}${percent(level)}.)`;
 }
 
+/** Yields of a block, by their keys. */
+const YIELDS = { kr: "k_r", ky: "k_y", ks: "k_s", kct: "k_ct" };
+
+/**
+ * What the answer is without the pressure of the water behind the block; empty for a dry block.
+ * @param {{drained?: Record<string, number | null> | null}} answer
+ */
+export function drainedBound({ drained }) {
+  if (!drained) return "";
+  const strength = Object.entries(YIELDS)
+    .filter(([key]) => typeof drained[key] === "number")
+    .map(([key, symbol]) => `${symbol}${GAP}=${GAP}${Number(Number(drained[key]).toPrecision(3))}, `);
+  const [p, low, high] = [drained.probability, drained.ci_low, drained.ci_high].map((value) =>
+    percent(Number(value)),
+  );
+  return `Drained, without water pressure: ${strength.join("")}P${GAP}=${GAP}${p} (${low} to ${high}).`;
+}
+
 /**
  * Which sites the range of one earthquake is of.
  * @param {{sites?: number | null}} answer

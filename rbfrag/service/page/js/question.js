@@ -10,10 +10,10 @@ import { plain } from "./numbers.js";
  */
 
 export const BLOCK_FIELDS = {
-  rectangle: ["height", "width", "dip", "phi"],
+  rectangle: ["height", "width", "dip", "phi", "water"],
   numbers: ["p2", "kr"],
-  angles: ["alpha1", "alpha3", "r3", "beta", "phi"],
-  fractures: ["s1", "s2", "gamma", "beta", "phi"],
+  angles: ["alpha1", "alpha3", "r3", "beta", "phi", "water"],
+  fractures: ["s1", "s2", "gamma", "beta", "phi", "water"],
 };
 
 /** By which of its fields an address names a shape. */
@@ -45,6 +45,7 @@ export const DEFAULTS = {
   gamma: "85",
   beta: "18",
   phi: "",
+  water: "",
   kind: "",
   restitution: "",
   displacement: "0.1",
@@ -83,8 +84,16 @@ export function only(values, names) {
  * @returns {Values}
  */
 export function blockOf({ shape, values }) {
-  const block = only(values, BLOCK_FIELDS[shape]);
+  const block = only(values, blockFields({ shape, values }));
   return values.kind ? { ...block, no_back: "true" } : block;
+}
+
+/**
+ * The fields that describe the block; no water stands behind one that is free-standing.
+ * @param {Question} question
+ */
+function blockFields({ shape, values }) {
+  return BLOCK_FIELDS[shape].filter((name) => !(values.kind && name === "water"));
 }
 
 /**
@@ -94,7 +103,7 @@ export function blockOf({ shape, values }) {
  */
 export function asked({ shape, values }) {
   const free = values.kind ? ["kind", "restitution"] : [];
-  const names = [...BLOCK_FIELDS[shape], ...free, "displacement", ...MEASURES, ...MODEL_FIELDS];
+  const names = [...blockFields({ shape, values }), ...free, "displacement", ...MEASURES, ...MODEL_FIELDS];
   const given = only(values, names);
   for (const name of /** @type {const} */ (["level", "displacement"])) {
     if (given[name] === DEFAULTS[name]) delete given[name];
