@@ -20,7 +20,6 @@ from rbfrag.fragility.measures import (
     ABOUT_SCATTER,
     MEASURES,
     SCATTERED,
-    STATED,
     TERMS,
     least_inputs,
     terms_from,
@@ -28,6 +27,7 @@ from rbfrag.fragility.measures import (
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.vocabulary.quantities import INTENSITY
 
 SHIPPED = "the reference that is shipped with rbfrag"
 """What answers are said to come from where no other database is named, or is there."""
@@ -158,7 +158,7 @@ def find_model(
                 f"model {chosen.name!r} needs {' and '.join(chosen.term.inputs)} "
                 f"({chosen.term.title}); given is {_measures(given)}: give what it needs, or "
                 "choose a model of another term",
-                fields=STATED,
+                fields=INTENSITY,
             )
     return chosen
 
@@ -198,7 +198,7 @@ def _suited_in(
     if not possible:
         raise InputError(
             f"{_measures(given)} is given: a prediction needs {_enough(TERMS)}, or a motion",
-            fields=STATED,
+            fields=INTENSITY,
         )
     block_of_question = block_of(given)
     kind = block_of_question.kind if kind is None else kind

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.solver.kinds import BY_MECHANICS
+from rbfrag.vocabulary.quantities import MEASURES, NUMBERS, QUANTITIES
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
@@ -92,7 +93,9 @@ def drained_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     bound = document.get("drained")
     if bound is None:
         return ()
-    yields = [f"{SYMBOLS[n]} = {bound[n]:.3g}, " for n in SYMBOLS if bound.get(n) is not None]
+    yields = [
+        f"{QUANTITIES[n].symbol} = {bound[n]:.3g}, " for n in NUMBERS if bound.get(n) is not None
+    ]
     p = with_interval(bound["probability"], bound["ci_low"], bound["ci_high"])
     return (f"Drained, without water pressure: {''.join(yields)}P = {p}.",)
 
@@ -140,7 +143,7 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
         else ()
     )
     numbers = " and ".join(
-        f"{SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
+        f"{QUANTITIES[name].symbol} = {value:.3g}{units.get(name, '')}"
         for name, value in values.items()
     )
     stands = (f"{block.support[:1].upper()}{block.support[1:]}.",) if block.support else ()
@@ -191,7 +194,7 @@ def measures_in_words(names: Sequence[str]) -> str:
 
 
 def _measure(name: str) -> str:
-    return _MEASURES.get(name) or name.partition("_")[0].upper()
+    return MEASURES[name].title or QUANTITIES[name].symbol
 
 
 def fitted_in_words(diagnostics: Mapping[str, Any]) -> str:
@@ -203,14 +206,3 @@ def fitted_in_words(diagnostics: Mapping[str, Any]) -> str:
     recorded = diagnostics.get("recorded_events") != 0
     of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
     return f"fitted on {number:,} {what} of {events:,} {of}"
-
-
-_MEASURES = {
-    "sa03_g": "SA(0.3 s)", "sa10_g": "SA(1 s)", "sa30_g": "SA(3 s)", "xp_m_s": "toppling spectrum",
-    "tm_s": "Tm", "arias_m_s": "Arias intensity", "magnitude": "magnitude",
-}  # fmt: skip
-
-SYMBOLS = {
-    "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",
-    "kct": "k_ct",
-}  # fmt: skip

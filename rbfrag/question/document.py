@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
-from rbfrag.fragility.measures import AMPLIFIED, STATED
+from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
 from rbfrag.question.question import (
@@ -21,7 +21,7 @@ from rbfrag.question.question import (
     without_water,
 )
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.vocabulary.quantities import SCENARIO
+from rbfrag.vocabulary.quantities import INTENSITY, SCENARIO
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -166,7 +166,7 @@ def prediction_document(
             )
         except InputError as error:
             # here the measures are fields of the question, which each door spells
-            error.fields = error.fields or STATED
+            error.fields = error.fields or INTENSITY
             raise
         for each in models:
             answer = answer_given(each, given, level, weights=weights, sites=sites)

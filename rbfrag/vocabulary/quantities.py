@@ -248,136 +248,87 @@ def _spectral(name: str, period_s: float, credible: float, rank: int = 0) -> Qua
 # fmt: off
 GROUPS: dict[str, tuple[Quantity, ...]] = {
     "numbers": (
-        Quantity(
-            "p2", "Frequency parameter p² of the block", "1/s²", "p²", POSITIVE,
+        Quantity("p2", "Frequency parameter p² of the block", "1/s²", "p²", POSITIVE,
             Input(aliases=("p²", "p^2"), column="p2_1_s2"),
-            prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m",
-        ),
-        Quantity(
-            "kr", "Rocking acceleration coefficient k_r = tan(critical angle)", "", "k_r",
+            prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"),
+        Quantity("kr", "Rocking acceleration coefficient k_r = tan(critical angle)", "", "k_r",
             input=Input("with {p2}", ("k_r",)),
             credible=(
                 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees",
             ),
             prompt="the block's yield acceleration coefficient at rest, tan(critical angle) (a "
-            "block with k_r <= 0 falls without an earthquake)",
-        ),
-        Quantity(
-            "ky", "Sliding: yield acceleration coefficient tan(phi - beta)", "", "k_y",
+            "block with k_r <= 0 falls without an earthquake)"),
+        Quantity("ky", "Sliding: yield acceleration coefficient tan(phi - beta)", "", "k_y",
             input=Input("with {beta_deg}", ("k_y",)), credible=(0.0, 5.0, _STEEP),
             prompt="the block's yield acceleration coefficient of sliding, tan(phi - beta) (a "
-            "block with k_y <= 0 slides without an earthquake)",
-        ),
-        Quantity(
-            "ks", "Slumping: yield acceleration coefficient k_s", "", "k_s",
+            "block with k_y <= 0 slides without an earthquake)"),
+        Quantity("ks", "Slumping: yield acceleration coefficient k_s", "", "k_s",
             input=Input("with {ps2}", ("k_s",)), credible=(0.0, 5.0, _STEEP),
             prompt="the block's yield acceleration coefficient of slumping (a block with k_s <= "
-            "0 slumps without an earthquake)",
-        ),
-        Quantity(
-            "ps2", "Slumping: frequency parameter p_s² at rest", "1/s²", "p_s²", POSITIVE,
+            "0 slumps without an earthquake)"),
+        Quantity("ps2", "Slumping: frequency parameter p_s² at rest", "1/s²", "p_s²", POSITIVE,
             Input(column="ps2_1_s2"),
-            prompt="p_s², the squared frequency parameter of slumping at rest",
-        ),
-        Quantity(
-            "kct", "Confined toppling: yield acceleration coefficient k_ct", "", "k_ct",
+            prompt="p_s², the squared frequency parameter of slumping at rest"),
+        Quantity("kct", "Confined toppling: yield acceleration coefficient k_ct", "", "k_ct",
             input=Input("with {pct2}", ("k_ct",)), credible=(0.0, 5.0, _STEEP),
             prompt="the block's yield acceleration coefficient of confined toppling (a block "
-            "with k_ct <= 0 topples without an earthquake)",
-        ),
-        Quantity(
-            "pct2", "Confined toppling: frequency parameter p_ct² at rest", "1/s²", "p_ct²",
+            "with k_ct <= 0 topples without an earthquake)"),
+        Quantity("pct2", "Confined toppling: frequency parameter p_ct² at rest", "1/s²", "p_ct²",
             POSITIVE, Input(column="pct2_1_s2"), prompt="p_ct², the squared frequency parameter "
-            "of confined toppling at rest",
-        ),
+            "of confined toppling at rest"),
     ),
     "failure": (
-        Quantity(
-            "displacement_m", "Sliding: the displacement that is too far", "m", range=POSITIVE,
+        Quantity("displacement_m", "Sliding: the displacement that is too far", "m", range=POSITIVE,
             input=Input(aliases=("displacement",)),
-            prompt="the displacement that is too far in m, above 0",
-        ),
-        Quantity(
-            "restitution", "Rocking: speed after an impact over that before it",
+            prompt="the displacement that is too far in m, above 0"),
+        Quantity("restitution", "Rocking: speed after an impact over that before it",
             range=Limits(above=0.0, most=1.0),
             input=Input("above 0 and up to 1; default: what angular momentum leaves"),
-            prompt="the speed after an impact over that before it, above 0 and up to 1",
-        ),
+            prompt="the speed after an impact over that before it, above 0 and up to 1"),
     ),
     "shape": (
-        Quantity(
-            "height_m", "Height of a rectangle", "m", range=POSITIVE,
-            input=Input("perpendicular to its base, with {width_m}", ("height", "h")),
-        ),
-        Quantity(
-            "width_m", "Width of a rectangle along its base", "m", range=POSITIVE,
-            input=Input("with {height_m}", ("width", "w", "b")),
-        ),
-        Quantity(
-            "alpha1_deg", "Angle from the normal of the base to the line centroid-heel", "deg",
-            range=_SLOPE, input=Input("with {alpha3_deg} and {r3_m}", ("alpha1", "α1")),
-        ),
-        Quantity(
-            "alpha3_deg", "The same angle of the toe", "deg", range=_SLOPE,
-            input=Input(aliases=("alpha3", "α3")),
-        ),
-        Quantity(
-            "r3_m", "Distance from centroid to toe", "m", range=POSITIVE,
-            input=Input(aliases=("r3",)),
-        ),
-        Quantity(
-            "s1_m", "Spacing of the base fractures", "m", range=POSITIVE,
-            input=Input("with {s2_m} and {gamma_deg}", ("s1",)),
-        ),
-        Quantity(
-            "s2_m", "Spacing of the back fractures", "m", range=POSITIVE,
-            input=Input(aliases=("s2",)),
-        ),
-        Quantity(
-            "gamma_deg", "Dip of the back plane less dip of the base", "deg",
-            range=Limits(above=0.0, below=180.0), input=Input(aliases=("gamma",)),
-        ),
+        Quantity("height_m", "Height of a rectangle", "m", range=POSITIVE,
+            input=Input("perpendicular to its base, with {width_m}", ("height", "h"))),
+        Quantity("width_m", "Width of a rectangle along its base", "m", range=POSITIVE,
+            input=Input("with {height_m}", ("width", "w", "b"))),
+        Quantity("alpha1_deg", "Angle from the normal of the base to the line centroid-heel", "deg",
+            range=_SLOPE, input=Input("with {alpha3_deg} and {r3_m}", ("alpha1", "α1"))),
+        Quantity("alpha3_deg", "The same angle of the toe", "deg", range=_SLOPE,
+            input=Input(aliases=("alpha3", "α3"))),
+        Quantity("r3_m", "Distance from centroid to toe", "m", range=POSITIVE,
+            input=Input(aliases=("r3",))),
+        Quantity("s1_m", "Spacing of the base fractures", "m", range=POSITIVE,
+            input=Input("with {s2_m} and {gamma_deg}", ("s1",))),
+        Quantity("s2_m", "Spacing of the back fractures", "m", range=POSITIVE,
+            input=Input(aliases=("s2",))),
+        Quantity("gamma_deg", "Dip of the back plane less dip of the base", "deg",
+            range=Limits(above=0.0, below=180.0), input=Input(aliases=("gamma",))),
     ),
     "planes": (
-        Quantity(
-            "beta_deg", "Dip of the base", "deg", range=_SLOPE,
+        Quantity("beta_deg", "Dip of the base", "deg", range=_SLOPE,
             input=Input("out of the slope positive; a rectangle's is 0 if not given",
             ("beta", "dip", "dip_deg", "dip_angle", "β", "base_dip"), column="dip_deg"),
-            prompt="the dip of the base in degrees, out of the slope positive",
-        ),
-        Quantity(
-            "phi_deg", "Friction angle of the base", "deg", range=_FRICTION,
+            prompt="the dip of the base in degrees, out of the slope positive"),
+        Quantity("phi_deg", "Friction angle of the base", "deg", range=_FRICTION,
             input=Input("; only a rectangle is assumed to topple without",
-            ("phi", "φ", "friction", "friction_angle")),
-        ),
-        Quantity(
-            "phi_back_deg", "Friction angle of the back plane", "deg", range=_FRICTION,
-            input=Input("; default: that of the base", ("phi_back",)),
-        ),
+            ("phi", "φ", "friction", "friction_angle"))),
+        Quantity("phi_back_deg", "Friction angle of the back plane", "deg", range=_FRICTION,
+            input=Input("; default: that of the base", ("phi_back",))),
     ),
     "joint": (
-        Quantity(
-            "water_m", "Height of the water in the back fracture above the heel", "m",
-            range=NOT_NEGATIVE, input=Input("with {density_kg_m3}", ("water", "water_level")),
-        ),
+        Quantity("water_m", "Height of the water in the back fracture above the heel", "m",
+            range=NOT_NEGATIVE, input=Input("with {density_kg_m3}", ("water", "water_level"))),
         Quantity(
             "jrc", "Joint roughness coefficient of the base", range=Limits(least=0.0, most=20.0),
             input=Input("of samples of 10 cm, with {jcs_mpa} and {density_kg_m3}; {phi_deg} is "
-            "then the residual friction angle"),
-        ),
-        Quantity(
-            "jcs_mpa", "Compressive strength of the walls of the base", "MPa", range=POSITIVE,
-            input=Input("of samples of 10 cm", ("jcs",), word="jcs"),
-        ),
-        Quantity(
-            "joint_length_m", "Length of the joint that shears as one", "m", range=POSITIVE,
-            input=Input("; default: that of the base", ("joint_length",)),
-        ),
-        Quantity(
-            "phi_residual_deg", "Friction angle of base and back that is left after the first "
+            "then the residual friction angle")),
+        Quantity("jcs_mpa", "Compressive strength of the walls of the base", "MPa", range=POSITIVE,
+            input=Input("of samples of 10 cm", ("jcs",), word="jcs")),
+        Quantity("joint_length_m", "Length of the joint that shears as one", "m", range=POSITIVE,
+            input=Input("; default: that of the base", ("joint_length",))),
+        Quantity("phi_residual_deg", "Friction angle of base and back that is left after the first "
             "slip", "deg", range=_FRICTION,
-            input=Input("which ends cohesion, water and roughness", ("phi_residual",)),
-        ),
+            input=Input("which ends cohesion, water and roughness", ("phi_residual",))),
     ),
     "block scatter": (
         _block_scatter("p2_sigma", "ln p²"),
@@ -390,84 +341,61 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         Quantity(
             "restitution_sigma", "Standard deviation of the restitution of what the block may be",
             range=NOT_NEGATIVE, input=Input(),
-            prompt="the standard deviation of the restitution, 0 or more",
-        ),
+            prompt="the standard deviation of the restitution, 0 or more"),
     ),
     "space": (
-        Quantity(
-            "base", "Plane of the base as dip/dip direction in deg",
-            input=Input("25/102, with {face}, instead of {beta_deg}", type=str),
-        ),
+        Quantity("base", "Plane of the base as dip/dip direction in deg",
+            input=Input("25/102, with {face}, instead of {beta_deg}", type=str)),
         Quantity(
             "back", "Plane of the back likewise", input=Input("with {s1_m} and {s2_m} along the "
-            "normals of the planes, instead of {gamma_deg}", type=str),
-        ),
-        Quantity(
-            "face", "Plane of the slope's face likewise: its dip direction is the section",
-            input=Input(type=str),
-        ),
+            "normals of the planes, instead of {gamma_deg}", type=str)),
+        Quantity("face", "Plane of the slope's face likewise: its dip direction is the section",
+            input=Input(type=str)),
     ),
     "whole": (
         Quantity("block", "A block by its corners", input=Input("a rbfrag.Block")),
-        Quantity(
-            "back_fracture", "There is no fracture behind the block",
-            input=Input(word="no_back", type=bool),
-        ),
-        Quantity(
-            "drainage", "Drainage of the water in the back fracture",
+        Quantity("back_fracture", "There is no fracture behind the block",
+            input=Input(word="no_back", type=bool)),
+        Quantity("drainage", "Drainage of the water in the back fracture",
             input=Input(
                 "with {water_m}: undrained (its pressure keeps acting while the block moves) or "
                 "drained (it vanishes); default: undrained", type=str,
-            ),
-        ),
-        Quantity(
-            "cohesion_pa", "Cohesion of the base", "Pa", range=NOT_NEGATIVE,
-            input=Input("with {density_kg_m3}"),
-        ),
-        Quantity(
-            "density_kg_m3", "Density of the rock", "kg/m³", range=POSITIVE,
-            input=Input("; default: 2650", ("density",)),
-        ),
+            )),
+        Quantity("cohesion_pa", "Cohesion of the base", "Pa", range=NOT_NEGATIVE,
+            input=Input("with {density_kg_m3}")),
+        Quantity("density_kg_m3", "Density of the rock", "kg/m³", range=POSITIVE,
+            input=Input("; default: 2650", ("density",))),
         Quantity(
             "kind", "How the blocks fail: toppling", input=Input(" (backed by a slope), rocking "
             "(free-standing), slumping, confined_toppling or sliding; default: what they are "
-            "given by", type=str),
-        ),
+            "given by", type=str)),
     ),
     "measures": (
-        Quantity(
-            "pgv_m_s", "Peak ground velocity", "m/s", "PGV", NOT_NEGATIVE,
+        Quantity("pgv_m_s", "Peak ground velocity", "m/s", "PGV", NOT_NEGATIVE,
             Input(aliases=("pgv", "peak_ground_velocity")),
             credible=(0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
             measure=Measure(axis="peak ground velocity, PGV", power=1, imt="PGV", imt_factor=0.01,
             rank=1, uncertain=True, top=5.0, largest=20.0),
-            stored="peak ground velocity, extreme of the exact integral",
-        ),
-        Quantity(
-            "pga_g", "Peak ground acceleration", "g", "PGA", NOT_NEGATIVE,
+            stored="peak ground velocity, extreme of the exact integral"),
+        Quantity("pga_g", "Peak ground acceleration", "g", "PGA", NOT_NEGATIVE,
             Input(aliases=("pga", "peak_ground_acceleration")),
             credible=(
                 0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?",
             ),
             measure=Measure(axis="peak ground acceleration, PGA", power=1, imt="PGA", rank=3,
             uncertain=True, top=5.0, largest=10.0),
-            stored="peak ground acceleration, max |a| over both signs",
-        ),
-        Quantity(
-            "tm_s", "Mean period", "s", "T_m", POSITIVE, Input(aliases=("tm", "mean_period")),
+            stored="peak ground acceleration, max |a| over both signs"),
+        Quantity("tm_s", "Mean period", "s", "T_m", POSITIVE, Input(aliases=("tm", "mean_period")),
             credible=(
                 0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?",
             ),
             measure=Measure("Tm"), stored="mean period of Rathje, Abrahamson and Bray (1998), "
-            "0.25 to 20 Hz; missing where it is not defined",
-        ),
-        Quantity(
-            "pgd_m", "Peak ground displacement", "m", "PGD", NOT_NEGATIVE,
+            "0.25 to 20 Hz; missing where it is not defined"),
+        Quantity("pgd_m", "Peak ground displacement", "m", "PGD", NOT_NEGATIVE,
             Input(aliases=("pgd", "peak_ground_displacement")),
             credible=(0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
             measure=Measure(axis="peak ground displacement, PGD", power=1),
-            stored="peak ground displacement, extreme of the exact double integral",
-        ),
+            stored="peak ground displacement, extreme of the exact double integral"),
         _spectral("sa03_g", 0.3, credible=10.0),
         _spectral("sa10_g", 1.0, credible=10.0, rank=2),
         _spectral("sa30_g", 3.0, credible=5.0),
@@ -477,14 +405,12 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             credible=(0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
             prompt="the Arias intensity in m/s, 0 or more",
             measure=Measure("Arias intensity", power=2),
-            stored=f"Arias intensity, pi/(2 g) integral of a²; {_SAMPLES}",
-        ),
-        Quantity(
-            "magnitude", "Magnitude of the earthquake", "", "M", Limits(above=0.0, most=10.0),
+            stored=f"Arias intensity, pi/(2 g) integral of a²; {_SAMPLES}"),
+        Quantity("magnitude", "Magnitude of the earthquake", "", "M", Limits(above=0.0, most=10.0),
             Input(aliases=("mag", "mw", "moment_magnitude")),
             credible=(3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
             prompt="the magnitude of the earthquake, above 0", measure=Measure("magnitude"),
-        ),
+            stored="magnitude as the source gives it, scales not harmonised"),
     ),
     "scenario": (
         _deviation("pgv_sigma", "PGV"),
@@ -492,115 +418,79 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         _deviation("sa03_sigma", "SA(0.3)"),
         _deviation("sa10_sigma", "SA(1.0)"),
         _deviation("sa30_sigma", "SA(3.0)"),
-        Quantity(
-            "pgv_tau", "Part of {pgv_sigma} that all sites of one earthquake share",
+        Quantity("pgv_tau", "Part of {pgv_sigma} that all sites of one earthquake share",
             range=NOT_NEGATIVE, input=Input("for the range with {sites}"),
-            prompt=_SIGMA,
-        ),
-        Quantity(
-            "rjb_km", "Distance from the surface projection of the rupture", "km",
+            prompt=_SIGMA),
+        Quantity("rjb_km", "Distance from the surface projection of the rupture", "km",
             range=NOT_NEGATIVE,
             input=Input("instead of measures, with {magnitude} and {vs30_m_s}",
-            ("rjb", "r_jb", "joyner_boore_distance")),
-        ),
+            ("rjb", "r_jb", "joyner_boore_distance"))),
         Quantity(
             "vs30_m_s", "Mean velocity of shear waves in the upper 30 m", "m/s", range=POSITIVE,
-            input=Input(aliases=("vs30",)),
-        ),
+            input=Input(aliases=("vs30",))),
         Quantity(
             "amplification", "Factor on all measures for the shape of the ground", range=POSITIVE,
-            input=Input(),
-        ),
+            input=Input()),
         Quantity(
             "amplification_sigma", "Standard deviation of ln {amplification}", range=NOT_NEGATIVE,
-            input=Input(), prompt=_SIGMA,
-        ),
+            input=Input(), prompt=_SIGMA),
     ),
     "record": (
-        Quantity(
-            "sa_g", "Spectral accelerations by their period in s", "g",
-            input=Input("as in {{1.0: 0.4}}"),
-        ),
-        Quantity(
-            "motion", "The accelerogram itself or its file",
-            input=Input("instead of its measures"),
-        ),
+        Quantity("sa_g", "Spectral accelerations by their period in s", "g",
+            input=Input("as in {{1.0: 0.4}}")),
+        Quantity("motion", "The accelerogram itself or its file",
+            input=Input("instead of its measures")),
         Quantity(
             "polarity", "forward or reverse where it is known how the motion points at the slope",
             input=Input("; both gives the mean of the two, which stand beside it (motion only)",
-            type=str),
-        ),
+            type=str)),
     ),
     "answering": (
         Quantity(
             "model", "Name of a stored model", input=Input("; default: the database's default if "
-            "the given measures suffice for it, else the best that they suffice for", type=str),
-        ),
-        Quantity(
-            "level", "Level of the interval of P", range=Limits(above=0.0, below=1.0),
-            input=Input("and of the range of one earthquake; default: 0.95"),
-        ),
-        Quantity(
-            "db", "Database: a path or an SQLAlchemy URL",
+            "the given measures suffice for it, else the best that they suffice for", type=str)),
+        Quantity("level", "Level of the interval of P", range=Limits(above=0.0, below=1.0),
+            input=Input("and of the range of one earthquake; default: 0.95")),
+        Quantity("db", "Database: a path or an SQLAlchemy URL",
             input=Input("; default: RBFRAG_DB, else rbfrag.db in the current folder, else the "
-            "reference that is shipped", type=str),
-        ),
+            "reference that is shipped", type=str)),
     ),
     "sites": (
-        Quantity(
-            "sites", "Number of sites shaken so in one earthquake: adds what share of such "
+        Quantity("sites", "Number of sites shaken so in one earthquake: adds what share of such "
             "blocks", range=Limits(least=1.0, most=10_000.0),
             input=Input("facing all sides, fails there; default: one block, which falls or "
-            "stands"),
-        ),
+            "stands")),
     ),
     "source": (
         Quantity(
             "mechanism", "How the fault moves", input=Input("with {rjb_km}: strike-slip, normal, "
-            "reverse or unspecified; default: unspecified", type=str),
-        ),
-        Quantity(
-            "gmm", "CSV table of medians and sigmas of another ground-motion model: rjb_km",
-            input=Input("pgv_m_s, pgv_sigma, pgv_tau and the like, a row a distance", type=str),
-        ),
+            "reverse or unspecified; default: unspecified", type=str)),
+        Quantity("gmm", "CSV table of medians and sigmas of another ground-motion model: rjb_km",
+            input=Input("pgv_m_s, pgv_sigma, pgv_tau and the like, a row a distance", type=str)),
     ),
     "component": (
-        Quantity(
-            "component", "Horizontal component of the measures of shaking: single",
-            input=Input("geometric_mean, rotd50, rotd100 or larger; default: single", type=str),
-        ),
+        Quantity("component", "Horizontal component of the measures of shaking: single",
+            input=Input("geometric_mean, rotd50, rotd100 or larger; default: single", type=str)),
     ),
     "request": (
-        Quantity(
-            "rotation_deg", "Slumping: rotation that counts as failure", "deg",
-            input=Input("of which there must be a model; default: failure past recovery"),
-        ),
+        Quantity("rotation_deg", "Slumping: rotation that counts as failure", "deg",
+            input=Input("of which there must be a model; default: failure past recovery")),
     ),
     "arrays": (
-        Quantity(
-            "nan", "propagate answers NaN with its reason where the input cannot be used",
-            input=Input("raise refuses such arrays", type=str),
-        ),
-        Quantity(
-            "interval", "False leaves interval and range out",
-            input=Input(" (their ends are then NaN), which takes less time"),
-        ),
-        Quantity(
-            "weights", "Makes the arrays that describe the block draws of one block",
-            input=Input("of these weights (1: all the same): one answer, over all of them"),
-        ),
+        Quantity("nan", "propagate answers NaN with its reason where the input cannot be used",
+            input=Input("raise refuses such arrays", type=str)),
+        Quantity("interval", "False leaves interval and range out",
+            input=Input(" (their ends are then NaN), which takes less time")),
+        Quantity("weights", "Makes the arrays that describe the block draws of one block",
+            input=Input("of these weights (1: all the same): one answer, over all of them")),
     ),
     "at rest": (
-        Quantity(
-            "kv", "Vertical acceleration of the ground", "g", range=Limits(above=-1.0),
-            input=Input("up positive"),
-        ),
+        Quantity("kv", "Vertical acceleration of the ground", "g", range=Limits(above=-1.0),
+            input=Input("up positive")),
     ),
     "names": (
-        Quantity(
-            "block_id", "Name of the block",
-            input=Input(aliases=("block", "name", "id"), type=str),
-        ),
+        Quantity("block_id", "Name of the block",
+            input=Input(aliases=("block", "name", "id"), type=str)),
         Quantity("site_id", "Name of its site", input=Input(aliases=("site",), type=str)),
     ),
     "rows": (
@@ -608,15 +498,12 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         Quantity("lon", "Longitude", "deg", input=Input(aliases=("longitude",))),
         Quantity("lat", "Latitude", "deg", input=Input(aliases=("latitude",))),
         Quantity(
-            "x", "Place of the block in {crs}", input=Input("to the east", ("easting", "x_m")),
-        ),
+            "x", "Place of the block in {crs}", input=Input("to the east", ("easting", "x_m"))),
         Quantity("y", "Place likewise", input=Input("to the north", ("northing", "y_m"))),
         Quantity("z", "Height of the place in {crs}", input=Input(aliases=("elevation", "z_m"))),
         Quantity("crs", "Coordinate reference system", input=Input("as EPSG:2056", type=str)),
-        Quantity(
-            "strike_length_m", "Length of the block along the slope", "m", range=POSITIVE,
-            input=Input("for its volume", ("strike_length",)),
-        ),
+        Quantity("strike_length_m", "Length of the block along the slope", "m", range=POSITIVE,
+            input=Input("for its volume", ("strike_length",))),
         Quantity("count", "Number of like blocks", input=Input()),
         Quantity("weight", "What a failure counts", input=Input()),
         Quantity("loss", "What a failure costs", input=Input()),
@@ -625,32 +512,24 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "stored measures": (
         _stored_spectral("sa05_g", 0.5),
         _stored_spectral("sa20_g", 2.0),
-        Quantity(
-            "cav_m_s", "Cumulative absolute velocity", "m/s", "CAV", measure=Measure(),
-            stored=f"cumulative absolute velocity, integral of |a|; {_SAMPLES}",
-        ),
-        Quantity(
-            "d5_95_s", "Significant duration", "s", "D_5-95", measure=Measure(),
+        Quantity("cav_m_s", "Cumulative absolute velocity", "m/s", "CAV", measure=Measure(),
+            stored=f"cumulative absolute velocity, integral of |a|; {_SAMPLES}"),
+        Quantity("d5_95_s", "Significant duration", "s", "D_5-95", measure=Measure(),
             stored="significant duration, from 5 to 95 % of the Arias intensity; missing where "
-            "the ground is at rest, and as the measures before it",
-        ),
+            "the ground is at rest, and as the measures before it"),
     ),
     "derived": (
-        Quantity(
-            "xp_m_s", "Toppling spectrum at the block's size", "m/s", "X(p)",
+        Quantity("xp_m_s", "Toppling spectrum at the block's size", "m/s", "X(p)",
             prompt="the toppling spectrum X(p) in m/s, 0 or more",
-            measure=Measure("toppling spectrum", "toppling spectrum at the block's size, $X(p)$"),
-        ),
+            measure=Measure("toppling spectrum", "toppling spectrum at the block's size, $X(p)$")),
         Quantity("intensity_m_s", "Intensity of the shaking", "m/s"),
         Quantity("y_m_s", "Toppling velocity k_r g/p", "m/s", "y"),
         Quantity("k_over_pga", "Strength over peak ground acceleration"),
-        Quantity(
-            "pgv_over_pga_s", "Peak ground velocity over peak ground acceleration", "s",
+        Quantity("pgv_over_pga_s", "Peak ground velocity over peak ground acceleration", "s",
             credible=(
                 0.005, 2.0, "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies "
                 "between 0.005 and 2 s): is PGV in m/s and PGA in g?",
-            ),
-        ),
+            )),
     ),
 }
 # fmt: on

@@ -95,6 +95,31 @@ def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
     assert "column ignored: Rebound [MPa]" in told
 
 
+MEASURED = """
+import json, rbfrag
+from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, MEASURES
+single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, csi_g=7.0)
+print(json.dumps({
+    "warnings": single.warnings, "help": rbfrag.predict.__doc__, "power": AMPLIFIED["csi_g"],
+    "known": "csi_g" in MEASURES and "csi_g" in CREDIBLE,
+}))
+"""
+
+
+def test_a_measure_is_a_line_too(copied: Path) -> None:
+    answer = json.loads(run(copied, "-c", MEASURED))
+    assert answer["known"]
+    assert answer["power"] == 1
+    assert any("csi_g was not used" in text for text in answer["warnings"])
+    assert "csi_g = 7 g is larger than ever recorded" in answer["warnings"]
+    assert "``csi_g``: Characteristic intensity [g]." in answer["help"]
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--help")
+    assert "--csi" in told
+    (copied / "csi.csv").write_text("p2,kr,PGV [cm/s],csi [%g]\n3,0.1,60,40\n")
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "csi.csv", "--json")
+    assert "csi" in told
+
+
 def test_the_data_dictionary_knows_it(copied: Path) -> None:
     (copied / "docs").symlink_to(PACKAGE.parent / "docs")
     script = "from docs.generate_data_dictionary import page; print(page())"

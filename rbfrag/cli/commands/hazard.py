@@ -25,7 +25,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.words import model_in_words, percent
 from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 from rbfrag.results.diagnostic import diagnostics
-from rbfrag.vocabulary.quantities import BLOCK, WHOLE
+from rbfrag.vocabulary.quantities import BLOCK, QUANTITIES, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -289,7 +289,7 @@ def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
     from rbfrag.hazards.report import shares_between
 
-    unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
+    unit = QUANTITIES[answer.measure].unit
     levels, imt, parts = curve.levels, curve.imt, shares_between(answer, curve.levels)
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
