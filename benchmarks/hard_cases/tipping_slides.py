@@ -1,7 +1,17 @@
 """Slides that pulses into the slope tip back, compared with a free block on stiff springs.
 
 Blocks that stand on their base at rest (α1 below β), under some seconds about the peak of recorded
-motions. The time step of the springs is small enough to be converged (2e-6 s).
+motions. At the stiffness of the other rows the springs are not converged to the smallest estimates:
+two of the 60 answers are beyond theirs and the 2e-6 m that springs give at rest. The difference
+falls with the stiffness, and halving the step moves it by some per cent at most:
+
+    case, estimate   stiffness × 1, step h, h/2   × 24, step h, h/2        × 96       limit
+    20th, 1.4e-6 m   4.00e-6 m, 4.00e-6 m         6.1e-7 m, 6.1e-7 m       5.0e-7 m   4e-7 m
+    53rd, 1.04e-5 m  2.20e-5 m, 2.17e-5 m         1.13e-5 m, 1.10e-5 m     1.01e-5 m  9e-6 m
+
+h is 2e-6 s over the root of the factor; the limit is extrapolated by the root of the stiffness, and
+both answers are within their bare estimate of it. So all 60 are judged by springs 24 times as
+stiff; by the usual ones the row would read 2 wrong, 58 within.
 """
 
 from __future__ import annotations
@@ -19,12 +29,8 @@ from tests.physics.penalty import STIFFNESS
 COUNT = 60
 SEED = 2046
 
-FINE_M = 5e-5
-"""Estimate below which the give of the usual springs under pulses is as large [m]."""
-
 STIFFER = 24.0
-"""Factor on their stiffness there: the difference of two cases falls from 4.0e-6 to 0.6e-6 m and
-from 2.2e-5 to 1.1e-5 m."""
+"""Factor on the stiffness of the springs of the other rows."""
 
 
 def rows() -> list[Row]:
@@ -37,7 +43,7 @@ def rows() -> list[Row]:
         if error is None:
             others += 1
             continue
-        springs = case.on_springs(STIFFER * STIFFNESS if error < FINE_M else STIFFNESS)
+        springs = case.on_springs(STIFFER * STIFFNESS)
         ratios.append(case.greatest / max(float(springs.heel_m.max()), 1e-12))
         if case.is_covered(springs, error):
             within += 1

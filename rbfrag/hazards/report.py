@@ -160,7 +160,7 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
     rate, ends = document["annual_rate"], (document["ci_high"], document["ci_low"])
     most, least = (once_in(end).removeprefix("once in ").removesuffix(" years") for end in ends)
     interval = f" ({most} to {least}, {100.0 * document['level']:g} %)"
-    bound = document["drained"]
+    bound = document.get("drained")
     drained = "" if bound is None else f" Drained: {once_in(bound['annual_rate'])}."
     return (
         f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "

@@ -31,6 +31,7 @@ PREDICT_KEYS = {
     "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s", "block_sd",
     "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s", "answers", "kind", "mode",
     "shaking", "failure", "median_displacement_m", "event_low", "event_high", "data", "how",
+    "drained",
 }  # fmt: skip
 SIMULATE_KEYS = {"combinations", "found", "below_limit", "runs", "seconds", "resumed"}
 FIT_KEYS = {

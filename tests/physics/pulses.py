@@ -46,3 +46,11 @@ def half_sines(
         samples[inside] += peak_g * np.sin(np.pi * (time_s[inside] - start_s) / length_s)
         start_s += length_s
     return GroundMotion(samples, dt_s)
+
+
+def smooth_noise(seed: int, peak_g: float = 0.9) -> GroundMotion:
+    """Three seconds of smooth noise in an envelope, sampled every 10 ms."""
+    rng = np.random.default_rng(seed)
+    noise = np.convolve(rng.standard_normal(300), np.hanning(int(rng.integers(8, 40))), "same")
+    samples = noise * np.hanning(300)
+    return GroundMotion(peak_g * samples / np.abs(samples).max(), 0.01)

@@ -15,10 +15,10 @@ import pytest
 
 import rbfrag
 from rbfrag import Block, GroundMotion, InputError, respond
-from rbfrag.solver.models.sliding import KY_ALONE, MAY_TIP
+from rbfrag.solver.models.sliding import KY_ALONE, MAY_SLIDE_UP, MAY_TIP
 from rbfrag.solver.whole_run import FAILS_BY_SOME_LAWS
 from tests.conftest import missing
-from tests.physics.pulses import half_sines
+from tests.physics.pulses import half_sines, smooth_noise
 
 FIRST = ((0.9, 0.3), (-0.6, 0.25), (0.7, 0.3), (-0.5, 0.25))
 SECOND = ((0.8, 0.25), (-0.45, 0.3), (0.8, 0.25))
@@ -176,14 +176,6 @@ def test_a_column_of_water_does_not_change_a_dry_block() -> None:
     assert many.yield_acceleration[0] == pytest.approx(7.436433841813929, rel=1e-12)
 
 
-def random_record(seed: int) -> GroundMotion:
-    """Three seconds of smooth noise with a PGA of 0.9 g."""
-    rng = np.random.default_rng(seed)
-    noise = np.convolve(rng.standard_normal(300), np.hanning(int(rng.integers(8, 40))), "same")
-    samples = noise * np.hanning(300)
-    return GroundMotion(0.9 * samples / np.abs(samples).max(), 0.01)
-
-
 def assert_continuous(motions: tuple[GroundMotion, GroundMotion], *alphas_deg: float) -> bool:
     """Compare two blocks on a base of 15° with 30° of friction; whether they move."""
     low, high = (
@@ -204,7 +196,7 @@ def assert_continuous(motions: tuple[GroundMotion, GroundMotion], *alphas_deg: f
 def test_displacements_have_no_jump_at_a_boundary(boundary: str) -> None:
     moves = 0
     for seed in range(200):
-        motion = random_record(seed)
+        motion = smooth_noise(seed)
         # at the threshold the greatest pulse into the slope just tips the block
         tips_deg = 15.0 + math.degrees(math.atan(motion.acceleration_g.min()))
         alpha1 = {"alpha1 = beta": 15.0, "alpha1 = -phi": -30.0}.get(boundary, max(tips_deg, -29.0))
@@ -217,3 +209,31 @@ def test_displacements_have_no_jump_at_a_boundary(boundary: str) -> None:
             below = above = 5.0
         moves += assert_continuous(motions, below, above)
     assert moves > 150 or boundary == "first slip"
+
+
+def test_slip_up_the_base_is_what_a_block_neglects_beyond_its_boundary() -> None:
+    """α1 = -φ is the one boundary with a jump: with α1 <= -φ slip up the base is neglected.
+
+    Only records above tan(φ + β) = 1 g into the slope cause it, the answer carries a note, the
+    displacement is not less than beyond the boundary, and with `two_way` there is no jump.
+    """
+    planes = {"beta_deg": 15.0, "phi_deg": 30.0}
+    jumps = 0
+    for seed in range(200):
+        motion = smooth_noise(seed, 1.2)
+        below = Block.from_angles(-30.0 - 1e-6, 60.0, 1.0)
+        neglects = respond(motion, block=below, **planes)
+        both_ways = respond(motion, block=below, **planes, two_way=True)
+        tips = respond(motion, block=Block.from_angles(-30.0 + 1e-6, 60.0, 1.0), **planes)
+        assert neglects.peak_displacement_m is not None
+        assert tips.peak_displacement_m is not None
+        assert tips.error_estimate is not None
+        error_m = tips.error_estimate + 1e-5
+        assert both_ways.peak_displacement_m == pytest.approx(tips.peak_displacement_m, abs=error_m)
+        jump_m = neglects.peak_displacement_m - tips.peak_displacement_m
+        assert jump_m >= -error_m
+        exceeds = bool(motion.acceleration_g.min() < -1.0)
+        assert (MAY_SLIDE_UP in neglects.warnings) == exceeds
+        assert exceeds or jump_m <= error_m
+        jumps += jump_m > error_m
+    assert jumps > 50

@@ -108,7 +108,7 @@ def fit_lognormal(
         warnings=[
             "this is the probability that the critical value is at least the block's: safe islands "
             "below it are not seen, and the model is over-confident about outcomes",
-            *data.between_words("count as lying there"),
+            *data.between_words("count as intervals"),
         ],
     )
 

@@ -48,8 +48,8 @@ ones that are stored, and safe ones above, nearly all of which are decided where
 LEAST_DISPLACEMENT_M = 1e-3
 """Displacements below this count as less than it, whether zero or not: their scatter is another."""
 
-KNOWN = 1e-6
-"""Greatest relative width of a bracket that counts as one value: that of certified ones."""
+NARROW = 0.02
+"""Greatest (upper - lower)/lower of a critical value that counts as found, certified or not."""
 
 _CENSORED = ("below_limit", "no_motion")
 
@@ -256,12 +256,12 @@ class FitData:
         return np.asarray(~self.observed & np.isfinite(self.values.get("y_m_s", self.x)))
 
     def between_words(self, treated: str) -> list[str]:
-        """Say how critical values between two ends are treated, where there are any."""
+        """Say how many critical values are wide intervals and how they are treated."""
         if self.least_y_m_s is None or not (n := int(np.isfinite(self.least_y_m_s).sum())):
             return []
         return [
-            f"{n} critical values are not certified, so that they lie between what was seen to "
-            f"topple and a proven bound, and {treated}"
+            f"{n} critical values are not certified and are intervals wider than "
+            f"{100 * NARROW:g} % of their lower end; they {treated}"
         ]
 
     @property
@@ -463,9 +463,9 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         )
     searched = table.status == "found"
     status = table.status.astype(str)
-    # a critical value that is not certified lies between what topples and what is proven safe
+    # a wide interval, which no scan could tighten, has two ends instead of a value
     highest = table.upper * pga_m_s2 / p
-    open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + KNOWN))
+    open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + NARROW))
     observed = searched & ~open_above
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
     y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))
