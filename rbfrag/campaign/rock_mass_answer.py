@@ -59,7 +59,6 @@ class RockMassAnswer(Tabular):
         document = as_dict(
             self.blocks, mode_counts(self.blocks), crossings(self.blocks), self.scenario, failed
         )
-        document["warnings"] += self.blocks.rock_mass.remarks
         if ran is not None:
             document["warnings"] += failure_warnings(ran)
         return document

@@ -105,6 +105,10 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
             f"{with_interval(total['probability'], total['ci_low'], total['ci_high'])} fail under "
             "this shaking."
         )
+        drained = total["drained"] or {"probability": None}
+        if drained["probability"] is not None and document["drainage"] == "undrained":
+            ends = (drained[name] for name in ("probability", "ci_low", "ci_high"))
+            yield f"Drained: {with_interval(*ends)}."
     for scale in () if shaking is None else shaking["scales"]:
         of_all = scale["all"]["fails_of_all"]
         unknown = scale["all"]["open_of_all"]

@@ -125,12 +125,14 @@ def numbers_of_dry(dry: Mapping[str, Any], at: SitedBlocks) -> dict[str, Any]:
     size = at.site.size
     if "row" in dry:
         own, rows = np.asarray(dry["row"]), np.asarray(at.columns["row"])
-        index = np.minimum(np.searchsorted(own, rows), own.size - 1)
-        lost = own[index] != rows
+        rows_of_dry = np.minimum(np.searchsorted(own, rows), own.size - 1)
+        lost = own[rows_of_dry] != rows
     else:  # one block at each site
-        index, lost = np.zeros((2, size), dtype=np.intp)
-    numbers = {n: np.where(lost, np.nan, np.asarray(v)[index]) for n, v in numbers_in(dry).items()}
-    return {**numbers, "kind": [str(dry["kind"][i]) for i in index.tolist()]}
+        rows_of_dry, lost = np.zeros((2, size), dtype=np.intp)
+    numbers = {
+        n: np.where(lost, np.nan, np.asarray(v)[rows_of_dry]) for n, v in numbers_in(dry).items()
+    }
+    return {**numbers, "kind": [str(dry["kind"][i]) for i in rows_of_dry.tolist()]}
 
 
 def _numbers(columns: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:

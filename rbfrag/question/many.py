@@ -412,7 +412,9 @@ class _Sorted:
             strength["density_kg_m3"] = np.where(np.isnan(density), ROCK_KG_M3, density)
         push = None
         if np.any(strength.get("water_m", 0.0) > 0.0):
-            push = _push(blocks, stated["beta_deg"], strength["water_m"], strength["density_kg_m3"])
+            push = push_of_blocks(
+                blocks, stated["beta_deg"], strength["water_m"], strength["density_kg_m3"]
+            )
         on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
         judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
         residual = stated.get("phi_residual_deg", np.full(1, np.nan))
@@ -490,7 +492,7 @@ class _Sorted:
             self.groups.append(Group(facts.kind, numbers, places[usable]))
 
 
-def _push(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m3: Any) -> Any:
+def push_of_blocks(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m3: Any) -> Any:
     """Return the push of water on blocks, zeros on dry ones."""
     t1, t3, h, beta, water, density = np.broadcast_arrays(
         blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, beta_deg, water_m, density_kg_m3

@@ -364,7 +364,7 @@ def numbers_of_shape(
         _say_what_gives_way(judged, listener)
     if "ky" in facts.parameters:
         listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
-        dip_deg = _dip_of_factor(judged)
+        dip_deg = dip_of_factor(judged)
         return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **stated}
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
@@ -405,7 +405,7 @@ def _say_what_gives_way(judged: ModeShapes, listener: Listener) -> None:
     listener.remark(exceeded, about, threshold=at_g)
 
 
-def _dip_of_factor(judged: ModeShapes) -> Any:
+def dip_of_factor(judged: ModeShapes) -> Any:
     """Return the dip [deg] that gives wet slides the factor of their displacements.
 
     Models derive cos(φ - b)/cos φ from k_y and a dip b with φ = b + atan k_y. Water lessens k_y and

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
+from rbfrag.solver.stability.modes import MODES, STABLE, STATES, ModeName, StateName
 
 QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
 """Quantiles of the yield acceleration that are reported."""
@@ -23,21 +23,34 @@ _SLOPE_BLOCKS = 400
 
 
 @dataclass(frozen=True)
-class ModeCount:
+class StateCount:
+    """States and yields of some blocks.
+
+    Args:
+        states: number of blocks by state.
+        yield_quantiles_g: yield acceleration of the stable ones at :data:`QUANTILES` [g];
+            empty if there are none.
+    """
+
+    states: dict[StateName, int]
+    yield_quantiles_g: dict[float, float]
+
+
+@dataclass(frozen=True)
+class ModeCount(StateCount):
     """The blocks of one mode.
 
     Args:
         share_error: standard error of the share from the finite number of realisations.
-        yield_quantiles_g: yield acceleration of the stable ones at :data:`QUANTILES` [g];
-            empty if there are none.
+        drained: the same blocks, in whichever mode, where their water drains as they start to
+            move; None without water.
     """
 
     mode: ModeName
     count: int
     share: float
     share_error: float
-    states: dict[StateName, int]
-    yield_quantiles_g: dict[float, float]
+    drained: StateCount | None
 
 
 @dataclass(frozen=True)
@@ -61,24 +74,32 @@ class EqualCounts:
 
 def mode_counts(realisations: Realisations) -> dict[ModeName, ModeCount]:
     """Return the blocks of all modes, in the order of the mode codes."""
-    stability = realisations.stability
+    drained = realisations.drained
     counts: dict[ModeName, ModeCount] = {}
     for mode in MODES:
         of_mode = realisations.of_mode(mode)
         count = int(np.count_nonzero(of_mode))
         share = count / realisations.n_blocks
-        by_state = np.bincount(stability.state_code[of_mode], minlength=len(STATES)).tolist()
-        stable = stability.yield_acceleration[realisations.of_mode(mode, "stable")]
-        values = np.quantile(stable, QUANTILES).tolist() if stable.size else []
         counts[mode] = ModeCount(
             mode=mode,
             count=count,
             share=share,
             share_error=math.sqrt(share * (1.0 - share) / realisations.n_blocks),
-            states=dict(zip(STATES, by_state, strict=True)),
-            yield_quantiles_g=dict(zip(QUANTILES, values, strict=False)),
+            drained=None if drained is None else _state_count(drained, of_mode),
+            **vars(_state_count(realisations, of_mode)),
         )
     return counts
+
+
+def _state_count(realisations: Realisations, chosen: NDArray[np.bool_]) -> StateCount:
+    """Return the states and yields of some blocks, shape (n,)."""
+    stability = realisations.stability
+    by_state = np.bincount(stability.state_code[chosen], minlength=len(STATES)).tolist()
+    stable = stability.yield_acceleration[chosen & (stability.state_code == STABLE)]
+    values = np.quantile(stable, QUANTILES).tolist() if stable.size else []
+    return StateCount(
+        dict(zip(STATES, by_state, strict=True)), dict(zip(QUANTILES, values, strict=False))
+    )
 
 
 def sorted_yields(realisations: Realisations, mode: ModeName) -> FloatArray:

@@ -13,7 +13,7 @@ from rbfrag.fragility.intervals import checked_level
 from rbfrag.rockmasses.report import block_columns
 from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
-from rbfrag.solver.stability.modes import MODES, ModeName
+from rbfrag.solver.stability.modes import MODES, TOPPLE, ModeName
 
 
 def exact_interval(count: int, of: int, level: float) -> tuple[float, float]:
@@ -69,7 +69,7 @@ class ModeFailures:
         open_of_all: those of which it is open whether they fail, as a share of all.
         displacement_m: quantiles and the greatest of the displacements along the base of those
             blocks that were followed to the end and are not past recovery, those at rest
-            included; None without any.
+            included; None without any. Topples are not among them.
     """
 
     mode: ModeName | None
@@ -136,7 +136,9 @@ def _count(
     outcomes = dict(zip(OUTCOMES, by_code, strict=True))
     n = shaken.realisations.n_blocks
     to_the_end = chosen & ~np.isin(code, [OUTCOMES.index(name) for name in OPEN])
-    slid = shaken.displacement_m[i, to_the_end]
+    # the toe of a topple that holds has no displacement to tell
+    slides = shaken.realisations.in_time.stability.mode_code != TOPPLE
+    slid = shaken.displacement_m[i, to_the_end & slides]
     slid = slid[np.isfinite(slid)]
     return ModeFailures(
         mode=mode,

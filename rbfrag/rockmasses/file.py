@@ -12,6 +12,8 @@ TOML::
     [back]
     dip_deg = { distribution = "measured", values = [41.0, 44.5, 47.0] }
     spacing_m = 0.6
+    water_m = 0.3
+    drainage = "undrained"
 
     [friction]
     phi_deg = 40.0
@@ -27,8 +29,8 @@ direction beside the file.
 CSV: the columns ``variable,distribution`` and, as needed, ``value, mean, median, sd, sd_ln, kappa,
 low, high, values``, one variable a row such as ``base.dip_deg,normal``; measurements stand in
 ``values`` with blanks between them. A plane is a ``value``, 25/102 or the CSV of a set, or a list
-in ``values``. ``realisations``, ``seed`` and ``block.back_fracture`` are rows with a ``value`` and
-no distribution.
+in ``values``. ``realisations``, ``seed``, ``block.back_fracture`` and ``back.drainage`` are rows
+with a ``value`` and no distribution.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ from pathlib import Path
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text, toml_document
-from rbfrag.rockmasses.joint_sets import RockMass
+from rbfrag.rockmasses.joint_sets import DRAINAGE, RockMass
 from rbfrag.rockmasses.orientations import read_planes
 
 COLUMNS = (
@@ -163,6 +165,8 @@ def _row(keys: dict[str, str], variable: str, line: int) -> object:
             numbers["value"] = text.split() if name == "values" else text
         elif name == "values":
             numbers[name] = [_number(part, where) for part in text.split()]
+        elif variable == DRAINAGE:
+            numbers[name] = text
         elif text.lower() in ("true", "false"):
             numbers[name] = text.lower() == "true"
         else:

@@ -17,7 +17,16 @@ from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.arrays import FLOATS, OF_JOINT, StabilityArray, stability_arrays
 from rbfrag.solver.stability.arrays import water_held_m as held_m
-from rbfrag.solver.stability.joint import NO_FRACTURE, refuse_half
+from rbfrag.solver.stability.first_slip import ENDED
+from rbfrag.solver.stability.joint import (
+    ASSUMED_DENSITY,
+    DRAINED,
+    NO_FRACTURE,
+    ROCK_KG_M3,
+    UNDRAINED,
+    is_drained,
+    refuse_half,
+)
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 
 REALISATIONS = 20_000
@@ -79,13 +88,14 @@ VARIABLES: dict[str, Variable] = {
 }
 """The variables of a rock mass by their keys."""
 
-_SETTINGS = ("block.back_fracture", "realisations", "seed")
+DRAINAGE = "back.drainage"
+_SETTINGS = ("block.back_fracture", DRAINAGE, "realisations", "seed")
 _BACK_FRICTION = "friction.phi_back_deg"
 _COHESION, _DENSITY = "friction.cohesion_pa", "block.density_kg_m3"
 _WATER, _RESIDUAL = "back.water_m", "friction.phi_residual_deg"
 _ROUGHNESS = ("friction.jrc", "friction.jcs_mpa", "friction.joint_length_m")
-ENDING = (_COHESION, _WATER, _ROUGHNESS[0])
-"""Variables that end with the first slip of a block."""
+_WEIGHED = (_COHESION, _WATER, _ROUGHNESS[0])
+"""Variables whose effect is that of a stress over the weight: they need a density."""
 
 _OPTIONAL = (_BACK_FRICTION, _COHESION, _DENSITY, _WATER, *_ROUGHNESS, _RESIDUAL)
 
@@ -118,7 +128,9 @@ class RockMass:
         back_fracture: False for blocks that no plane supports from behind.
         realisations: number of blocks that the description asks for.
         seed: seed of the random numbers that the description asks for.
-        remarks: what is to be said of its planes in space.
+        remarks: what is to be said of its planes in space, and of a density that is assumed.
+        drainage: what the water in the back fractures does while blocks move, `UNDRAINED` or
+            `DRAINED` of :mod:`rbfrag.solver.stability.joint`.
     """
 
     variables: Mapping[str, Distribution]
@@ -126,6 +138,7 @@ class RockMass:
     realisations: int = REALISATIONS
     seed: int = SEED
     remarks: tuple[str, ...] = ()
+    drainage: str = UNDRAINED
 
     @classmethod
     def of(cls, description: Mapping[str, object]) -> RockMass:
@@ -136,10 +149,12 @@ class RockMass:
                 :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
                 ``friction.cohesion_pa``, ``back.water_m``, ``friction.jrc`` with
                 ``friction.jcs_mpa`` and perhaps ``friction.joint_length_m``,
-                ``friction.phi_residual_deg``, ``block.density_kg_m3`` (needed with cohesion, water
-                or roughness), ``block.size_factor``, ``block.kv``, ``block.back_fracture``,
-                ``realisations`` and ``seed`` may be left out. ``face.plane``, ``base.plane`` and
-                ``back.plane``, each dip/dip direction or a list of such, stand for the dips.
+                ``friction.phi_residual_deg``, ``block.density_kg_m3`` (2,650 where cohesion, water
+                or roughness need it), ``block.size_factor``, ``block.kv``,
+                ``block.back_fracture``, ``back.drainage`` (``undrained``, the default, or
+                ``drained``), ``realisations`` and ``seed`` may be left out. ``face.plane``,
+                ``base.plane`` and ``back.plane``, each dip/dip direction or a list of such, stand
+                for the dips.
 
         Raises:
             InputError: a key is missing, unknown or has an impossible value; it is named.
@@ -160,12 +175,12 @@ class RockMass:
                     f"{key} is missing: give a number, or a table such as "
                     "{ distribution = 'normal', mean = …, sd = … }"
                 )
-        weighed = [key for key in ENDING if key in variables]
-        if weighed and _DENSITY not in variables:
-            raise InputError(
-                f"{weighed[0]} needs {_DENSITY}, the density of the rock (about 2700 kg/m³): its "
-                "effect is that of a stress over the weight"
-            )
+        if _DENSITY not in variables and not variables.keys().isdisjoint(_WEIGHED):
+            remarks = (*remarks, ASSUMED_DENSITY)
+        drainage = description.get(DRAINAGE)
+        if drainage is not None and _WATER not in variables:
+            raise InputError(f"{DRAINAGE} goes with {_WATER}, the water that drains or does not")
+        drains = is_drained(drainage)
         refuse_half(*(variables.get(key) for key in _ROUGHNESS))
         back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
@@ -178,6 +193,7 @@ class RockMass:
             checked_count(description.get("realisations", REALISATIONS), "realisations"),
             checked_seed(description.get("seed", SEED), "seed"),
             remarks,
+            DRAINED if drains else UNDRAINED,
         )
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
@@ -217,8 +233,8 @@ class RockMass:
         s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor
         phi_back = drawn.get(_BACK_FRICTION, phi)
         gamma = back_dip - beta
-        density = drawn.get(_DENSITY, np.ones(n))
-        cohesion, water, jrc = (drawn.get(key, np.zeros(n)) for key in ENDING)
+        density = drawn.get(_DENSITY, np.full(n, ROCK_KG_M3))
+        cohesion, water = (drawn.get(key, np.zeros(n)) for key in (_COHESION, _WATER))
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
         for code, valid in enumerate(
@@ -239,44 +255,58 @@ class RockMass:
         possible = reason == 0
         blocks = BlockArray.from_fractures(np.where(possible, s1, np.nan), s2, gamma)
         water = held_m(water, s1_m=s1, gamma_deg=gamma, beta_deg=beta)
-        on: dict[str, Any] = {"beta_deg": beta, "kv": drawn["block.kv"]}
-        on["back_fracture"] = self.back_fracture
         strength = {_COHESION: cohesion, _WATER: water, **{k: drawn.get(k) for k in _ROUGHNESS}}
-        stated: dict[str, Any] = {k.split(".")[1]: strength[k] for k in strength if k in drawn}
-        stability = stability_arrays(
-            blocks, phi_deg=phi, phi_back_deg=phi_back, density_kg_m3=density, **on, **stated
-        )
-        left = stability
-        if _RESIDUAL in drawn:
-            left = stability_arrays(blocks, phi_deg=drawn[_RESIDUAL], **on)
+        joint: dict[str, Any] = {k.split(".")[1]: strength[k] for k in strength if k in drawn}
+        if joint:
+            joint["density_kg_m3"] = density
+
+        def on_joint(joint: dict[str, Any], phi: FloatArray, phi_back: FloatArray) -> Realisations:
+            stability = stability_arrays(
+                blocks, phi_deg=phi, phi_back_deg=phi_back, beta_deg=beta, kv=drawn["block.kv"],
+                back_fracture=self.back_fracture, **joint,
+            )  # fmt: skip
+            return Realisations(
+                rock_mass=self,
+                seed=seed,
+                beta_deg=beta,
+                gamma_deg=gamma,
+                s1_m=s1,
+                s2_m=s2,
+                phi_deg=phi,
+                phi_back_deg=phi_back,
+                kv=drawn["block.kv"],
+                cohesion_pa=joint.get("cohesion_pa", np.zeros(n)),
+                water_m=water,
+                jrc=joint.get("jrc", np.zeros(n)),
+                joint=joint,
+                blocks=blocks,
+                stability=stability,
+                reason_code=reason,
+            )
+
+        def realised(joint: dict[str, Any]) -> Realisations:
+            first = on_joint(joint, phi, phi_back)
+            if _RESIDUAL not in drawn:
+                return first
+            left = {name: values for name, values in joint.items() if name not in ENDED}
+            residual = drawn[_RESIDUAL]
+            return replace(first, after_slip=on_joint(left, residual, residual))
+
+        # drained blocks are dry ones
+        dry = {name: values for name, values in joint.items() if name != "water_m"}
+        drains = self.drainage == DRAINED
+        realisations = realised(dry if drains else joint)
+        stability, left = realisations.stability, realisations.in_time.stability
         codes, sliver = stability.reason_code, len(IMPOSSIBLE) - 1
+        # in place: all of these realisations are the same blocks
         reason[possible & ((codes != 0) | ~(stability.p2 > 0.0))] = sliver
         reason[possible & (codes == FLOATS)] = sliver - 1
         reason[possible & ((codes == OF_JOINT) | ((codes == 0) & (left.reason_code != 0)))] = (
             sliver - 2
         )
-        realisations = Realisations(
-            rock_mass=self,
-            seed=seed,
-            beta_deg=beta,
-            gamma_deg=gamma,
-            s1_m=s1,
-            s2_m=s2,
-            phi_deg=phi,
-            phi_back_deg=phi_back,
-            kv=drawn["block.kv"],
-            cohesion_pa=cohesion,
-            water_m=water,
-            jrc=jrc,
-            blocks=blocks,
-            stability=stability,
-            reason_code=reason,
-        )
-        if _RESIDUAL in drawn:
-            of_joint: dict[str, Any] = dict.fromkeys(("phi_deg", "phi_back_deg"), drawn[_RESIDUAL])
-            of_joint |= dict.fromkeys(("cohesion_pa", "water_m", "jrc"), np.zeros(n))
-            after = replace(realisations, stability=left, **of_joint)
-            realisations = replace(realisations, after_slip=after)
+        if np.any(water[possible] > 0.0):
+            drained = realisations if drains else realised(dry)
+            realisations = replace(realisations, drained=drained)
         if realisations.n_blocks == 0:
             raise InputError(f"none of {n} realisations is a block: {realisations.why_impossible}")
         return realisations
@@ -297,10 +327,14 @@ class Realisations:
         cohesion_pa: cohesion of the base [Pa]; 0 where the description states none.
         water_m: height of the water in the back fracture above the heel [m]; 0 likewise.
         jrc: joint roughness coefficient of the base; 0 likewise.
+        joint: keywords of :func:`rbfrag.solver.stability.single.stability` about bond, water that
+            acts, and roughness, with the density of the rock; empty for dry joints of friction.
         stability: the modes of the blocks, states and yield accelerations.
         reason_code: why a realisation is no block, a place in :data:`IMPOSSIBLE`.
-        after_slip: the same blocks on their residual friction, dry and without bond or roughness;
-            None where the description states no residual friction.
+        after_slip: the same blocks on their residual friction, without bond or roughness; None
+            where the description states no residual friction.
+        drained: the same blocks whose water drains as they start to move, which is the other
+            bound; None without water.
     """
 
     rock_mass: RockMass
@@ -315,10 +349,12 @@ class Realisations:
     cohesion_pa: FloatArray
     water_m: FloatArray
     jrc: FloatArray
+    joint: Mapping[str, FloatArray]
     blocks: BlockArray
     stability: StabilityArray
     reason_code: NDArray[np.int8]
     after_slip: Realisations | None = None
+    drained: Realisations | None = None
 
     @property
     def in_time(self) -> Realisations:
@@ -375,16 +411,25 @@ class Realisations:
     def ends_with_slip(self) -> NDArray[np.bool_]:
         """Whether the strength of a block ends with its first slip, shape (n,).
 
-        That of a topple, which turns about its toe whatever bond or roughness, does by water alone.
+        That of a topple does not, which turns about its toe whatever bond or roughness.
         """
         on_base = (self.cohesion_pa > 0.0) | (self.jrc > 0.0)
         topples = self.stability.mode_code == MODES.index("topple")
-        return np.asarray(self.is_block & ((self.water_m > 0.0) | (on_base & ~topples)))
+        return np.asarray(self.is_block & on_base & ~topples)
+
+    @property
+    def is_wet(self) -> NDArray[np.bool_]:
+        """Whether water acts on a block as it moves, shape (n,)."""
+        return np.asarray(self.joint.get("water_m", np.zeros(self.n)) > 0.0)
 
     @property
     def kr_at_rest(self) -> FloatArray:
-        """Toppling yield without vertical acceleration, tan(α3 - β); NaN for other modes."""
-        return self.stability.kr / (1.0 + self.kv)
+        """Toppling yield without vertical acceleration; NaN for other modes.
+
+        tan(α3 - β) less the moment of the water, which k_v leaves as it is.
+        """
+        alone = np.tan(np.radians(self.blocks.alpha3_deg - self.beta_deg))
+        return self.stability.kr - self.kv * alone
 
 
 def checked_count(value: object, name: str) -> int:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmasses.counts import EqualCounts, ModeCount
+from rbfrag.rockmasses.counts import EqualCounts, ModeCount, StateCount
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.scenario import Average, Scenario
+from rbfrag.solver.stability.joint import IS_DRAINED, NO_EFFECT_OF_COHESION, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName
 
 COUNTS = ("count", "share", "has_model", "unstable", "in_domain")
@@ -20,6 +21,11 @@ ANSWERS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "in_domain", "how", "reason",
 )  # fmt: skip
 """Values of modes, realisations and scenarios that documents and tables show as they are."""
+
+OTHER_MODE_DRAINED = (
+    "{count} blocks have another mode where their water drains: their drained bound is that of the "
+    "limit state of that mode, which may be likelier"
+)
 
 NEAR_LIMIT = 0.01
 """Share of impossible realisations above which the description is doubted."""
@@ -40,14 +46,14 @@ def as_dict(
         "impossible": realisations.impossible,
         "variables": {key: str(law) for key, law in realisations.rock_mass.variables.items()},
         "back_fracture": realisations.rock_mass.back_fracture,
+        "drainage": None if realisations.drained is None else realisations.rock_mass.drainage,
         "modes": {
             mode: {
                 "count": count.count,
                 "share": count.share,
                 "share_error": count.share_error,
-                **count.states,
-                "yield_g": {f"q{100 * q:02.0f}": k for q, k in count.yield_quantiles_g.items()}
-                or None,
+                **_states(count),
+                "drained": None if count.drained is None else _states(count.drained),
             }
             for mode, count in counts.items()
         },
@@ -60,23 +66,40 @@ def as_dict(
         ],
         "scenario": None if answer is None else _scenario(answer),
         "shaking": None if shaking is None else dict(shaking),
-        "warnings": _warnings(realisations, answer),
+        "warnings": [
+            *_warnings(realisations, answer, in_motion=bool(answer or shaking)),
+            *realisations.rock_mass.remarks,
+        ],
     }
 
 
+def _states(count: StateCount) -> dict[str, Any]:
+    quantiles = {f"q{100 * q:02.0f}": k for q, k in count.yield_quantiles_g.items()}
+    states: dict[str, Any] = dict(count.states.items())
+    return {**states, "yield_g": quantiles or None}
+
+
 def _scenario(answer: Scenario) -> dict[str, Any]:
+    drained = answer.drained
     return {
         **answer.measures,
         "model": answer.model,
         "other_models": dict(answer.other_models),
         **{name: getattr(answer, name) for name in ("term", "method", "level")},
         "modes": {
-            mode.mode: {**{name: getattr(mode, name) for name in COUNTS}, **_average(mode.covered)}
+            mode.mode: {
+                **{name: getattr(mode, name) for name in COUNTS},
+                **_average(mode.covered),
+                "drained": None if mode.drained is None else _average(mode.drained),
+            }
             for mode in answer.modes
         },
         "covered_share": answer.covered_share,
         "uncovered_share": dict(answer.uncovered_share),
-        "covered_only": _average(answer.covered),
+        "covered_only": {
+            **_average(answer.covered),
+            "drained": None if drained is None else _average(drained.covered),
+        },
     }
 
 
@@ -85,8 +108,16 @@ def _average(average: Average) -> dict[str, Any]:
     return {"covered": values.pop("count"), **values}
 
 
-def _warnings(realisations: Realisations, answer: Scenario | None) -> list[str]:
+def _warnings(realisations: Realisations, answer: Scenario | None, *, in_motion: bool) -> list[str]:
     warnings = [] if answer is None else list(answer.warnings)
+    if in_motion and realisations.drained is not None:
+        warnings += notes_on_water(realisations)
+        modes = (each.stability.mode_code for each in (realisations, realisations.drained))
+        if others := int(np.count_nonzero(np.not_equal(*modes)[realisations.is_block])):
+            warnings.append(OTHER_MODE_DRAINED.format(count=others))
+    topples = realisations.of_mode("topple") & (realisations.cohesion_pa > 0.0)
+    if bonded := int(np.count_nonzero(topples)):
+        warnings.append(f"{bonded} toppling blocks: {NO_EFFECT_OF_COHESION}")
     lifts = int(np.count_nonzero(realisations.is_block & realisations.stability.toe_lifts))
     if lifts:
         warnings.append(
@@ -104,6 +135,13 @@ def _warnings(realisations: Realisations, answer: Scenario | None) -> list[str]:
     return warnings
 
 
+def notes_on_water(realisations: Realisations) -> tuple[str, ...]:
+    """Return what the water does while the blocks move; nothing of dry blocks."""
+    if realisations.drained is None:
+        return ()
+    return (STAYS_UNDRAINED if realisations.is_wet.any() else IS_DRAINED,)
+
+
 def block_columns(
     realisations: Realisations, answer: Scenario | None = None
 ) -> dict[str, NDArray[Any]]:
@@ -111,7 +149,8 @@ def block_columns(
 
     A realisation that is no block has a row, too: without mode, with weight 0 and its reason.
     ``kr`` is the toppling yield at rest without vertical acceleration, NaN for other modes;
-    ``yield_g`` is the yield of the governing mode.
+    ``yield_g`` is the yield of the governing mode. Where water stands behind the blocks,
+    ``drained_yield_g`` and ``drained_probability`` are the drained bound.
 
     Args:
         answer: the answers to a scenario of theirs, which add the measures of the motion and
@@ -144,8 +183,13 @@ def block_columns(
     for name in ("cohesion_pa", "water_m", "jrc"):
         if np.any(getattr(realisations, name)[is_block]):
             columns[name] = getattr(realisations, name)
+    if realisations.drained is not None:
+        drained = realisations.drained.stability
+        columns["drained_yield_g"] = only_blocks(drained.yield_acceleration)
     if answer is None:
         return columns | {"reason": realisations.reason}
+    if answer.drained is not None:
+        columns["drained_probability"] = answer.drained.probability
     return columns | {name: getattr(answer, name) for name in ANSWERS}
 
 

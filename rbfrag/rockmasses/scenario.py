@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
@@ -18,21 +18,23 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.many import push_of_blocks
 from rbfrag.question.question import predict
-from rbfrag.question.shapes import ModeShapes, p2_at_rest
+from rbfrag.question.shapes import ModeShapes, dip_of_factor, p2_at_rest
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.kinds import BY_MECHANICS, kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, STABLE, UNSTABLE, ModeName
+from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 
 MODELLED: tuple[ModeName, ...] = ("topple",)
 """Modes that a fragility model answers for."""
 
 UNCOVERED = "no fragility model for this mode"
 BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
-ENDS = "water or roughness: it ends with the first slip; friction.phi_residual_deg gives an answer"
+ENDS = "roughness: it ends with the first slip; friction.phi_residual_deg gives an answer"
 SLIPS_ON = "after its first slip it does not stand on friction.phi_residual_deg"
 LOCKED = "locked: no horizontal acceleration moves it in this mode"
 
@@ -66,6 +68,8 @@ class ScenarioMode:
         unstable: number of blocks that fail at rest, P = 1 whatever the mode.
         covered: average over the blocks for which there is an answer.
         in_domain: number of blocks with a model's answer in the range that was fitted.
+        drained: average over those of the blocks for which there is an answer where their water
+            drains as they start to move; None without water.
     """
 
     mode: ModeName
@@ -75,6 +79,7 @@ class ScenarioMode:
     unstable: int
     covered: Average
     in_domain: int
+    drained: Average | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +106,8 @@ class Scenario:
         reason: why an answer is missing, ruled or to be doubted, shape (n,).
         warnings: sentences on the whole answer.
         other_models: names of the models that answered for other modes than toppling, by mode.
+        drained: the answer where the water drains as the blocks start to move, the other bound;
+            None without water.
     """
 
     measures: Mapping[str, float]
@@ -122,6 +129,12 @@ class Scenario:
     reason: NDArray[np.object_]
     warnings: tuple[str, ...]
     other_models: Mapping[ModeName, str] = field(default_factory=dict)
+    drained: Scenario | None = None
+
+    def average(self, blocks: NDArray[np.bool_]) -> Average:
+        """Return the average over those of some blocks, shape (n,), that have an answer."""
+        covered = blocks & np.isfinite(self.probability)
+        return _average(covered, self.probability, self.ci_low, self.ci_high)
 
 
 def scenario(
@@ -139,10 +152,12 @@ def scenario(
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
     fragility model. With `displacement_m` a stable block that slides has the probability of
     sliding further than that, and one that slumps or topples confined that of failing past
-    recovery, unless its base has cohesion: that bond breaks at the first slip, as uplift by water
-    and roughness end. Where the rock mass states a residual friction, blocks are answered for as
-    they are after it. All others have no answer and are left out of every average; the answer says
-    how many they are, as of modes whose models need other measures.
+    recovery, unless its base has cohesion or is rough: the first slip ends both. Where the rock
+    mass states a residual friction, blocks are answered for as they are after it. Water keeps
+    acting while blocks move, unless the rock mass is drained; the drained bound comes with the
+    answer. All others have no answer and are
+    left out of every average; the answer says how many they are, as of modes whose models need
+    other measures.
 
     Args:
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
@@ -179,7 +194,7 @@ def scenario(
     in_domain = np.zeros(realisations.n, dtype=np.bool_)
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
     reason[after.ends_with_slip] = BONDED
-    reason[after.ends_with_slip & ((after.water_m > 0.0) | (after.jrc > 0.0))] = ENDS
+    reason[after.ends_with_slip & (after.jrc > 0.0)] = ENDS
     reason[realisations.is_block & (after.stability.state_code == UNSTABLE)] = SLIPS_ON
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
     columns[:3, unstable] = 1.0
@@ -230,7 +245,22 @@ def scenario(
 
     if lacking and answer is None and not others:
         raise next(iter(lacking.values()))
+    drained: Scenario | None = None
     covered = np.isfinite(probability)
+    gives_way = (
+        _what_gives_way(after, described & covered, measures["pga_g"])
+        if "pga_g" in measures
+        else ()
+    )
+    no_bound: tuple[str, ...] = ()
+    if realisations.drained is not None:
+        try:
+            drained = scenario(
+                realisations.drained, measures, model=model, level=level, db=db,
+                displacement_m=displacement_m, rotation_deg=rotation_deg,
+            )  # fmt: skip
+        except InputError as error:
+            no_bound = (f"no drained bound: {error}",)
     modes = []
     for mode in MODES:
         blocks = realisations.of_mode(mode)
@@ -245,6 +275,7 @@ def scenario(
                     unstable=int(np.count_nonzero(blocks & unstable)),
                     covered=_average(blocks & covered, probability, low, high),
                     in_domain=int(np.count_nonzero(blocks & in_domain)),
+                    drained=None if drained is None else drained.average(blocks),
                 )
             )
     missing = {m.mode: (m.count - m.covered.count) / realisations.n_blocks for m in modes}
@@ -272,8 +303,9 @@ def scenario(
         in_domain=in_domain,
         how=how,
         reason=reason,
-        warnings=tuple(warnings),
+        warnings=(*warnings, *gives_way, *no_bound),
         other_models=others,
+        drained=drained,
     )
 
 
@@ -291,21 +323,19 @@ def _other_modes(
         for name in ("pgv_m_s", "pga_g", "arias_m_s", "magnitude")
         if name in measures
     }
-    k, beta_deg = realisations.stability.yield_acceleration, realisations.beta_deg
+    k = realisations.stability.yield_acceleration
     described = described & (k > 0.0)
     slides = realisations.of_mode("slide", "stable") & described
-    slide = {"ky": k[slides], "beta_deg": beta_deg[slides], "displacement_m": distance}
+    with np.errstate(all="ignore"):
+        dip_deg = dip_of_factor(_shapes(realisations, "slide"))
+    slide = {"ky": k[slides], "beta_deg": dip_deg[slides], "displacement_m": distance}
     questions: list[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]] = [("slide", slides, slide)]
     criteria: dict[ModeName, dict[str, Any]] = {"slump": {"rotation_deg": rotation_deg}}
     if rotation_deg is None:
         criteria["confined_topple"] = {}
     for mode, criterion in criteria.items():
-        shapes = ModeShapes(
-            realisations.blocks, mode, k, beta_deg, realisations.phi_deg,
-            realisations.phi_back_deg, False, backed=True,
-        )  # fmt: skip
         with np.errstate(all="ignore"):
-            p2 = p2_at_rest(shapes, array_elementwise())
+            p2 = p2_at_rest(_shapes(realisations, mode), array_elementwise())
         moves = realisations.of_mode(mode, "stable") & described & np.isfinite(p2)
         names = kind_of_mode(mode).parameters
         numbers = zip(names, (k[moves], p2[moves]), strict=True)
@@ -313,6 +343,47 @@ def _other_modes(
     for mode, chosen, block in questions:
         if chosen.any():
             yield mode, chosen, {**block, **motion}
+
+
+def _shapes(realisations: Realisations, mode: ModeName) -> ModeShapes:
+    """Return the blocks as those of one mode, which some of them are."""
+    return ModeShapes(
+        realisations.blocks, mode, realisations.stability.yield_acceleration,
+        realisations.beta_deg, realisations.phi_deg, realisations.phi_back_deg, False, backed=True,
+        push=_push(realisations),
+    )  # fmt: skip
+
+
+def _push(realisations: Realisations) -> Any:
+    """Return the push of water on the blocks as `ModeShapes` has it; None for dry ones."""
+    if not realisations.is_wet.any():
+        return None
+    joint = realisations.joint
+    return push_of_blocks(
+        realisations.blocks, realisations.beta_deg, joint["water_m"], joint["density_kg_m3"]
+    )
+
+
+def _what_gives_way(
+    realisations: Realisations, described: NDArray[np.bool_], pga_g: float
+) -> Iterator[str]:
+    """Yield how many slides tip about their heel at a PGA [g], and how many toes slip."""
+    push = _push(realisations)
+    thresholds: dict[ModeName, tuple[str, Callable[..., Any]]] = {
+        "slide": (HEEL_TIPS, heel_tips_g),
+        "topple": (TOE_SLIPS, toe_slips_g),
+    }
+    for mode, (about, threshold_g) in thresholds.items():
+        own = np.flatnonzero(realisations.of_mode(mode, "stable") & described)
+        at_g = threshold_g(
+            realisations.blocks.at(own), realisations.beta_deg[own], realisations.phi_deg[own],
+            None if push is None else tuple(each[own] for each in push),
+        )  # fmt: skip
+        gives_way = (at_g < pga_g) & (realisations.stability.yield_acceleration[own] < pga_g)
+        if count := int(np.count_nonzero(gives_way)):
+            low, high = (float(each(at_g[gives_way])) for each in (np.min, np.max))
+            text = about.replace("{threshold:.2f}", f"{low:.2f} to {high:.2f}")
+            yield f"{count} of {own.size} stable blocks of mode {mode}: {text}"
 
 
 def _average(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,16 @@ from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome
 from rbfrag.solver.stability import modes as mechanism
-from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP, TOPPLE, ModeName
+from rbfrag.solver.stability.modes import (
+    CONFINED_TOPPLE,
+    DRY,
+    MODES,
+    SLIDE,
+    SLUMP,
+    TOPPLE,
+    ModeName,
+)
+from rbfrag.solver.stability.single import judged, push_of
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
@@ -34,8 +43,8 @@ OUTCOMES = (
 rest, whatever the motion; ``locked``: no horizontal acceleration moves it in its mode;
 ``undetermined``: closer to failure than the error of its run; ``contact_lost``,
 ``indeterminate`` and ``jump``: the model ended before the block did, for the reason of that
-outcome; ``bond_breaks``: the motion exceeds the yield of a block whose bond, uplift by water or
-roughness ends with the first slip.
+outcome; ``bond_breaks``: the motion exceeds the yield of a block whose bond or roughness ends with
+the first slip.
 """
 
 AT_REST, STAYS, FAILS, UNSTABLE, LOCKED, UNDETERMINED = range(6)
@@ -122,9 +131,8 @@ class BlocksToRun:
 
     Args:
         place: places of the blocks among the realisations.
-        numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
-            ``phi_deg``, ``phi_back_deg`` and ``cohesion_pa`` [Pa], as :class:`Realisations`
-            has them.
+        numbers: ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``, ``phi_deg`` and
+            ``phi_back_deg``, as :class:`Realisations` has them, and what its `joint` has.
         back_fracture: whether there is a plane behind them.
     """
 
@@ -147,8 +155,8 @@ class BlockOutcomes:
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
         final_code: places in :data:`MODES` of the last motion that is one of a mode; -1 for none.
-        about: sentences on what a model takes for granted, and how many of the blocks each is
-            about, by mode code and sentence.
+        about: sentences on what a model takes for granted at any scale, and how many of the blocks
+            each is about, by mode code and sentence.
     """
 
     place: NDArray[np.intp]
@@ -183,7 +191,7 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
             rotation_rad[i, j] = _or_nan(end.peak_rad)
             if end.final_mode is not None:
                 final_code[i, j] = MODES.index(end.final_mode)
-        for sentence in outcomes[0][1].about_block if outcomes else ():
+        for sentence in dict.fromkeys(text for _, end in outcomes for text in end.about_block):
             about[mode_code, sentence] = about.get((mode_code, sentence), 0) + 1
     return BlockOutcomes(
         place=work.place,
@@ -198,15 +206,18 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
 
 def _runner(work: BlocksToRun, j: int) -> Runner:
     """Return the runner of the model that the block's mode calls for."""
-    one = {name: float(values[j]) for name, values in work.numbers.items()}
+    one: dict[str, Any] = {name: float(values[j]) for name, values in work.numbers.items()}
+    block = Block.from_fractures(one.pop("s1_m"), one.pop("s2_m"), one.pop("gamma_deg"))
+    finding, planes, _ = judged(block, back_fracture=work.back_fracture, **one)
     site = BlockOnPlanes(
-        block=Block.from_fractures(one["s1_m"], one["s2_m"], one["gamma_deg"]),
-        beta_rad=math.radians(one["beta_deg"]),
-        phi_rad=math.radians(one["phi_deg"]),
-        phi_back_rad=math.radians(one["phi_back_deg"]),
+        block=block,
+        beta_rad=math.radians(finding.beta_deg),
+        phi_rad=math.radians(finding.phi_deg),
+        phi_back_rad=math.radians(finding.phi_back_deg),
         back_fracture=work.back_fracture,
-        cohesive=one["cohesion_pa"] > 0.0,
-        yield_g=one["yield_g"],
+        cohesive=bool(planes.bond),
+        yield_g=finding.k,
+        push=push_of(block, planes) or DRY,
     )
     return model_of_mode(MODES[work.mode_code[j]]).runner(site)
 
@@ -215,9 +226,7 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-_NUMBERS = (
-    "s1_m", "s2_m", "gamma_deg", "beta_deg", "phi_deg", "phi_back_deg", "cohesion_pa",
-)  # fmt: skip
+_NUMBERS = ("s1_m", "s2_m", "gamma_deg", "beta_deg", "phi_deg", "phi_back_deg")
 
 CHUNK = 250
 """Blocks handed out at a time: a second or less of work."""
@@ -257,11 +266,12 @@ class ShakingPlan:
         realisations, places = self.realisations.in_time, self.places
         for start in range(0, places.size, chunk):
             at = places[start : start + chunk]
-            numbers = {name: getattr(realisations, name)[at] for name in _NUMBERS}
+            numbers = {name: getattr(realisations, name) for name in _NUMBERS}
+            numbers |= realisations.joint
             yield BlocksToRun(
                 place=at,
                 mode_code=realisations.stability.mode_code[at],
-                numbers={**numbers, "yield_g": realisations.stability.yield_acceleration[at]},
+                numbers={name: values[at] for name, values in numbers.items()},
                 back_fracture=realisations.rock_mass.back_fracture,
                 moves=self.moves[:, at],
                 shaking=self.shaking,
@@ -309,7 +319,8 @@ class ShakenMass(ShakingPlan):
 
     Args:
         displacement_m: greatest displacement along the base, of the block or, where it turns, of
-            its contact on the base; NaN where there is none to tell.
+            its contact on the base; NaN where there is none to tell, as of a topple whose toe
+            holds.
         rotation_rad: greatest rotation; NaN for sliding, and where there is none to tell.
         final_code: place in :data:`MODES` of the last motion that is one of a mode; -1 for none.
         about: how many blocks of a mode a sentence is about.
@@ -406,8 +417,8 @@ def _about_bonds(breaks: NDArray[np.bool_]) -> tuple[str, ...]:
     if not count:
         return ()
     return (
-        f"{count} blocks with cohesion, water or roughness are driven beyond their yield: the "
-        "first slip ends it, and what they do after it no model describes (outcome bond_breaks); "
+        f"{count} blocks with cohesion or roughness are driven beyond their yield: the first "
+        "slip ends it, and what they do after it no model describes (outcome bond_breaks); "
         "with friction.phi_residual_deg, what is left of the friction, they are run as they are "
         "after it",
     )

@@ -273,6 +273,7 @@ class RockmassAnswer(_Document):
     impossible: dict[str, int]
     variables: dict[str, str]
     back_fracture: bool
+    drainage: str | None
     modes: dict[str, dict[str, Any]]
     crossings: list[dict[str, Any]]
     scenario: dict[str, Any] | None

@@ -12,10 +12,10 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
 from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
-from rbfrag.solver.results import Outcome, Response
+from rbfrag.solver.results import Response
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.single import refuse_undecided, stability
-from rbfrag.solver.whole_run import WholeRun, response_of, whole_run
+from rbfrag.solver.whole_run import WholeRun, end_of, response_of, whole_run
 
 
 def driven_up_below(site: BlockOnPlanes) -> float:
@@ -62,18 +62,7 @@ class MechanismKind(Kind):
         mechanism = self._without_cohesion(site)
 
         def run(excited: Excitation) -> RunEnd:
-            whole = whole_run(mechanism, site, excited)
-            # of a block that has failed a peak is only where the run was stopped
-            failed = whole.outcome is Outcome.TOPPLED
-            return RunEnd(
-                outcome=whole.outcome,
-                moved=whole.started_s is not None,
-                peak_rad=None if failed else whole.peak_rad,
-                peak_displacement_m=None if failed else whole.peak_displacement_m,
-                error=whole.step_error,
-                final_mode=whole.final_mode,
-                about_block=mechanism.warnings,
-            )
+            return end_of(whole_run(mechanism, site, excited), self.mode, mechanism.warnings)
 
         return run
 

@@ -57,9 +57,7 @@ def respond(
     excited = excitation(motion, vertical, polarity)
     refuse_endless(excited, p2)
     run = simulate(excited, p2=p2, kr=kr)
-    outcome = OUTCOMES[run.outcome]
-    if math.isnan(run.error_rad):  # the error is beyond any number: nothing is known of the end
-        outcome = Outcome.UNDETERMINED
+    outcome = outcome_of(run)
     theta_c = math.atan(kr)
     known = math.isfinite(run.peak_rad)
     return Response(
@@ -75,7 +73,7 @@ def respond(
         samples_moved=run.samples_moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
         warnings=_warnings(motion, vertical, excited, outcome, run),
-        history=_history(excited, p2=p2, kr=kr) if history else None,
+        history=history_of(excited, p2=p2, kr=kr) if history else None,
     )
 
 
@@ -85,6 +83,11 @@ def simulate(
     """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
     p = math.sqrt(p2)
     return Run(*run_toppling(excited.nodes, kr, p, order, ph_max, _NO_HISTORY, np.empty(9)))
+
+
+def outcome_of(run: Run) -> Outcome:
+    """Return how a run ended; undetermined where its error is beyond any number."""
+    return Outcome.UNDETERMINED if math.isnan(run.error_rad) else OUTCOMES[run.outcome]
 
 
 def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
@@ -107,7 +110,7 @@ def refuse_endless(excited: Excitation, p2: float) -> None:
         )
 
 
-def _history(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
+def history_of(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     """Run again over the record and a stretch of rest after it, keeping every node."""
     p = math.sqrt(p2)
     longer = with_free_motion(excited, p)

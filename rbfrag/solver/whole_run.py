@@ -21,7 +21,7 @@ from rbfrag.solver.free_motion import (
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Shaking
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import (
     BlockState,
@@ -251,6 +251,27 @@ def whole_run(
     by_law = () if start is None or run is not None else start.by_law
     free = free_motion(site, excited, release, at_toe=mechanism.at_toe, by_law=by_law)
     return WholeRun(mechanism, site, start, run, free)
+
+
+def end_of(whole: WholeRun, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
+    """Return how a block that was followed ends, without its history.
+
+    Args:
+        mode: failure mode of its model, in which it ends where no other motion is that of a mode.
+        about_block: what its model takes for granted.
+    """
+    # of a block that has failed a peak is only where the run was stopped
+    failed = whole.outcome is Outcome.TOPPLED
+    moved = whole.started_s is not None
+    return RunEnd(
+        outcome=whole.outcome,
+        moved=moved,
+        peak_rad=None if failed else whole.peak_rad,
+        peak_displacement_m=None if failed else whole.peak_displacement_m,
+        error=whole.step_error,
+        final_mode=(whole.final_mode or mode) if moved else None,
+        about_block=about_block,
+    )
 
 
 def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:

@@ -328,7 +328,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             input=Input("; default: that of the base", ("joint_length",))),
         Quantity("phi_residual_deg", "Friction angle of base and back that is left after the first "
             "slip", "deg", range=_FRICTION,
-            input=Input("which ends cohesion, water and roughness", ("phi_residual",))),
+            input=Input("which ends cohesion and roughness", ("phi_residual",))),
     ),
     "block scatter": (
         _block_scatter("p2_sigma", "ln p²"),

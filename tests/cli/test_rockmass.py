@@ -108,6 +108,27 @@ def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     assert "--displacement, how far is too far [m], gives them" in result.stderr
 
 
+def test_water_shows_both_bounds(shell: Shell, mass: Path) -> None:
+    mass.write_text(mass.read_text().replace("[back]", "[back]\nwater_m = 0.2"))
+    question = ("rockmass", mass, "--n", "300", "--pgv", "0.6", "--pga", "0.7")
+    question = (*question, "--displacement", "0.05")
+    document = json.loads(shell(*question, "--json").stdout)
+    total = document["scenario"]["covered_only"]
+    assert total["drained"]["probability"] < total["probability"]
+    slides = document["modes"]["slide"]
+    assert slides["drained"]["yield_g"]["q50"] > slides["yield_g"]["q50"]
+    assert any("keeps acting while the block moves" in text for text in document["warnings"])
+    assert any("have another mode where their water drains" in t for t in document["warnings"])
+    text = shell(*question).stdout
+    assert f"Drained: {round(100 * total['drained']['probability'])} %" in text
+    for header in ("drained_k_q50_g", "drained_low"):
+        assert header in text
+    mass.write_text(mass.read_text().replace("[back]", '[back]\ndrainage = "drained"'))
+    drained = json.loads(shell(*question, "--json").stdout)
+    assert drained["scenario"]["covered_only"]["probability"] == total["drained"]["probability"]
+    assert "Drained:" not in shell(*question).stdout
+
+
 @pytest.mark.usefixtures("stored_model")
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_the_table_holds_the_blocks_with_their_answers(

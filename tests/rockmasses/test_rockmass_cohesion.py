@@ -157,7 +157,6 @@ def test_a_chart_of_modes_says_that_it_knows_no_cohesion(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("cohesion_pa = 3000\n", "needs block.density_kg_m3"),
         ("cohesion_pa = -1\n[block]\ndensity_kg_m3 = 2700\n", "give 0 or more"),
         ("cohesion_pa = 1\n[block]\ndensity_kg_m3 = 0\n", "give above 0"),
     ],

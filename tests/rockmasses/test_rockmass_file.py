@@ -58,6 +58,21 @@ def test_both_forms_say_the_same(tmp_path: Path) -> None:
     assert found.realise().n == 500
 
 
+def test_both_forms_state_the_drainage(tmp_path: Path) -> None:
+    toml = TOML.replace("spacing_m = 0.6", 'spacing_m = 0.6\nwater_m = 0.3\ndrainage = "drained"')
+    toml = toml.replace("back_fracture = false", "")
+    csv = CSV.replace("block.back_fracture,,false", "back.water_m,,0.3\nback.drainage,,drained")
+    mass = read_rock_mass(written(tmp_path, "a.toml", toml))
+    assert mass == read_rock_mass(written(tmp_path, "a.csv", csv))
+    assert mass.drainage == "drained"
+    undrained = read_rock_mass(
+        written(tmp_path, "a.toml", toml.replace('"drained"', '"undrained"'))
+    )
+    assert undrained.drainage == "undrained"
+    assert undrained.realise().is_wet.any()
+    assert not mass.realise().is_wet.any()
+
+
 def test_the_example_files_are_the_same_rock_mass() -> None:
     toml, csv = (read_rock_mass(EXAMPLES / f"rockmass.{kind}") for kind in ("toml", "csv"))
     assert toml == csv

@@ -129,3 +129,29 @@ def test_what_can_be_answered_is_and_the_rest_is_listed() -> None:
     assert set(pgv.reason[slumps & np.isnan(pgv.probability)]) == {lacks[0].split("answer: ")[1]}
     with pytest.raises(InputError, match="no stored sliding model works with pga_g: give pgv_m_s"):
         scenario(MADE, {"pga_g": 0.6}, displacement_m=0.1)
+
+
+def test_slides_that_tip_and_toes_that_slip_are_counted_as_one_by_one() -> None:
+    mass = {
+        **TABLE_3_4, "back.dip_deg": {"distribution": "uniform", "low": 40.0, "high": 100.0},
+        "base.dip_deg": {"distribution": "uniform", "low": -5.0, "high": 25.0},
+        "back.water_m": {"distribution": "uniform", "low": 0.0, "high": 0.3},
+        "back.spacing_m": 0.5, "block.density_kg_m3": 2650.0,
+    }  # fmt: skip
+    made = RockMass.of(mass).realise(60, 3)
+    motion = {"pgv_m_s": 0.4, "pga_g": 0.7}
+    answer = scenario(made, motion, displacement_m=0.05)
+    counts = dict.fromkeys(("tip the block", "the toe slips above"), 0)
+    for i in np.flatnonzero(made.stability.state_code == STABLE).tolist():
+        slide = {"displacement_m": 0.05} if made.stability.mode_code[i] == SLIDE else {}
+        one = predict(
+            s1_m=float(made.s1_m[i]), s2_m=float(made.s2_m[i]), gamma_deg=float(made.gamma_deg[i]),
+            beta_deg=float(made.beta_deg[i]), phi_deg=float(made.phi_deg[i]),
+            water_m=float(made.water_m[i]), density_kg_m3=2650.0, **slide, **motion,
+        )  # fmt: skip
+        for text in counts:
+            counts[text] += any(text in note for note in one.warnings)
+    assert min(counts.values()) > 0
+    for text, count in counts.items():
+        (note,) = (each for each in answer.warnings if text in each)
+        assert note.startswith(f"{count} of ")

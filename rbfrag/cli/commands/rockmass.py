@@ -204,8 +204,12 @@ def _print(document: dict[str, Any], *, verbose: bool) -> None:
     for text, count in document["impossible"].items():
         print(f"no block {count} times: {text}")
     quantiles = ("q05", "q50", "q95")
+    headers = ["mode", "count", "share_%", "+-", "unstable", "locked"]
+    headers += [f"k_{q}_g" for q in quantiles]
+    if document["drainage"] is not None:
+        headers += [f"drained_k_{q}_g" for q in quantiles]
     print_table(
-        ["mode", "count", "share_%", "+-", "unstable", "locked", *(f"k_{q}_g" for q in quantiles)],
+        headers,
         [
             [
                 mode,
@@ -214,7 +218,12 @@ def _print(document: dict[str, Any], *, verbose: bool) -> None:
                 round(100.0 * tally["share_error"], 2),
                 tally["unstable"],
                 tally["locked"],
-                *((tally["yield_g"] or {}).get(q) for q in quantiles),
+                *(
+                    (states["yield_g"] or {}).get(q)
+                    for states in (tally, tally["drained"])
+                    if states is not None
+                    for q in quantiles
+                ),
             ]
             for mode, tally in document["modes"].items()
         ],
@@ -247,11 +256,18 @@ def _print_scenario(scenario: dict[str, Any]) -> None:
     total = scenario["covered_only"]
     rows.append(["covered blocks only", 100.0 * scenario["covered_share"], total["covered"]])
     rows[-1] += _probability(total)
-    print_table(["mode", "share_%", "covered", "probability", "+-", "ci_low", "ci_high"], rows)
+    headers = ["mode", "share_%", "covered", "probability", "+-", "ci_low", "ci_high"]
+    if total["drained"] is not None:
+        headers += ["drained", "drained_low", "drained_high"]
+    print_table(headers, rows)
 
 
 def _probability(answer: dict[str, Any]) -> list[Any]:
-    return [answer[key] for key in ("probability", "standard_error", "ci_low", "ci_high")]
+    drained = answer["drained"] or {}
+    return [
+        *(answer[key] for key in ("probability", "standard_error", "ci_low", "ci_high")),
+        *(drained[key] for key in ("probability", "ci_low", "ci_high") if drained),
+    ]
 
 
 def _words(mode: str) -> str:

@@ -195,9 +195,11 @@ class GivenBlocks(NamedTuple):
 def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.rockmasses.file import read_rock_mass
+    from rbfrag.rockmasses.report import notes_on_water
     from rbfrag.rockmasses.report import toppling_blocks as stable_topples
 
-    p2s, krs, share = stable_topples(read_rock_mass(path).realise(n, None))
+    blocks = read_rock_mass(path).realise(n, None)
+    p2s, krs, share = stable_topples(blocks)
     if krs.size == 0:
         raise InputError(f"{path}: no block of it topples: there is no model for them")
     remark = (
@@ -206,7 +208,7 @@ def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
     )
     kinds = [TOPPLING_BLOCK.kind] * krs.size
     columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs, "kind": kinds}
-    return GivenBlocks(columns, True, (remark,))
+    return GivenBlocks(columns, True, (remark, *notes_on_water(blocks), *blocks.rock_mass.remarks))
 
 
 class ChartedBlocks(NamedTuple):

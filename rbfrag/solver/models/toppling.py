@@ -22,10 +22,15 @@ from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
-from rbfrag.solver.results import CriticalResult, Outcome, Response
-from rbfrag.solver.stability.toe import slides_at_toe, toe_needs_in_time, toe_slips_g
-from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, respond, simulate
-from rbfrag.solver.whole_run import response_of, whole_run
+from rbfrag.solver.results import CriticalResult, Outcome, Response, ResponseHistory
+from rbfrag.solver.stability.toe import (
+    TOE_FOLLOWED,
+    slides_at_toe,
+    toe_needs_in_time,
+    toe_slips_g,
+)
+from rbfrag.solver.toppling_run import history_of, outcome_of, refuse_endless, respond, simulate
+from rbfrag.solver.whole_run import WholeRun, end_of, response_of, whole_run
 
 
 class Toppling(Kind):
@@ -46,12 +51,12 @@ class Toppling(Kind):
             return answer
         beta_deg, phi_deg = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
         slips_g = toe_slips_g(site.block, beta_deg, phi_deg, site.push)
-        needs = toe_needs_in_time(site.block, beta_deg, answer.history, site.push)
+        needs = _toe_needs(site, answer.history)
         need, at_s = needs or (None, None)
         history = answer.history if shaking.history else None
-        # a block of another mode, asked about as a topple, is not followed: it would slide or slump
-        if need is not None and need > phi_deg and site.yield_g is not None:
-            answer = self._with_toe_slip(site, shaking)
+        if need is not None and _is_followed_with_toe(site, needs):
+            whole = _with_toe(site, shaking.excitation, history=shaking.history)
+            answer = replace(response_of(self.kind, whole, shaking), state=None)
             gives_way = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
             answer = replace(answer, warnings=(*answer.warnings, gives_way))
             history = answer.history
@@ -60,13 +65,6 @@ class Toppling(Kind):
             answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips, history=history
         )
 
-    def _with_toe_slip(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
-        """Return what the block does with the slip of its toe, step by step."""
-        # friction on the back face is neglected, as it is in k_r
-        smooth = replace(site, phi_back_rad=0.0)
-        whole = whole_run(_mechanism(site), smooth, shaking.excitation, history=shaking.history)
-        return replace(response_of(self.kind, whole, shaking), state=None)
-
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
         p2, kr = _size(site), _strength(site)
@@ -74,13 +72,18 @@ class Toppling(Kind):
         def run(excited: Excitation) -> RunEnd:
             refuse_endless(excited, p2)
             end = simulate(excited, p2=p2, kr=kr)
+            moved = math.isfinite(end.started_s)
+            if moved and site.block is not None:
+                needs = _toe_needs(site, history_of(excited, p2=p2, kr=kr))
+                if _is_followed_with_toe(site, needs):
+                    return end_of(_with_toe(site, excited), self.mode, (TOE_FOLLOWED,))
             return RunEnd(
-                outcome=OUTCOMES[end.outcome],
-                moved=math.isfinite(end.started_s),
+                outcome=outcome_of(end),
+                moved=moved,
                 peak_rad=finite_or_none(end.peak_rad),
                 peak_displacement_m=None,
                 error=end.error_rad,
-                final_mode=self.mode if math.isfinite(end.started_s) else None,
+                final_mode=self.mode if moved else None,
             )
 
         return run
@@ -98,6 +101,28 @@ class Toppling(Kind):
         if "p2" not in options:
             raise InputError("p2 is missing: the critical block is searched for one p² [1/s²]")
         return critical(motion, kind=self.kind, **options)
+
+
+def _toe_needs(site: BlockOnPlanes, history: ResponseHistory) -> tuple[float, float] | None:
+    """Return the greatest friction angle that a rotation needs at the toe [deg], and when [s]."""
+    assert site.block is not None
+    return toe_needs_in_time(site.block, math.degrees(site.beta_rad), history, site.push)
+
+
+def _is_followed_with_toe(site: BlockOnPlanes, needs: tuple[float, float] | None) -> bool:
+    """Return whether the toe slips of a block whose mode is to topple.
+
+    A block of another mode, asked about as a topple, is not followed: it would slide or slump.
+    """
+    slips = needs is not None and needs[0] > math.degrees(site.phi_rad)
+    return slips and site.yield_g is not None
+
+
+def _with_toe(site: BlockOnPlanes, excited: Excitation, *, history: bool = False) -> WholeRun:
+    """Follow the block with the slip of its toe, step by step."""
+    # friction on the back face is neglected, as it is in k_r
+    smooth = replace(site, phi_back_rad=0.0)
+    return whole_run(_mechanism(site), smooth, excited, history=history)
 
 
 def _mechanism(site: BlockOnPlanes) -> Mechanism:

@@ -39,6 +39,7 @@ HEEL_TIPS = Diagnostic(
     "heel_tips",
     severity="warning",
 )
+TOE_FOLLOWED = "the toe gives way: its slip is followed step by step"
 NEEDS = "rotation without slip needs {need:.1f} deg at the toe at {where}"
 
 
