@@ -34,7 +34,7 @@ from rbfrag.fragility.fit.scores import CLIP, calibration
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.fragility.methods import method_named
-from rbfrag.question.fields import word_of
+from rbfrag.vocabulary.quantities import word_of
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]

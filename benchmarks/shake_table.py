@@ -38,10 +38,11 @@ from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
 from rbfrag.fragility.lookup import stored_rows
-from rbfrag.fragility.measures import SPECTRAL, TERMS
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import LOGIT
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
 from rbfrag.solver.models.rocking import MODEL as ROCKING
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary, table_meaning
 from rbfrag.db.schema import ledger
-from rbfrag.question.fields import (
-    RowFields,
+from rbfrag.vocabulary.quantities import (
+    COLUMNS,
+    INPUTS,
+    QUANTITIES,
+    ROW,
     column_of,
-    columns_declared,
-    declared,
-    names_of,
     option_of,
     parameter_of,
 )
@@ -51,18 +51,18 @@ or `samples_sha256` with `dt_s`.
 def fields() -> str:
     """Return the table of the fields that blocks, their shaking and rows of tables have."""
     rows = []
-    for name in (*columns_declared(), "cohesion_pa"):
-        about = declared()[name]
+    for name in (*COLUMNS, "cohesion_pa"):
+        about = QUANTITIES[name]
         others = [
             f"**{column_of(name)}**",
-            *(each for each in about.others if each != column_of(name)),
+            *(each for each in INPUTS[name].aliases if each != column_of(name)),
         ]
         doors = ["", ""]
-        if name not in names_of(RowFields) or name == "kind":
+        if name not in ROW or name == "kind":
             doors = [f"`{option_of(name)}`", f"`{parameter_of(name)}`"]
-        cells = [f"`{name}`", *doors, ", ".join(others), about.unit, about.wanted]
+        cells = [f"`{name}`", *doors, ", ".join(others), about.unit, about.range.words]
         rows.append(
-            f"| {' | '.join(cells)} | {about.sentence('`{}`'.format).split(' [')[0].rstrip('.')} |"
+            f"| {' | '.join(cells)} | {about.help('`{}`'.format).split(' [')[0].rstrip('.')} |"
         )
     return FIELDS + "\n".join(rows) + "\n\n"
 

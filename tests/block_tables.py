@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import opened_table
-from rbfrag.question.fields import column_of, columns_declared
+from rbfrag.vocabulary.quantities import COLUMNS, column_of
 
-FIELD_OF = {column_of(name): name for name in columns_declared()}
+FIELD_OF = {column_of(name): name for name in COLUMNS}
 
 
 def read_columns(

@@ -56,6 +56,5 @@ def write_suite(folder: Path, count: int = 6) -> Path:
 
 def unknown_spectrum(n: int) -> dict[str, np.ndarray]:
     """Return the columns of what is not known of n motions: spectrum, energy and magnitude."""
-    from rbfrag.db.rows import SPECTRAL_COLUMNS
-
-    return {name: np.full(n, np.nan) for name in (*SPECTRAL_COLUMNS, "arias_m_s", "magnitude")}
+    spectrum = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
+    return {name: np.full(n, np.nan) for name in (*spectrum, "arias_m_s", "magnitude")}

@@ -12,10 +12,13 @@ from types import ModuleType
 
 import pytest
 
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "rbfrag"
 
 LEVELS = (
+    {"vocabulary"},
     {"results"},
     {"motions"},
     {"solver"},
@@ -319,3 +322,45 @@ def test_figure_and_walk_of_the_documentation_are_those_of_today(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert drawing().main(["--check"]) == 0, capsys.readouterr().err
+
+
+OTHER_FACTS = {
+    "fragility/methods/overturning.py": "features of a formula",
+    "question/scenario.py": "limits of a published ground-motion model",
+}
+"""Where a dict maps measures to what is not theirs."""
+
+
+def facts_of_measures(source: str) -> list[int]:
+    """Return the lines of dicts that map a measure to a label, a unit or a limit.
+
+    A value that is a call (of coefficients), a period by its own word, or another name is none.
+    """
+    lines = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Dict):
+            continue
+        for key, value in zip(node.keys, node.values, strict=True):
+            if not (isinstance(key, ast.Constant) and key.value in MEASURES):
+                continue
+            parts = value.elts if isinstance(value, ast.Tuple) else [value]
+            constants = [part.value for part in parts if isinstance(part, ast.Constant)]
+            texts = [each for each in constants if isinstance(each, str)]
+            if any(text not in QUANTITIES and "_over_" not in text for text in texts) or (
+                isinstance(value, ast.Tuple) and constants and not texts
+            ):
+                lines.append(node.lineno)
+                break
+    return lines
+
+
+def test_facts_of_measures_stand_in_the_vocabulary_only() -> None:
+    assert facts_of_measures('a = {"pgv_m_s": "PGV"}\nb = {"pga_g": (0.0, 5.0)}') == [1, 2]
+    assert facts_of_measures('a = {"pga_g": pga, "pgv_m_s": x[0]}') == []
+    users = {
+        name
+        for path in SOURCES
+        if not (name := path.relative_to(PACKAGE).as_posix()).startswith("vocabulary/")
+        and facts_of_measures(path.read_text(encoding="utf-8"))
+    }
+    assert users == {*OTHER_FACTS}

@@ -24,18 +24,18 @@ from rbfrag.fragility.lookup import SHIPPED
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.question.fields import (
-    BlockFields,
-    ShakingFields,
-    column_of,
-    declared,
-    option_of,
-    parameter_of,
-)
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    INPUTS,
+    SHAKING,
+    column_of,
+    option_of,
+    parameter_of,
+)
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
 from tests.exchange.openquake_job import write_job
@@ -201,7 +201,7 @@ def agree(told: Told, expected: Told, question: dict[str, Any]) -> None:
     assert (told.kind, told.mode) == (expected.kind, expected.mode), words(question)
 
 
-PHYSICAL = BlockFields.__optional_keys__ | ShakingFields.__optional_keys__
+PHYSICAL = {*BLOCK, *SHAKING}
 REFERENCE_ANSWERS: dict[int, Told] = {}
 
 
@@ -302,7 +302,7 @@ def table(folder: Path, form: str) -> tuple[Path, list[int]]:
 
 
 def column_of_or_itself(name: str) -> str:
-    return column_of(name) if name in declared() else name
+    return column_of(name) if name in INPUTS else name
 
 
 def read(path: Path) -> list[dict[str, Any]]:

@@ -20,25 +20,24 @@ from rbfrag.errors import InputError, RbfragError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.fragility.words import drained_in_words
-from rbfrag.question.fields import (
-    BlockFields,
-    ComponentFields,
-    MeasureFields,
-    SceneFields,
-    SourceFields,
-    SpaceFields,
-    WholeFields,
+from rbfrag.question.table import field_of
+from rbfrag.service.app import make_app
+from rbfrag.service.settings import ServiceSettings
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    COLUMNS,
+    COMPONENT,
+    INPUTS,
+    INTENSITY,
+    QUANTITIES,
+    SCENE,
+    SOURCE,
+    WHOLE,
     column_of,
-    columns_declared,
-    declared,
-    names_of,
     option_of,
     parameter_of,
     word_of,
 )
-from rbfrag.question.table import field_of
-from rbfrag.service.app import make_app
-from rbfrag.service.settings import ServiceSettings
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
 from tests.plots.test_report import words_of
@@ -172,10 +171,7 @@ def changed(name: str) -> dict[str, Any]:
 
 
 def test_every_field_of_a_question_has_a_case() -> None:
-    every = names_of(
-        BlockFields, WholeFields, MeasureFields, SceneFields, SourceFields, SpaceFields,
-        ComponentFields,
-    )  # fmt: skip
+    every = dict.fromkeys((*BLOCK, *WHOLE, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
     assert {*every} - {*CASES} == {"block", "gmm"}  # a shape as an object, and a file
 
 
@@ -193,7 +189,7 @@ def test_a_keyword_changes_the_answer_or_is_rejected(name: str) -> None:
         assert any(name in text and "not used" in text for text in told), (name, told)
         return
     assert before != after, name
-    for alias in {column_of(name), word_of(name), *declared()[name].others}:
+    for alias in {column_of(name), word_of(name), *INPUTS[name].aliases}:
         if name == "back_fracture":
             assert from_python({**question, "no_back": True}) == after
         else:
@@ -232,7 +228,7 @@ def test_requests_answer_as_the_keyword(client: TestClient, name: str) -> None:
         answer = ask()
         found = answer.json().get("probability", answer.json().get("detail"))
         agree(found, expected, f"{name}: {answer.json()}")
-    lists = {field: [value] if declared()[field].unit or field in BlockFields.__optional_keys__
+    lists = {field: [value] if QUANTITIES[field].unit or field in BLOCK
              else value for field, value in keywords.items()}  # fmt: skip
     if any(isinstance(value, list) for value in lists.values()):
         answer = client.post("/v1/predict", json=lists)
@@ -247,7 +243,7 @@ def one_row(question: dict[str, Any], header: str, value: Any, name: str) -> dic
 
 
 def aliases_of(name: str) -> list[str]:
-    return sorted({name, column_of(name), word_of(name), *declared()[name].others})
+    return sorted({name, column_of(name), word_of(name), *INPUTS[name].aliases})
 
 
 def table_answer(columns: dict[str, list[Any]]) -> float | str:
@@ -259,7 +255,7 @@ def table_answer(columns: dict[str, list[Any]]) -> float | str:
     return row["reason"] if row["probability"] is None else float(row["probability"])
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name in columns_declared()])
+@pytest.mark.parametrize("name", [name for name in CASES if name in COLUMNS])
 def test_a_column_answers_as_the_keyword_by_each_of_its_names(name: str) -> None:
     question, value = CASES[name]
     expected = from_python(changed(name))
@@ -280,7 +276,7 @@ def rows_of(table: str) -> list[dict[str, str]]:
 def test_pasted_text_answers_as_the_keyword(open_page: Any) -> None:
     opened = open_page("?height=1&width=1&pgv=0.6")
     page = opened.page
-    for name in [name for name in CASES if name in columns_declared()]:
+    for name in [name for name in CASES if name in COLUMNS]:
         question, value = CASES[name]
         cell = "no" if name == "back_fracture" else value
         columns = one_row(question, column_of(name), cell, name)

@@ -24,7 +24,10 @@ from tests.synthetic import shaking
 
 PACKAGE = Path(rbfrag.__file__).parent
 
-FIELD = '    pad_m: Annotated[V, Field("Thickness of the pads", "m", ("pads",), above=0.0)]\n'
+FIELD = (
+    '        Quantity("pad_m", "Thickness of the pads", "m", "", POSITIVE, '
+    'Input(aliases=("pads",))),\n'
+)
 FACTS = '        KindFacts("padded", None, ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
 
 MODEL = '''
@@ -170,17 +173,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in additions.items():
         (folder / "rbfrag" / name).write_text(text)
     for name, mark, line in (
-        ("question/fields.py", '"""What a model reads of a block beside its numbers', FIELD),
+        ("vocabulary/quantities.py", '    "failure": (\n', FIELD),
         ("solver/kinds.py", '        KindFacts(\n            "rocking"', FACTS),
     ):
         text = (PACKAGE / name).read_text(encoding="utf-8")
         head, found, rest = text.partition(mark)
         assert found
-        if line == FIELD:
-            docstring, _, rest = rest.partition("\n")
-            text = f"{head}{found}{docstring}\n\n{line}{rest}"
-        else:
-            text = f"{head}{line}{found}{rest}"
+        text = f"{head}{found}{line}{rest}" if line == FIELD else f"{head}{line}{found}{rest}"
         (folder / "rbfrag" / name).unlink()
         (folder / "rbfrag" / name).write_text(text, encoding="utf-8")
     samples = shaking(3)

@@ -20,8 +20,8 @@ try:
     from rbfrag.cli.parameters.stack import read_plainly
     from rbfrag.cli.streams import end_unwritten, write_plainly
     from rbfrag.errors import InputError, RbfragError, one_paragraph
-    from rbfrag.question.fields import option_of
     from rbfrag.version import __version__
+    from rbfrag.vocabulary.quantities import option_of
 except KeyboardInterrupt:  # Ctrl-C while libraries load
     raise SystemExit(130) from None
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
 from rbfrag.fragility import words
-from rbfrag.question.fields import declared, option_of
 from rbfrag.results.diagnostic import with_diagnostics
+from rbfrag.vocabulary.quantities import INPUTS, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -273,7 +273,7 @@ def show_prediction(
     print_sentences((*questions, words.headline(document)))
     for label, text in words.lines(document, given):
         print_labelled(label, text)
-    fields = [name for name in declared() if "_" in name]
+    fields = [name for name in INPUTS if "_" in name]
     for text in warnings:
         if text not in questions:
             print_note(text, fields)

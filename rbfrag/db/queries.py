@@ -14,7 +14,7 @@ from rbfrag.db.engine import stated_revision
 from rbfrag.db.ledger import last_sound
 from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import IMPORTED, SPECTRAL_COLUMNS, CombinationTable, Vertical
+from rbfrag.db.rows import IMPORTED, CombinationTable, Vertical
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -29,7 +29,9 @@ from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 from rbfrag.motions.quality import PGD_IN_DOUBT, STRUCTURE
 from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.vocabulary.quantities import MEASURES
 
+_MEASURES = tuple(name for name in CombinationTable.__dataclass_fields__ if name in MEASURES)
 _ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 
@@ -158,8 +160,8 @@ def combination_table(
     if not doubtful_pgd:
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = (
-        "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s", "pga_g", "pgv_m_s",
-        "tm_s", "arias_m_s", "magnitude",
+        "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s",
+        *(name for name in _MEASURES if name != "pgd_m"),
     )  # fmt: skip
     others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
@@ -167,7 +169,7 @@ def combination_table(
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
         event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
         pgd_m=pgd_m,
-        **{name: floats(name) for name in (*numbers, *SPECTRAL_COLUMNS)},
+        **{name: floats(name) for name in numbers},
         **{name: objects(name) for name in others},
     )
 
@@ -336,7 +338,7 @@ def _combination_query() -> Select[Any]:
         "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
         "upper", "kr", "y_m_s",
     )  # fmt: skip
-    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", "arias_m_s", *SPECTRAL_COLUMNS, "flags")
+    of_motion = (*(name for name in _MEASURES if name in motion.c), "flags")
     return select(
         *(combination.c[name] for name in own),
         *(motion.c[name] for name in of_motion),

@@ -120,8 +120,6 @@ class Point(NamedTuple):
 
 
 IMPORTED = "imported"  # numerics version of critical values that rbfrag has not computed
-SPECTRAL_COLUMNS = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
-"""The spectral accelerations that fits read."""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from sqlalchemy import (
 from sqlalchemy.schema import SchemaItem
 
 from rbfrag.motions.response_spectrum import PERIODS_S
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 metadata = MetaData(
     naming_convention={
@@ -66,8 +67,6 @@ _OUTCOME = (
     " (1 + k_v <= 0), contact_lost, indeterminate"
 )
 
-_NOT_COMPUTED = "missing where the database was upgraded without the samples"
-
 
 def _table(name: str, meaning: str, *parts: SchemaItem, **options: Any) -> Table:
     digest = "hash of the row's other values, by which rbfrag db check finds altered ones"
@@ -82,6 +81,12 @@ def _column(name: str, type_: Any, meaning: str, unit: str = "", **options: Any)
 
 def _optional(name: str, type_: Any, meaning: str, unit: str = "") -> Column[Any]:
     return _column(name, type_, meaning, unit, nullable=True)
+
+
+def _measure(name: str) -> Column[Any]:
+    """Return the column of an intensity measure, as the vocabulary declares it."""
+    about = QUANTITIES[name]
+    return _column(name, Double, about.stored, about.unit, nullable="missing" in about.stored)
 
 
 def _reference(
@@ -120,7 +125,7 @@ earthquake = _table(
     _column("event_id", Text, "the id that earthquakes are told apart by"),
     _column("guessed", Boolean, "true: read off a file header; false: stated by metadata"),
     _column("name", Text, "name for people; may be empty"),
-    _optional("magnitude", Double, "magnitude as the source gives it, scales not harmonised"),
+    _optional("magnitude", Double, QUANTITIES["magnitude"].stored),
     _optional("time", Text, "origin time, or the year, as text"),
     UniqueConstraint("event_id", "guessed"),
     CheckConstraint("event_id <> ''", name="event_id"),
@@ -151,38 +156,8 @@ motion = _table(
     _column("is_vertical", Boolean, "true for a vertical component, upward positive"),
     _column("dt_s", Double, "sampling interval", "s"),
     _column("npts", Integer, "number of samples"),
-    _column("pga_g", Double, "peak ground acceleration, max |a| over both signs", "g"),
-    _column("pgv_m_s", Double, "peak ground velocity, extreme of the exact integral", "m/s"),
-    _column("pgd_m", Double, "peak ground displacement, extreme of the exact double integral", "m"),
-    _optional(
-        "tm_s",
-        Double,
-        "mean period of Rathje, Abrahamson and Bray (1998), 0.25 to 20 Hz; missing where it is "
-        "not defined",
-        "s",
-    ),
-    *(
-        _optional(
-            name,
-            Double,
-            f"pseudo-spectral acceleration at {period_s:g} s, 5 % damping; {_NOT_COMPUTED}",
-            "g",
-        )
-        for name, period_s in PERIODS_S.items()
-    ),
-    _optional(
-        "cav_m_s", Double, f"cumulative absolute velocity, integral of |a|; {_NOT_COMPUTED}", "m/s"
-    ),
-    _optional(
-        "arias_m_s", Double, f"Arias intensity, pi/(2 g) integral of a²; {_NOT_COMPUTED}", "m/s"
-    ),
-    _optional(
-        "d5_95_s",
-        Double,
-        "significant duration, from 5 to 95 % of the Arias intensity; missing where the ground is "
-        "at rest, and as the measures before it",
-        "s",
-    ),
+    *map(_measure, ("pga_g", "pgv_m_s", "pgd_m", "tm_s")),
+    *map(_measure, (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")),
     _column("final_velocity_m_s", Double, "velocity at the last sample; a sign of quality", "m/s"),
     _column(
         "final_displacement_m", Double, "displacement at the last sample; a sign of quality", "m"

@@ -11,8 +11,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import opened_table
 from rbfrag.fragility.unusable import in_list
 from rbfrag.question.blocks import has_shape
-from rbfrag.question.fields import BlockFields, names_of
 from rbfrag.question.many import many_blocks
+from rbfrag.vocabulary.quantities import BLOCK
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         InputError: the file cannot be read, describes no block, or weights that are none.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    fields = [name for name in names_of(BlockFields) if not name.endswith("_sigma")]
+    fields = [name for name in BLOCK if not name.endswith("_sigma")]
     with opened_table(path, (*fields, "weight"), ()) as table:
         columns, faults, lines = table.whole()
     if faults:

@@ -13,7 +13,6 @@ from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import JUMP, FragilityFunction, chords
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.hazards.measure_type import IntensityType
@@ -22,6 +21,7 @@ from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import MEASURES
 
 FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_topple": "toppled"}
 """The limit state of a block by its mode."""
@@ -29,15 +29,8 @@ FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped", "confined_to
 LEAST, FLOOR = 5e-6, 1e-5
 """P where a function begins, and the least P to which errors are relative."""
 
-CREDIBLE = {"pgv_m_s": 5.0, "pga_g": 5.0, **dict.fromkeys(SPECTRAL.values(), 10.0)}
+TOP = {name: measure.top for name, measure in MEASURES.items() if measure.top is not None}
 """The strongest shaking [m/s or g] that a function covers, by the measure's name in `predict`."""
-
-_TYPES = {
-    "pgv_m_s": IntensityType("pgv_m_s", 0.01),
-    "pga_g": IntensityType("pga_g", 1.0),
-    **{name: IntensityType("sa_g", 1.0, period) for period, name in SPECTRAL.items()},
-}
-"""What the levels of a function measure, by the measure's name in `predict`."""
 
 _WEAKEST, _SCANNED, _FINE, _HALVINGS = 1e-5, 1001, 1201, 40
 _TOWARDS_THE_FIRST = np.linspace(0.0, 1.0, _FINE) ** 2
@@ -156,7 +149,7 @@ def block_functions(
             begun.extend([] if curve.lowest is None else [curve.lowest])
             yield curve.smoothed(meaning, measure)
 
-    top, state = CREDIBLE[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
+    top, state = TOP[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
     each = iter([_mean(shown(), top)]) if one_class else shown()
     functions: list[FragilityFunction] = []
     weak: list[str] = []
@@ -200,8 +193,8 @@ def curves_of(
         scatter: standard deviation of ln of the shaking that is to be integrated: curves reach as
             much farther to both sides.
     """
-    if measure not in CREDIBLE:
-        raise InputError(f"measure = {measure!r}: use one of {', '.join(CREDIBLE)}")
+    if measure not in TOP:
+        raise InputError(f"measure = {measure!r}: use one of {', '.join(TOP)}")
     columns = model.method.block.filled(numbers)
 
     def curves() -> Iterator[BlockCurve]:
@@ -210,7 +203,7 @@ def curves_of(
             of_blocks = {name: column[some, None] for name, column in columns.items()}
             yield from _some_curves(of_blocks, measure, model, names[start:] or names, scatter)
 
-    return _TYPES[measure], curves()
+    return IntensityType.of(measure), curves()
 
 
 def _some_curves(
@@ -224,7 +217,7 @@ def _some_curves(
         return array_answer(model, {**blocks, measure: np.exp(u)}, interval=False).probability
 
     least = LEAST if scatter == 0.0 else _UNSEEN
-    highest = math.log(CREDIBLE[measure]) + _REACH * scatter
+    highest = math.log(TOP[measure]) + _REACH * scatter
     u = np.linspace(math.log(_WEAKEST), highest, _SCANNED)
     p = probability(u)
     for row in np.flatnonzero(np.isnan(p).any(axis=1))[:1]:

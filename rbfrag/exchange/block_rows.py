@@ -17,13 +17,12 @@ from rbfrag.exchange.block_table import TEXTS, opened_table
 from rbfrag.files import as_path
 from rbfrag.fragility.unusable import refuse, unusable_in_words
 from rbfrag.question.answers import block_reasons_of
-from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import BY_ROW, BlockFields, column_of, names_of
 from rbfrag.question.many import many_blocks
 from rbfrag.question.question import is_wet, without_water
 from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.solver.kinds import KINDS, facts_of
+from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, NUMBERS, column_of
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -217,7 +216,7 @@ def read_blocks(
     if not hasattr(source, "items"):
         source = as_path(source, "blocks", "a table of blocks")
     for_all = for_all or {}
-    fields = (*names_of(BlockFields), *BY_ROW)
+    fields = (*BLOCK, *BY_ROW)
     of_place = ("x", "y") if {*PLACE} <= {*reads} else ()
     with opened_table(
         source, (*fields, *reads, *of_place), TEXTS, sheet=sheet, ignore_columns=ignore_columns

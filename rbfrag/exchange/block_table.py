@@ -17,14 +17,6 @@ from rbfrag.exchange.tables.files import open_table
 from rbfrag.exchange.tables.parts import Parts, TableFile, TablePart, cells_of
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import kinds_by_numbers
-from rbfrag.question.fields import (
-    BY_ROW,
-    BlockFields,
-    ShakingFields,
-    column_of,
-    declared,
-    names_of,
-)
 from rbfrag.question.sections import ANGLES
 from rbfrag.question.shapes import OF_A_SHAPE, PLANE_TEXTS, RECTANGLE, SHAPES
 from rbfrag.question.table import (
@@ -38,6 +30,14 @@ from rbfrag.question.table import (
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import FREE_STANDING
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    BY_ROW,
+    INPUTS,
+    QUANTITIES,
+    SHAKING,
+    column_of,
+)
 
 TEXTS = ("block_id", "site_id", "kind", "mode", "crs", *PLANE_TEXTS)
 """Columns of texts."""
@@ -114,7 +114,7 @@ class BlockTable:
             if name == "back_fracture":
                 values, others = self._yes_or_no(part, column)
             else:
-                unit = declared()[name].unit if name in declared() else ""
+                unit = QUANTITIES[name].unit if name in INPUTS else ""
                 values, others = part.numbers(column.header, unit, column.factor)
             faults = others | faults
             empty = np.isnan(values)
@@ -254,7 +254,7 @@ class BlockTable:
     def check_read(self, given: Collection[str], read: Collection[str]) -> None:
         """Reject what is given for all blocks, and no answer depends on."""
         for name in given:
-            if name in names_of(BlockFields) and name not in read:
+            if name in BLOCK and name not in read:
                 text = f"{name} does not go with the blocks of {self.name}: leave it out"
                 raise InputError(text, fields=(name,))
 
@@ -359,7 +359,7 @@ def read_rows(
     Returns:
         Fields by name, with ``block_id``, ``count`` and, of a row that cannot be used, ``reason``.
     """
-    read = (*names_of(BlockFields, ShakingFields, *BY_ROW), "count")
+    read = (*BLOCK, *SHAKING, *BY_ROW, "count")
     texts = (*TEXTS, *SHAKING_TEXTS)
     with opened_table(source, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table:
         table.check(given, given.get("kind"))

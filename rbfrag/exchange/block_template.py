@@ -10,18 +10,12 @@ import numpy as np
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.exchange.tables.workbook import openpyxl
 from rbfrag.files import output_path, written_whole
-from rbfrag.question.fields import (
-    FailureFields,
-    PlaneFields,
-    columns_declared,
-    declared,
-    names_of,
-    word_of,
-)
 from rbfrag.question.shapes import RECTANGLE
 from rbfrag.question.table import header_of
+from rbfrag.vocabulary import quantities
+from rbfrag.vocabulary.quantities import FAILURE, PLANES
 
-COLUMNS = ("block_id", *RECTANGLE, *names_of(PlaneFields, FailureFields), "pgv_m_s", "pga_g")
+COLUMNS = ("block_id", *RECTANGLE, *PLANES, *FAILURE, "pgv_m_s", "pga_g")
 """Fields that have a column; the others are listed on a sheet of their own."""
 
 EXAMPLE = {"block_id": "example", "height_m": 2.4, "width_m": 0.5, "beta_deg": 3.0, "phi_deg": 35.0}
@@ -46,9 +40,9 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     sheet.append([*names])
     sheet.append(row)
     others.append(["column", "what it states", "also called"])
-    for name in columns_declared():
-        about = declared()[name]
-        others.append([header_of(name), about.sentence(word_of), ", ".join(about.others)])
+    for name in quantities.COLUMNS:
+        help = quantities.QUANTITIES[name].help(quantities.word_of)
+        others.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
     with written_whole(target, "table") as partial:
         book.save(partial)
     return target

@@ -35,11 +35,12 @@ from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.question.components import Component, component_named
-from rbfrag.question.fields import AnsweringFields, V
-from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import LEVEL, model_for, parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import facts_of
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 
 class _Lasted(TypedDict, total=False):
@@ -114,7 +115,7 @@ def losses(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
+    given, answering, lasted = parts_of((), question, BLOCKS, ANSWERING, _Lasted.__optional_keys__)
     rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("rotd50" if component is None else component)

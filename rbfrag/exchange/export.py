@@ -23,10 +23,11 @@ from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.frames import Tabular
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
-from rbfrag.question.fields import AnsweringFields, V
-from rbfrag.question.keywords import BlockKeywords, parts_of
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import parts_of
 from rbfrag.question.words import numbers_in_words
 from rbfrag.solver.kinds import KindFacts, facts_of
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 EACH_NEEDED = "an exposure model needs a function of each"
 """Why a table with a row that cannot be used is refused."""
@@ -200,7 +201,7 @@ class _Request(NamedTuple):
     @classmethod
     def of(cls, numbers: Sequence[Any], question: Mapping[str, Any]) -> _Request:
         given, answering, request = parts_of(
-            numbers, question, BlockKeywords, AnsweringFields, _Functions
+            numbers, question, BLOCKS, ANSWERING, _Functions.__optional_keys__
         )
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
         rows = given_blocks(given, blocks)

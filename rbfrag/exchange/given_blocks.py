@@ -21,7 +21,7 @@ from rbfrag.question.blocks import (
     one_block,
     taken_as_medians,
 )
-from rbfrag.question.fields import BlockFields, column_of
+from rbfrag.vocabulary.quantities import BLOCK, column_of
 
 
 def given_blocks(
@@ -51,7 +51,7 @@ def given_blocks(
         rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
         return replace(rows, remarks=described.remarks)
     reasons = block_reasons_of(*blocks_of_arrays(given))
-    refuse_elements(reasons, fields=BlockFields.__optional_keys__)
+    refuse_elements(reasons, fields=BLOCK)
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, known.values()))
     except ValueError:

@@ -21,12 +21,13 @@ from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
 from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.components import component_named
-from rbfrag.question.fields import AnsweringFields, V
-from rbfrag.question.keywords import BlockKeywords, parts_of
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.question.words import numbers_in_words
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.solver.kinds import by_model
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -120,7 +121,7 @@ def shakemap(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, answering = parts_of(numbers, question, BlockKeywords, AnsweringFields)
+    given, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
     rows = given_blocks(given, blocks, reads=(*PLACE, "weight", "count"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)

@@ -19,9 +19,10 @@ from rbfrag.exchange.block_rows import PLACE, Blocks, read_blocks
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.question.sections import in_sections
-from rbfrag.question.shapes import SHAPES, SPACE
+from rbfrag.question.shapes import SHAPES
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import SPACE
 
 SIDES = (*dict.fromkeys(name for names in SHAPES for name in names), *SPACE, "density_kg_m3")
 """Fields that the size and the mass of a block follow from."""

@@ -12,6 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.xml_source import parse_xml
+from rbfrag.vocabulary.quantities import MEASURES
 
 FloatArray = NDArray[np.float64]
 
@@ -41,7 +42,6 @@ _FIELDS: Mapping[str, tuple[str, Mapping[str, float]]] = {
     },
 }
 
-_MOST = {"pgv_m_s": 20.0, **dict.fromkeys(("pga_g", "sa03_g", "sa10_g", "sa30_g"), 10.0)}
 _MOST_STD = 5.0
 
 
@@ -230,7 +230,8 @@ class GridReading:
                 f"{self.source}, node {node + 1} of grid_data: {title} = {table[node, place]:g}: "
                 "a finite number, not below zero, is wanted"
             )
-        if (values > _MOST.get(name, _MOST_STD)).any():
+        largest = MEASURES[name].largest if name in MEASURES else None
+        if (values > (largest or _MOST_STD)).any():
             warnings.append(
                 f"{self.source}: {title} reaches {np.nanmax(table[:, place]):g} {unit}: is that "
                 "its unit?"

@@ -12,7 +12,7 @@ from scipy.special import ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import (
-    CREDIBLE,
+    TOP,
     BlockCurve,
     BlockFunctions,
     about_model,
@@ -96,7 +96,7 @@ def share_functions(
         own.partition([count - 1 for count in counts], axis=1)
         reached[:, start : start + at_once] = own[:, [count - 1 for count in counts]].T
     ends = reached[np.isfinite(reached)]
-    top = math.log(CREDIBLE[measure])
+    top = math.log(TOP[measure])
     if ends.size == 0 or ends.min() >= top:
         raise InputError(
             f"{name}: no share of its blocks fails up to {measure} = {math.exp(top):g}"

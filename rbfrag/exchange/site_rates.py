@@ -18,9 +18,9 @@ from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.report import rate_columns as rates_in_columns
 from rbfrag.question.blocks import numbers_in
-from rbfrag.question.fields import column_of
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.solver.kinds import KINDS
+from rbfrag.vocabulary.quantities import column_of
 
 
 @dataclass(frozen=True, eq=False)

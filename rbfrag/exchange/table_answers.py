@@ -26,27 +26,19 @@ from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
-from rbfrag.question.fields import (
-    BY_ROW,
-    BlockFields,
-    RowFields,
-    ScatterFields,
-    ShakingFields,
-    column_of,
-    names_of,
-)
 from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
 from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, column_of
 
 _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
 ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "how", "warnings", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-_SHAKING, _SCATTER = names_of(ShakingFields), frozenset(names_of(ScatterFields))
+_SHAKING, _SCATTER = SHAKING, frozenset(SCATTER)
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
@@ -110,7 +102,7 @@ def predict_table(
     goal = None if target is None else table_path(target)
     if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"out {goal} is the table itself: name another file", fields=("out",))
-    read = (*names_of(BlockFields, ShakingFields, *BY_ROW), "count")
+    read = (*BLOCK, *SHAKING, *BY_ROW, "count")
     counts = np.zeros(3, dtype=np.int64)
     together: list[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]] = []
     refused: dict[str, str] = {}
@@ -158,7 +150,7 @@ def predict_table(
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
         table.check_read(given, chosen["read"])
-        used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *RowFields.__optional_keys__}
+        used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *ROW}
         missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
         notes += diagnostics(
             remarks,

@@ -13,71 +13,26 @@ from typing import Any, NamedTuple
 
 from rbfrag.fragility.domain import RATIOS, Ratio
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, SPECTRAL
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.solver.kinds import BY_MECHANICS
-
-_SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
-_STRENGTH = (
-    "the block's yield acceleration coefficient at rest, tan(critical angle) (a block with k_r "
-    "<= 0 falls without an earthquake)"
-)
-_DESCRIPTIONS = {
-    "p2": ("1/s²", _SIZE),
-    "ps2": ("1/s²", "p_s², the squared frequency parameter of slumping at rest"),
-    "pct2": ("1/s²", "p_ct², the squared frequency parameter of confined toppling at rest"),
-    "kr": ("", _STRENGTH),
-    "ky": (
-        "",
-        "the block's yield acceleration coefficient of sliding, tan(phi - beta) (a block with k_y "
-        "<= 0 slides without an earthquake)",
-    ),
-    "ks": (
-        "",
-        "the block's yield acceleration coefficient of slumping (a block with k_s <= 0 slumps "
-        "without an earthquake)",
-    ),
-    "kct": (
-        "",
-        "the block's yield acceleration coefficient of confined toppling (a block with k_ct <= 0 "
-        "topples without an earthquake)",
-    ),
-    "displacement_m": ("m", "the displacement that is too far in m, above 0"),
-    "restitution": ("", "the speed after an impact over that before it, above 0 and up to 1"),
-    **{
-        f"{name}_sigma": ("", f"the standard deviation of ln {name}, 0 or more")
-        for name in ("p2", "ps2", "pct2", "kr", "ky", "ks", "kct")
-    },
-    "restitution_sigma": ("", "the standard deviation of the restitution, 0 or more"),
-    **dict.fromkeys(ABOUT_SCATTER, ("", "a standard deviation of a logarithm, 0 or more")),
-    "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
-    "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
-    "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
-    "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
-    "tm_s": ("s", "the mean period in s, above 0"),
-    **{
-        name: ("g", f"the spectral acceleration at {period:g} s and 5 % damping in g, 0 or more")
-        for period, name in SPECTRAL.items()
-    },
-    "arias_m_s": ("m/s", "the Arias intensity in m/s, 0 or more"),
-    "magnitude": ("", "the magnitude of the earthquake, above 0"),
-    "xp_m_s": ("m/s", "the toppling spectrum X(p) in m/s, 0 or more"),
-    "intensity_m_s": ("m/s", ""),
-    "y_m_s": ("m/s", ""),
-    "pgv_over_pga_s": ("s", ""),
-    "k_over_pga": ("", ""),
-}
-"""Unit of each value, and what is to be given."""
+from rbfrag.vocabulary.quantities import INTENSITY, NUMBERS, QUANTITIES, SPECTRAL
 
 
-def _described(name: str) -> tuple[str, str]:
-    return _DESCRIPTIONS.get(name, ("", f"{name}, a number"))
+def _unit(name: str) -> str:
+    unit = QUANTITIES[name].unit if name in QUANTITIES else ""
+    return "°" if unit == "deg" else unit
+
+
+def _prompt(name: str) -> str:
+    return QUANTITIES[name].prompt if name in QUANTITIES else f"{name}, a number"
 
 
 _ABOVE_ZERO = {
-    **dict.fromkeys(("p2", "ps2", "pct2", "displacement_m"), "block"),
-    **dict.fromkeys(("tm_s", "magnitude"), "earthquake"),
+    name: "earthquake" if name in INTENSITY else "block"
+    for name in (*NUMBERS, "displacement_m", *INTENSITY)
+    if QUANTITIES[name].range.above == 0.0
 }
 
 
@@ -104,7 +59,7 @@ class Remark:
         """Return the sentence for one value."""
         if not self.name:
             return self.text
-        unit = _described(self.name)[0]
+        unit = _unit(self.name)
         return f"{self.name} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
 
     def in_general(self) -> str:
@@ -154,7 +109,7 @@ def refusals(
     """Yield what makes an answer impossible; `signed` names the values that may be negative."""
     for name in needed:
         value = values[name]
-        wanted = _described(name)[1]
+        wanted = _prompt(name)
         yield Remark(value != value, name, value, f"is not a number: give {wanted}")
         if name in _ABOVE_ZERO:
             yield Remark(value <= 0.0, name, value, f"is not above zero: give {wanted}")
@@ -216,7 +171,7 @@ def answer_with_findings(
         refuse(finding.holds, finding)
         missing = missing | finding.holds
     strength = given[block.strength]
-    wanted = _described(block.strength)[1]
+    wanted = _prompt(block.strength)
     at_rest = (strength <= 0.0) & _not(missing)
     unstable(
         at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
@@ -289,7 +244,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         if name not in values or name in _RATIO_NAMES:
             continue
         value = values[name]
-        unit = _described(name)[0]
+        unit = _unit(name)
         # A p² computed from a shape may miss the edge by rounding.
         below, above = value < low * (1.0 - 1e-9), value > high * (1.0 + 1e-9)
         for holds, edge in ((below, low), (above, high)):

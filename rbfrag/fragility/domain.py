@@ -14,9 +14,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.method import Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
 
 INSIDE = 0.995
 """Share of the fitted points that lie within the fitted distance."""
@@ -24,15 +24,18 @@ INSIDE = 0.995
 MARGIN = 2.0
 """Factor by which a ratio may lie beyond those of the shipped motions before it is doubted."""
 
-MEASURE_WORDS: Mapping[str, tuple[str, str]] = {
-    "pgv_m_s": ("a PGV", " m/s"),
-    "pga_g": ("a PGA", " g"),
-    "tm_s": ("a Tm", " s"),
-    "pgd_m": ("a PGD", " m"),
-    **{name: (f"an SA({period:.1f})", " g") for period, name in SPECTRAL.items()},
-    "p": ("a block's p", " 1/s"),
-}
-"""What each value of a ratio is called, and its unit."""
+
+def _name_of(value: str) -> str:
+    """Return what a value of a ratio is called: a measure, or p of the block."""
+    if value not in MEASURES:
+        return "block's p"
+    return MEASURES[value].imt or MEASURES[value].title or QUANTITIES[value].symbol
+
+
+def _with_unit(value: str, number: float) -> str:
+    name = _name_of(value)
+    unit = QUANTITIES[value].unit if value in MEASURES else "1/s"
+    return f"a{'n' if name.startswith('SA') else ''} {name} of {number:.3g} {unit}"
 
 
 @dataclass(frozen=True)
@@ -87,10 +90,7 @@ class Ratio:
         Args:
             fitted: range of the fitted motions; None where the shipped ones judge.
         """
-        first, *others = (
-            f"{MEASURE_WORDS[name][0]} of {values[name]:.3g}{MEASURE_WORDS[name][1]}"
-            for name in self.of
-        )
+        first, *others = (_with_unit(name, values[name]) for name in self.of)
         where, what = self._ranges(fitted)
         return (
             f"{first} does not go with {' and '.join(others)}: {self.symbol} is "
@@ -99,7 +99,7 @@ class Ratio:
 
     def in_general(self, fitted: tuple[float, float] | None) -> str:
         """Return the sentence for many values; `fitted` as for :meth:`contradiction`."""
-        first, *others = (MEASURE_WORDS[name][0].partition(" ")[2] for name in self.of)
+        first, *others = map(_name_of, self.of)
         where, what = self._ranges(fitted)
         return f"{first} does not go with {' and '.join(others)}: {self.symbol} is {where}: {what}"
 

@@ -20,7 +20,6 @@ from rbfrag.fragility.measures import (
     ABOUT_SCATTER,
     MEASURES,
     SCATTERED,
-    STATED,
     TERMS,
     least_inputs,
     terms_from,
@@ -29,6 +28,7 @@ from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters
 from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.vocabulary.quantities import INTENSITY
 
 SHIPPED = "the built-in data set"
 """What answers are said to come from where no other database is named, or is there."""
@@ -119,7 +119,7 @@ def find_model(
         model: a model, the name of a stored one, or None.
         given: names of what is known of block and motion (``p2``, ``kr``, ``pgv_m_s``, …).
         db: database; None for ``RBFRAG_DB``, or else ``rbfrag.db`` in the current folder, or
-            else the reference that is shipped.
+            else the built-in data set.
         kind: how the block fails; None for what it is given by, or what the model is of.
         rotation_deg: rotation that counts as failure [deg], where there are models of several.
 
@@ -159,7 +159,7 @@ def find_model(
                 f"model {chosen.name!r} needs {' and '.join(chosen.term.inputs)} "
                 f"({chosen.term.title}); given is {_measures(given)}: give what it needs, or "
                 "choose a model of another term",
-                fields=STATED,
+                fields=INTENSITY,
             )
     return chosen
 
@@ -202,7 +202,7 @@ def _suited_in(
     if not possible:
         raise InputError(
             f"{_measures(given)} is given: a prediction needs {_enough(TERMS)}, or a motion",
-            fields=STATED,
+            fields=INTENSITY,
         )
     block_of_question = block_of(given)
     kind = block_of_question.kind if kind is None else kind

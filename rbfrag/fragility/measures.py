@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.vocabulary import quantities as vocabulary
+from rbfrag.vocabulary.quantities import INTENSITY, SPECTRAL
 
 T = TypeVar("T")
 
@@ -94,9 +96,6 @@ def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
     """Return 2π·PGD/Tm [m/s] from PGD [m] and the mean period [s] (equation 4.31)."""
     return pgd_m * (2.0 * math.pi) / tm_s
 
-
-SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 3.0: "sa30_g"}
-"""Spectral accelerations (5 % damping, one component) that questions may state, by period [s]."""
 
 TERMS: Mapping[str, Term] = {
     term.name: term
@@ -209,24 +208,24 @@ TERMS: Mapping[str, Term] = {
 }
 """The terms by name."""
 
-STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m", "arias_m_s", "magnitude")
-"""The measures that a question may state, by name."""
-
 SCATTERED = {
-    f"{name.partition('_')[0]}_sigma": name for name in ("pgv_m_s", "pga_g", *SPECTRAL.values())
+    f"{name.partition('_')[0]}_sigma": name
+    for name, measure in vocabulary.MEASURES.items()
+    if measure.uncertain
 }
 """By the name of its standard deviation each measure that may be known with scatter."""
 
-AMPLIFIED = {**dict.fromkeys(("pgv_m_s", "pga_g", "pgd_m", *SPECTRAL.values()), 1), "arias_m_s": 2}
+AMPLIFIED = {name: measure.power for name, measure in vocabulary.MEASURES.items() if measure.power}
 """Measures that grow with the amplitude of the shaking, and to which power."""
 
 ABOUT_SCATTER = frozenset({*SCATTERED, "pgv_tau", "amplification_sigma"})
 """What a question may state of the scatter of its measures."""
 
-MEASURES = frozenset({*STATED, "xp_m_s", *ABOUT_SCATTER})
+MEASURES = frozenset({*INTENSITY, "xp_m_s", *ABOUT_SCATTER})
 """The names of all that a question states of the shaking: measures and their scatter."""
 
-ALONE = ("pgv_m_s", "sa10_g", "pga_g")
+_RANKS = {vocabulary.MEASURES[name].rank: name for name in INTENSITY}
+ALONE = tuple(_RANKS[rank] for rank in sorted(_RANKS) if rank)
 """Measures that a shipped model reads alone, by falling skill."""
 
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
@@ -272,7 +271,7 @@ def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
     another.
     """
     known = [TERMS[name].inputs for name in terms if name in TERMS]
-    stated = [inputs for inputs in known if set(inputs) <= set(STATED)]
+    stated = [inputs for inputs in known if set(inputs) <= set(INTENSITY)]
     least = [own for own in stated if not any(set(other) < set(own) for other in stated)]
     return list(dict.fromkeys(least))
 
@@ -280,26 +279,9 @@ def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
 LOWEST, HIGHEST = 1e-9, 1e9
 """Beyond these no rock block and no earthquake exists, and arithmetic might overflow."""
 
-_STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
 CREDIBLE = {
-    "pgv_m_s": (0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
-    "pga_g": (0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
-    **dict.fromkeys(
-        ("sa03_g", "sa10_g"), (0.0, 10.0, "larger than ever recorded (it is in g): is it in g?")
-    ),
-    "sa30_g": (0.0, 5.0, "larger than ever recorded (it is in g): is it in g?"),
-    "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
-    "pgv_over_pga_s": (
-        0.005,
-        2.0,
-        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
-        "s): is PGV in m/s and PGA in g?",
-    ),
-    "arias_m_s": (0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
-    "magnitude": (3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
-    "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
-    "kr": (0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
-    "ky": (0.0, 5.0, _STEEP),
-    **dict.fromkeys(("ks", "kct"), (0.0, 5.0, _STEEP)),
+    name: quantity.credible
+    for name, quantity in vocabulary.QUANTITIES.items()
+    if quantity.credible is not None
 }
 """Least and greatest credible value of a question, and what is said of others."""

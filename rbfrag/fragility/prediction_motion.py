@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, unused_measures
-from rbfrag.fragility.measures import ABOUT_SCATTER, SPECTRAL, STATED
+from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import (
     MotionPrediction,
@@ -24,6 +24,7 @@ from rbfrag.fragility.prediction import (
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.vocabulary.quantities import INTENSITY, SPECTRAL
 
 Polarity = Literal["forward", "reverse", "both"]
 
@@ -59,7 +60,7 @@ def predict_motion(
     if weights is not None:
         raise InputError(f"weights given beside a motion: {SIMULATED}")
     motion = as_motion(motion)
-    beside = {*STATED, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
+    beside = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
     extra = [name for name in given if name in beside]
     if extra:
         raise InputError(

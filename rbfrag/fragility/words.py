@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.results.numbers import confidence, interval, percent, with_interval
 from rbfrag.solver.kinds import BY_MECHANICS
+from rbfrag.vocabulary.quantities import INTENSITY, MEASURES, NUMBERS, QUANTITIES
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
@@ -55,24 +56,17 @@ def lines(document: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[tup
 
 def shaking_in_words(shaking: Mapping[str, Any], given: Mapping[str, Any]) -> str:
     """Return the measures of a question: "PGV 0.9 m/s, PGA 0.6 g"; medians where they scatter."""
-    from rbfrag.fragility.measures import STATED
-
     parts = [
-        f"{_measure(name)} {given[name]:.4g} {_unit(name)}".rstrip()
-        for name in STATED
+        f"{_measure(name)} {given[name]:.4g} {QUANTITIES[name].unit}".rstrip()
+        for name in INTENSITY
         if isinstance(given.get(name), int | float) and name not in shaking
-        and not name.endswith(("_sigma", "_tau"))
-    ]  # fmt: skip
+    ]
     parts += [
-        f"median {_measure(name)} {about['median']:.2g} {_unit(name)}, σ_ln {about['sigma']:.2g}, "
-        "integrated"
+        f"median {_measure(name)} {about['median']:.2g} {QUANTITIES[name].unit}, σ_ln "
+        f"{about['sigma']:.2g}, integrated"
         for name, about in shaking.items()
     ]
     return ", ".join(parts)
-
-
-def _unit(name: str) -> str:
-    return name.partition("_")[2].replace("m_s", "m/s")
 
 
 def _at_sites_in_words(document: Mapping[str, Any], sites: float) -> str:
@@ -95,7 +89,9 @@ def drained_in_words(document: Mapping[str, Any]) -> str:
     bound = document.get("drained")
     if bound is None:
         return ""
-    yields = [f"{SYMBOLS[n]} = {bound[n]:.3g}, " for n in SYMBOLS if bound.get(n) is not None]
+    yields = [
+        f"{QUANTITIES[n].symbol} = {bound[n]:.3g}, " for n in NUMBERS if bound.get(n) is not None
+    ]
     p = with_interval(bound["probability"], bound["ci_low"], bound["ci_high"])
     return f"{''.join(yields)}P = {p}, without water pressure"
 
@@ -124,7 +120,7 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> str:
     if not all(isinstance(value, (int, float)) for value in values.values()):
         return ""
     numbers = [
-        f"{SYMBOLS.get(name, name)} = {value:.3g}{' s⁻²' if name == block.size else ''}"
+        f"{QUANTITIES[name].symbol} = {value:.3g}{' s⁻²' if name == block.size else ''}"
         for name, value in values.items()
     ]
     limit_m = given.get("displacement_m")
@@ -161,7 +157,7 @@ def measures_in_words(names: Sequence[str]) -> str:
 
 
 def _measure(name: str) -> str:
-    return _MEASURES.get(name) or name.partition("_")[0].upper()
+    return MEASURES[name].title or QUANTITIES[name].symbol
 
 
 def fitted_in_words(diagnostics: Mapping[str, Any]) -> str:
@@ -173,14 +169,3 @@ def fitted_in_words(diagnostics: Mapping[str, Any]) -> str:
     recorded = diagnostics.get("recorded_events") != 0
     of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
     return f"fitted on {number:,} {what} of {events:,} {of}"
-
-
-_MEASURES = {
-    "sa03_g": "SA(0.3 s)", "sa10_g": "SA(1 s)", "sa30_g": "SA(3 s)", "xp_m_s": "toppling spectrum",
-    "tm_s": "Tm", "arias_m_s": "Arias intensity", "magnitude": "magnitude",
-}  # fmt: skip
-
-SYMBOLS = {
-    "p2": "p²", "ps2": "p_s²", "pct2": "p_ct²", "kr": "k_r", "ky": "k_y", "ks": "k_s",
-    "kct": "k_ct",
-}  # fmt: skip

@@ -47,12 +47,13 @@ from rbfrag.hazards.kernel import (
 from rbfrag.hazards.mass import Indices, SiteMass, curve_mass
 from rbfrag.hazards.model_parts import RateKeywords, parts_by_model
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
-from rbfrag.question.fields import AnsweringFields, BlockFields
-from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
 QUANTILES = (0.05, 0.5, 0.95)
 """Quantiles of a rate over the branches of a logic tree and the model's own uncertainty."""
@@ -268,7 +269,7 @@ def hazard(
         DatabaseError: the database cannot be read.
     """
     given, meaning, answering = parts_of(
-        numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
+        numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
     curves, weight = branch_curves(curve, weights, meaning)
 
@@ -341,7 +342,7 @@ def hazard_at_sites(
             fields=("model", "disaggregation"),
         )
     parts, remarks, reason = parts_by_model(given, reading, answering)
-    refuse_elements(reason, fields=BlockFields.__optional_keys__)
+    refuse_elements(reason, fields=BLOCK)
     sound = np.asarray(reason == "", dtype=bool)
     where = np.zeros(sound.size, dtype=np.intp) if site is None else site
     branch_weight = np.zeros(len(sites[0]))

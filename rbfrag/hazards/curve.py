@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import ALONE, SPECTRAL
+from rbfrag.fragility.measures import ALONE
 from rbfrag.frames import Tabular
 from rbfrag.question.shaking import doubts_about, doubts_about_rates
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""

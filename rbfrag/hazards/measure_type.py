@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import ALONE, SPECTRAL
+from rbfrag.fragility.measures import ALONE
+from rbfrag.vocabulary.quantities import MEASURES, SPECTRAL
 
 _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
@@ -25,19 +26,24 @@ class IntensityType:
     factor: float
     period_s: float | None = None
 
+    @classmethod
+    def of(cls, measure: str) -> IntensityType:
+        """Return the type of a measure, by its name in `predict`."""
+        period_s, factor = MEASURES[measure].period_s, MEASURES[measure].imt_factor
+        return cls(measure if period_s is None else "sa_g", factor, period_s)
+
     @property
     def imt(self) -> str:
         """The name as OpenQuake writes it."""
-        return {"pga_g": "PGA", "pgv_m_s": "PGV"}.get(self.measure, f"SA({self.period_s})")
+        return f"SA({self.period_s})" if self.measure == "sa_g" else MEASURES[self.measure].imt
 
 
 def openquake_type(imt: str, where: str) -> IntensityType:
     """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g]."""
     name = imt.strip()
-    if name.upper() == "PGA":
-        return IntensityType("pga_g", 1.0)
-    if name.upper() == "PGV":
-        return IntensityType("pgv_m_s", 0.01)
+    for measure, about in MEASURES.items():
+        if about.imt and about.imt == name.upper() and about.period_s is None:
+            return IntensityType.of(measure)
     match = _SA.fullmatch(name)
     if match:
         try:

@@ -13,8 +13,8 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.curve import CurveKeywords
 from rbfrag.hazards.shaking import LevelShaking
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
-from rbfrag.question.fields import AnsweringFields, V
-from rbfrag.question.keywords import BlockKeywords, model_for
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import model_for
 from rbfrag.solver.results import FloatArray
 
 

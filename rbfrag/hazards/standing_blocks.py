@@ -32,11 +32,11 @@ from rbfrag.hazards.kernel import (
 from rbfrag.hazards.mass import SiteMass, curve_mass
 from rbfrag.hazards.model_parts import parts_by_model
 from rbfrag.hazards.shaking import LevelShaking, ends_in_words
-from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import AnsweringFields, BlockFields
+from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
+from rbfrag.vocabulary.quantities import BLOCK, NUMBERS
 
 ALL_STAND = "that all of them stand is the question"
 """Why blocks of which one cannot be used are refused."""
@@ -153,7 +153,7 @@ class ModelBlocks:
         if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
         parts, remarks, reason = parts_by_model(stated, shaking, answering)
-        refuse_elements(reason, ALL_STAND, BlockFields.__optional_keys__)
+        refuse_elements(reason, ALL_STAND, BLOCK)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)
             raise InputError(f"the blocks are of kinds {kinds}: ask of each kind by itself")

@@ -26,10 +26,10 @@ from rbfrag.hazards.standing_blocks import (
     ModelBlocks,
     StandingBlocks,
 )
-from rbfrag.question.fields import AnsweringFields
-from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
+from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 DRAWS = 128
 """Draws of the blocks' parameters where several uncertain blocks are given."""
@@ -188,7 +188,7 @@ def survival(
         DatabaseError: the database cannot be read.
     """
     given, meaning, answering = parts_of(
-        numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
+        numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
     each, weight = branch_curves(curves, weights, meaning)
     age = Age.of(age_years, age_sd_years)

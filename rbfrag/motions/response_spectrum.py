@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.motions.polarity import FloatArray
+from rbfrag.vocabulary.quantities import MEASURES
 
 ComplexArray = NDArray[np.complex128]
 
 DAMPING = 0.05
 """Damping ratio ζ of the spectral accelerations."""
 
-PERIODS_S: Mapping[str, float] = {
-    "sa03_g": 0.3, "sa05_g": 0.5, "sa10_g": 1.0, "sa20_g": 2.0, "sa30_g": 3.0,
-}  # fmt: skip
+_STORED = {each.period_s: name for name, each in MEASURES.items() if each.period_s is not None}
+PERIODS_S: Mapping[str, float] = {_STORED[period_s]: period_s for period_s in sorted(_STORED)}
 """Period [s] of each spectral acceleration that is stored, by its name."""
 
 _SERIES_BELOW = 0.5

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.words import at_sites, fitted_in_words, row_in_words
@@ -33,31 +32,18 @@ from rbfrag.question.keywords import LEVEL
 from rbfrag.question.words import numbers_in_words
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 AXIS = {
-    "pgv_m_s": "peak ground velocity, PGV [m/s]",
-    "pga_g": "peak ground acceleration, PGA [g]",
-    "pgd_m": "peak ground displacement, PGD [m]",
-    "xp_m_s": "toppling spectrum at the block's size, $X(p)$ [m/s]",
-    **{
-        name: f"spectral acceleration, SA({period:.1f} s), 5 % damping [g]"
-        for period, name in SPECTRAL.items()
-    },
+    name: f"{measure.axis} [{QUANTITIES[name].unit}]"
+    for name, measure in MEASURES.items()
+    if measure.axis
 }
 """What a curve may run over."""
-
-FIXED = {
-    "pgv_m_s": "PGV = {:g} m/s",
-    "pga_g": "PGA = {:g} g",
-    "tm_s": "$T_m$ = {:g} s",
-    "arias_m_s": "$I_a$ = {:g} m/s",
-    "magnitude": "$M$ = {:g}",
-    **{name: f"SA({period:.1f} s) = {{:g}} g" for period, name in SPECTRAL.items()},
-}
 
 EVENT = "#b8b8b8"
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
@@ -131,7 +117,7 @@ def plot_curve(
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
-    conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
+    conditions = ", ".join(_condition(name, held[name]) for name in others)
     fitted = fitted_in_words(model.row.diagnostics)
     axes.set_title(
         "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
@@ -141,6 +127,16 @@ def plot_curve(
     )
     legend_below(figure, 2)
     return save_figure(figure, path)
+
+
+def _condition(name: str, value: float) -> str:
+    """Return a measure that is held at a value."""
+    symbol, period_s = QUANTITIES[name].symbol, MEASURES[name].period_s
+    if period_s is not None:
+        symbol = f"SA({period_s:.1f} s)"
+    elif "_" in symbol or len(symbol) == 1:
+        symbol = f"${symbol}$"
+    return f"{symbol} = {value:g} {QUANTITIES[name].unit}".rstrip()
 
 
 def draw_curve(

@@ -15,8 +15,8 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.chart import CONTOURS
 from rbfrag.plots.labels import as_written
-from rbfrag.question.fields import declared
 from rbfrag.question.words import number_in_words
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 _NODES = 241
 _PERIODS_S = {"sa03_g": ("sa03_over_pga", 0.0), "sa10_g": ("v10_over_pgv", 1.0),
@@ -79,8 +79,8 @@ def plot_kind_chart(
     places = list(_label_places(x, y, answers.probability))
     axes.clabel(lines, fmt=lambda p: f"{100.0 * p:g} %", fontsize=8, manual=places)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    about = declared()[first]
-    axes.set_xlabel(f"{about.what} [{about.unit}]")
+    about = QUANTITIES[first]
+    axes.set_xlabel(f"{about.noun} [{about.unit}]")
     axes.set_ylabel(f"yield acceleration coefficient, $k_{{{strength[1:]}}}$")
     axes.grid(visible=True, which="both", lw=0.4, color="#c0c0c0")
     at = [" = ".join(number_in_words(name, value, 3)) for name, value in held.items()]

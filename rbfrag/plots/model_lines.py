@@ -11,12 +11,12 @@ from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
 
 ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa10", "pga_tm", "pgd_tm")
 """Terms that are one number."""
@@ -213,8 +213,8 @@ def predicted_strengths(
     Returns:
         Shape (n,); NaN where what the model reads is not known.
     """
-    columns = {name: getattr(table, name) for name in ("p2", *STATED)}
-    columns["xp_m_s"] = xp_m_s
+    stored = (name for name in INTENSITY if QUANTITIES[name].stored)
+    columns = {name: getattr(table, name) for name in ("p2", *stored)} | {"xp_m_s": xp_m_s}
     given = {name: columns[name] for name in ("p2", *model.term.inputs)}
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.sqrt(table.p2)

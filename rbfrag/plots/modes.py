@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import halo
-from rbfrag.question.fields import declared, word_of
 from rbfrag.rockmasses.joint_sets import VARIABLES, Realisations, RockMass
 from rbfrag.rockmasses.shaking import FAILS, NO_MODE, ShakenMass
 from rbfrag.solver.block.arrays import BlockArray
@@ -25,6 +24,7 @@ from rbfrag.solver.stability.arrays import (
     water_held_m,
 )
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
+from rbfrag.vocabulary.quantities import QUANTITIES, word_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,7 +194,7 @@ def _title(
     back = "with" if back_fracture else "without"
     for name, value in on_base.items():
         friction += (
-            f", {word_of(name).replace('_', ' ')} {value:g} {declared()[name].unit}".rstrip()
+            f", {word_of(name).replace('_', ' ')} {value:g} {QUANTITIES[name].unit}".rstrip()
         )
     if ended is not None:
         return (

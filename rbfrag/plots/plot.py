@@ -18,9 +18,10 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
-from rbfrag.question.fields import MeasureFields, RangeFields
-from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
+from rbfrag.question.fields import BlockKeywords, MeasureFields, RangeFields
+from rbfrag.question.keywords import LEVEL, model_for, parts_of
 from rbfrag.question.question import described
+from rbfrag.vocabulary.quantities import BLOCKS, INTENSITY, RANGE
 
 if TYPE_CHECKING:
     from rbfrag.plots.hazard import plot_contribution as hazard
@@ -216,7 +217,7 @@ def curve(
 
     numbers = [each for each in (p2, kr) if each is not None]
     block, held, answering, drawing = parts_of(
-        numbers, question, BlockKeywords, MeasureFields, RangeFields, _OneCurve
+        numbers, question, BLOCKS, INTENSITY, RANGE, _OneCurve.__optional_keys__
     )
     held |= spectral(drawing.get("sa_g") or {})
     kind = block.pop("kind", None)

@@ -12,19 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of, check_numbers
-from rbfrag.question.fields import (
-    BlockFields,
-    FailureFields,
-    JointFields,
-    NumberFields,
-    PlaneFields,
-    ScatterFields,
-    ShakingFields,
-    ShapeFields,
-    WholeFields,
-    column_of,
-    names_of,
-)
 from rbfrag.question.shapes import (
     BOND,
     DENSITY_NOTE,
@@ -33,14 +20,11 @@ from rbfrag.question.shapes import (
     FRICTION_MISSING,
     IS_PLANE,
     IS_SHAPE,
-    JOINT,
     LEAST_M,
     NO_MODEL,
     OF_A_SHAPE,
-    PLANES,
     SHAPES,
     SIDES_AND_PLANES,
-    SPACE,
     WAYS,
     ModeShapes,
     check_lengths,
@@ -55,12 +39,23 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
 from rbfrag.solver.stability.joint import ROCK_KG_M3, is_drained
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    JOINT,
+    NUMBERS,
+    PLANES,
+    SCATTER,
+    SHAKING,
+    SHAPE,
+    SPACE,
+    WHOLE,
+    column_of,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-NUMBERS = names_of(NumberFields)
 """Fields that say of a block what its shape would."""
 
 
@@ -150,7 +145,7 @@ def numbers_in(columns: Mapping[str, Any]) -> dict[str, Any]:
     """Return what answers read of blocks, by field, from columns of a table that was written."""
     return {
         name: columns[column_of(name)]
-        for name in BlockFields.__optional_keys__
+        for name in BLOCK
         if name not in OF_A_SHAPE and column_of(name) in columns
     }
 
@@ -327,18 +322,9 @@ class _One:
             self.remarks.append(text)
 
 
-_READ = frozenset(
-    names_of(
-        NumberFields,
-        FailureFields,
-        ShapeFields,
-        PlaneFields,
-        JointFields,
-        ScatterFields,
-        ShakingFields,
-        WholeFields,
-    )
-)
+_READ = frozenset((
+    *NUMBERS, "displacement_m", "restitution", *SHAPE, *PLANES, *JOINT, *SCATTER, *SHAKING, *WHOLE,
+))  # fmt: skip
 """Fields that shapes, models or the choice of one read."""
 
 

@@ -26,9 +26,10 @@ from itertools import pairwise
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import AMPLIFIED, SPECTRAL
+from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 COMPONENT_SIGMA = 0.161
 """Dispersion of a single component about RotD50 or the geometric mean, in ln: .07 in log10."""

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
-from rbfrag.fragility.measures import AMPLIFIED, STATED
+from rbfrag.fragility.measures import AMPLIFIED
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
-from rbfrag.question.fields import SCENE
 from rbfrag.question.question import (
     OF_SHAKING,
     ask_at_rest,
@@ -22,6 +21,7 @@ from rbfrag.question.question import (
     without_water,
 )
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
+from rbfrag.vocabulary.quantities import INTENSITY, SCENARIO
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -133,9 +133,9 @@ def prediction_document(
     """
     is_component_assumed = component is None and motion is None
     source = mechanism, gmm, component
-    if source != (None, None, None) or not SCENE.isdisjoint(given):
+    if source != (None, None, None) or not SCENARIO.isdisjoint(given):
         if motion is not None:
-            fields = (*SCENE, "mechanism", "gmm", "component")
+            fields = (*SCENARIO, "mechanism", "gmm", "component")
             raise InputError(BESIDE_A_MOTION, fields=fields)
         from rbfrag.question.scenario import SITE, Source, shaken
 
@@ -166,7 +166,7 @@ def prediction_document(
             )
         except InputError as error:
             # here the measures are fields of the question, which each door spells
-            error.fields = error.fields or STATED
+            error.fields = error.fields or INTENSITY
             raise
         for each in models:
             answer = answer_given(each, given, level, weights=weights, sites=sites)

@@ -2,47 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.question.fields import AnsweringFields, BlockFields, V, WholeFields
 from rbfrag.question.question import by_field_name
 
 if TYPE_CHECKING:
     from rbfrag.fragility.model import FragilityModel
+    from rbfrag.question.fields import AnsweringFields
 
 LEVEL = 0.95
 """Confidence level where none is asked for."""
 
 
-class BlockKeywords(BlockFields[V], WholeFields, total=False):
-    """What the blocks are, as :func:`rbfrag.predict` has it; of many, each may state its kind."""
-
-    kind: str | Sequence[str | None] | None  # type: ignore[misc]
-
-
-def parts_of(numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Any) -> list[Any]:
-    """Return the keywords of a question by the classes that declare them; None is not stated.
+def parts_of(
+    numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Collection[str]
+) -> list[Any]:
+    """Return the keywords of a question by the parts that they belong to; None is not stated.
 
     Args:
         numbers: what is given without a name: p2 and kr.
         keywords: what is given by name.
-        parts: classes of keywords.
+        parts: names of keywords.
 
     Raises:
         InputError: p2 or kr is given twice, or there are more numbers than these.
-        UnknownFieldError: a keyword that no class declares.
+        UnknownFieldError: a keyword of no part.
     """
-    known = {name for part in parts for name in part.__optional_keys__}
+    known = {name for part in parts for name in part}
     if not keywords.keys() <= known:
         keywords = by_field_name(keywords, known)
     first = dict(zip(("p2", "kr"), numbers, strict=False))
     if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
         raise InputError("p2 and kr come first, or by their names: give each once")
     whole = {name: value for name, value in {**first, **keywords}.items() if value is not None}
-    return [{n: v for n, v in whole.items() if n in part.__optional_keys__} for part in parts]
+    return [{n: v for n, v in whole.items() if n in part} for part in parts]
 
 
 def model_for(

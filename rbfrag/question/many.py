@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import (
-    NUMBERS,
     Blocks,
     Group,
     Refused,
@@ -29,15 +28,12 @@ from rbfrag.question.shapes import (
     DRAINED_NOTE,
     DRAINS_NOTHING,
     FRICTION_MISSING,
-    JOINT,
     LEAST_M,
     LENGTHS,
     MOST_M,
     NO_MODEL,
-    PLANES,
     RECTANGLE,
     SHAPES,
-    SPACE,
     UNSTABLE_AT_REST,
     ModeShapes,
     check_lengths,
@@ -62,6 +58,7 @@ from rbfrag.solver.stability.joint import (
     water_at,
 )
 from rbfrag.solver.stability.modes import MODES, words_of_mode
+from rbfrag.vocabulary.quantities import JOINT, NUMBERS, PLANES, SPACE
 
 _IF_EMPTY = {"beta_deg": 0.0}
 """What an empty cell stands for beside the numbers of a block: a level base."""

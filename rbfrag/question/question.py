@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from os import PathLike
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from rbfrag.errors import InputError, UnknownFieldError
@@ -23,27 +24,28 @@ from rbfrag.fragility.prediction import (
 )
 from rbfrag.question.blocks import Blocks, has_shape, one_block, read_by_some
 from rbfrag.question.components import SINGLE_ASSUMED, SINGLE_COMPONENT
-from rbfrag.question.fields import (
-    SCENE,
-    ArrayFields,
-    QuestionFields,
-    RequestFields,
-    ShakingFields,
-    keywords_in_words,
-    names_of,
-)
 from rbfrag.question.shapes import size_questions
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import BY_MECHANICS, FREE_STANDING, facts_of
+from rbfrag.vocabulary.quantities import (
+    ARRAYS,
+    INPUTS,
+    QUANTITIES,
+    QUESTION,
+    REQUEST,
+    SCENARIO,
+    SHAKING,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from rbfrag.fragility.model import Model
     from rbfrag.fragility.prediction_array import PredictionArray
+    from rbfrag.question.fields import QuestionFields
 
 
-_OPTIONS = frozenset(names_of(RequestFields, ArrayFields))
+_KEYWORDS, _OPTIONS = frozenset(QUESTION), frozenset((*REQUEST, *ARRAYS))
 _SINGLE = frozenset({"block", "back_fracture"})
 """Fields that hold one thing for all blocks."""
 
@@ -107,8 +109,8 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    if not question.keys() <= QuestionFields.__optional_keys__:
-        question = by_field_name(question, QuestionFields.__optional_keys__)
+    if not question.keys() <= _KEYWORDS:
+        question = by_field_name(question, _KEYWORDS)
     given: dict[str, Any] = {} if p2 is None else {"p2": p2}
     if kr is not None:
         given["kr"] = kr
@@ -219,8 +221,20 @@ def bound_values(
     return {n: document[n] for n in OF_BOUND} | {name: numbers.get(name)}
 
 
+def _keywords_in_words() -> str:
+    """Return the list of keywords for the documentation."""
+    lines = []
+    for name in QUESTION:
+        help = QUANTITIES[name].help("``{}``".format)
+        if INPUTS[name].type is bool:
+            help = f"False where {help[:1].lower()}{help[1:]}"
+        text = f"- ``{name}``: {help}"
+        lines += wrap(text, 92, initial_indent="    ", subsequent_indent="      ")
+    return "\n".join(lines)
+
+
 if predict.__doc__:  # python -OO leaves none
-    predict.__doc__ = predict.__doc__.replace("    KEYWORDS", keywords_in_words(QuestionFields))
+    predict.__doc__ = predict.__doc__.replace("    KEYWORDS", _keywords_in_words())
 
 
 def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
@@ -269,7 +283,7 @@ def unknown_field(name: str, known: Collection[str]) -> UnknownFieldError:
     return UnknownFieldError(f"unknown field {name[:60]!r}{hint}")
 
 
-OF_SHAKING = frozenset({*names_of(ShakingFields), *MEASURES})
+OF_SHAKING = frozenset({*SHAKING, *MEASURES})
 """Fields that say nothing of the block."""
 
 
@@ -305,7 +319,7 @@ def ask_at_rest(
     """
     (group,) = blocks.groups
     assert group.kind is not None
-    if scenario.get("mechanism") or scenario.get("gmm") or not SCENE.isdisjoint(measures):
+    if scenario.get("mechanism") or scenario.get("gmm") or not SCENARIO.isdisjoint(measures):
         from rbfrag.question.scenario import Source, shaken
 
         source = Source(scenario.get("mechanism"), scenario.get("gmm"))
@@ -389,7 +403,7 @@ def ask(
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
     is_single_component = isinstance(component, str) and component == SINGLE_COMPONENT
     converts = component is not None and not is_single_component
-    if mechanism is not None or gmm is not None or converts or not SCENE.isdisjoint(given):
+    if mechanism is not None or gmm is not None or converts or not SCENARIO.isdisjoint(given):
         # Kept apart: most questions state measures.
         from rbfrag.question.scenario import SITE, Source, shaken
 

@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import stored_row
-from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, STATED, TERMS
+from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, TERMS
 from rbfrag.fragility.method import SINGLE, Numbers, arrays
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma
+from rbfrag.vocabulary.quantities import INTENSITY
 
 SITE = ("rjb_km", "vs30_m_s")
 """Fields that make a question one of a scenario."""
@@ -115,7 +116,7 @@ def scenario(
     Raises:
         InputError: something is missing, given twice, or outside the range of the model.
     """
-    stated = [n for n in given if (n in STATED or n in _SIGMAS.values()) and n != "magnitude"]
+    stated = [n for n in given if (n in INTENSITY or n in _SIGMAS.values()) and n != "magnitude"]
     if stated:
         raise InputError(
             f"{stated[0]} does not go with a scenario, which says how strong the shaking is: leave "

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.question.shapes import SHAPES, SPACE, WAYS
+from rbfrag.question.shapes import SHAPES, WAYS
 from rbfrag.solver.block.planes import plane_of, section_of
+from rbfrag.vocabulary.quantities import SPACE
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.fragility.measures import CREDIBLE
-from rbfrag.question.fields import ShakingFields, declared
+from rbfrag.vocabulary.quantities import QUANTITIES, SHAKING
 
 MOST_A_YEAR = 100.0
 """Rates of exceedance above this are of another unit, or of no earthquakes [1/a]."""
@@ -21,12 +21,12 @@ def doubts_about(measures: Mapping[str, Any]) -> Iterator[str]:
         measures: values by the names of :func:`rbfrag.predict`, arrays or numbers; NaN is passed
             over.
     """
-    for name in ShakingFields.__optional_keys__ & measures.keys() & CREDIBLE.keys():
+    for name in measures.keys() & CREDIBLE.keys() & {*SHAKING}:
         values = np.asarray(measures[name], dtype=np.float64)
         values = values[np.isfinite(values)]
         _, most, text = CREDIBLE[name]
         if values.size and (largest := float(values.max())) > most:
-            yield f"{name} = {largest:.4g} {declared()[name].unit} is {text}"
+            yield f"{name} = {largest:.4g} {QUANTITIES[name].unit} is {text}"
 
 
 def doubts_about_rates(annual_rate: Any) -> Iterator[str]:

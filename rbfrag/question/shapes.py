@@ -11,15 +11,6 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    JointFields,
-    PlaneFields,
-    SpaceFields,
-    column_of,
-    declared,
-    names_of,
-    word_of,
-)
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
@@ -34,6 +25,7 @@ from rbfrag.solver.stability.joint import (
 )
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
+from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.arrays import BlockArray
@@ -49,7 +41,6 @@ SHAPES = {
 
 WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
 
-PLANES = names_of(PlaneFields)
 
 LEAST_DEG, LEAST_DIP_DEG = 1.6, 0.8
 """Friction angles and dips below this are questioned [deg]: radians may have been meant."""
@@ -241,11 +232,8 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     return first
 
 
-SPACE = names_of(SpaceFields)
-
 BOND = ("cohesion_pa", "density_kg_m3")
 
-JOINT = names_of(JointFields)
 
 PLANE_TEXTS = (*SPACE, "drainage")
 """Fields of planes that are words; of many blocks arrays of them."""
@@ -270,7 +258,6 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
         listener: hears of it.
         columns: call fields as the columns of tables that are written.
     """
-    fields = declared()
     for name, value in stated.items():
         is_friction = name in ("phi_deg", "phi_back_deg")
         if is_friction or name == "beta_deg":
@@ -278,16 +265,16 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
             small = (abs(value) > 0.0) & (abs(value) < least) & (value % 0.25 != 0.0)
             text = Diagnostic(_RADIANS.format(name=name), "check_unit", fields=(name,))
             listener.remark(small, text, value=value)
-        usable = fields[name].usable(value)
+        usable = QUANTITIES[name].range.holds(value)
         if usable is True:  # a single number: no text is needed
             continue
-        about, unknown = fields[name], value != value
+        about, unknown = QUANTITIES[name], value != value
         shown = column_of(name) if columns else name
         if not is_friction and name != "displacement_m":
             why = "is empty" if columns else "is not a number"
             level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
             listener.refuse(unknown, f"{shown} {why}{level}", name)
-        wrong = f"{shown} = {{value:.10g}} is not {about.wanted} {about.unit}".rstrip()
+        wrong = f"{shown} = {{value:.10g}} is not {about.range.words} {about.unit}".rstrip()
         listener.refuse(usable ^ True ^ unknown, wrong, name, value=value)
 
 

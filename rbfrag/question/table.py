@@ -15,17 +15,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    MeasureFields,
-    column_of,
-    columns_declared,
-    declared,
-    names_of,
-    word_of,
-)
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.stability.joint import DRAINED, UNDRAINED
+from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, INTENSITY, QUANTITIES, column_of, word_of
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
 
@@ -73,7 +66,7 @@ INSTEAD_OF = {
     "height_m": ("kr", "ky", "ks", "kct", "alpha1_deg", "s1_m"),
     "width_m": ("kr", "ky", "ks", "kct", "alpha1_deg", "s1_m"),
     "s1_m": ("kr", "ky", "ks", "kct", "height_m", "alpha1_deg"),
-    "pgv_m_s": (*names_of(MeasureFields), "rjb_km"),
+    "pgv_m_s": (*INTENSITY, "rjb_km"),
 }
 """By a field that a column sounds like the fields that may take its place."""
 
@@ -120,8 +113,8 @@ class HeaderMatch(NamedTuple):
 def _names() -> dict[str, str]:
     """Return the fields by all the names of their columns."""
     by_name: dict[str, str] = {}
-    for name in columns_declared():
-        for alias in (name, column_of(name), word_of(name), *declared()[name].others):
+    for name in COLUMNS:
+        for alias in (name, column_of(name), word_of(name), *INPUTS[name].aliases):
             by_name[alias] = name
     return by_name
 
@@ -174,7 +167,7 @@ def normalized_words(text: str) -> list[str]:
 
 def header_of(name: str) -> str:
     """Return a name for the column of a field: what people call it, and its unit."""
-    unit = declared()[name].unit
+    unit = QUANTITIES[name].unit
     return f"{word_of(name)} [{unit}]" if unit else word_of(name)
 
 
@@ -191,7 +184,7 @@ def field_of(header: str) -> HeaderMatch | None:
         return match
     if end := _AT_THE_END.fullmatch(text.translate({ord("²"): "2", ord("³"): "3"})):
         match, unit = _called(end[1]), end[2].replace("_", "/")
-        if match is not None and unit_factor(declared()[match.field].unit, unit):
+        if match is not None and unit_factor(QUANTITIES[match.field].unit, unit):
             return match._replace(unit=unit)
     return None
 
@@ -315,7 +308,7 @@ def _fields_in(row: Sequence[object]) -> set[str]:
 
 
 def _has_number(fields: Collection[str]) -> bool:
-    return any(not declared()[name].is_text for name in fields)
+    return any(INPUTS[name].type is not str for name in fields)
 
 
 def _text(cell: object) -> str:
@@ -386,7 +379,7 @@ class Header(NamedTuple):
             field = sounds_like(text)
             if field is None or not {field, *INSTEAD_OF.get(field, ())}.isdisjoint(present):
                 continue
-            what = "back fracture" if field == "back_fracture" else declared()[field].what
+            what = "back fracture" if field == "back_fracture" else QUANTITIES[field].noun
             raise InputError(
                 f"{source}: the column {text[:60]!r} is not understood and may be the "
                 f"{what}: call it {column_of(field)!r}, or pass "
@@ -445,12 +438,12 @@ def columns_in(
                 unknown += [] if text in WRITTEN else [text]
             continue
         name, unit, column = match
-        field = declared()[name]
+        field = QUANTITIES[name]
         if name not in read:
             unused[text] = name
             continue
         key = "free_standing" if column == "free_standing" else name
-        if field.is_text or name == "back_fracture":
+        if INPUTS[name].type is str or name == "back_fracture":
             # of several names its own goes before the others
             if key not in columns or text == name:
                 columns[key] = Column(text, inverse=column == "no_back")
@@ -460,7 +453,7 @@ def columns_in(
             twice = (
                 f"the column {text} is there twice"
                 if text == other
-                else f"the columns {other} and {text} are both the {field.what}"
+                else f"the columns {other} and {text} are both the {field.noun}"
             )
             raise InputError(f"{source}: {twice}: leave one of them out")
         factor = 1.0 if unit is None else unit_factor(field.unit, unit)
@@ -469,7 +462,7 @@ def columns_in(
         if factor is None:
             units = " or ".join(word or "no unit" for word in FACTORS.get(field.unit, ("",)))
             raise InputError(
-                f"{source}: the column {text} is in {unit!r}, and the {field.what} is expected in "
+                f"{source}: the column {text} is in {unit!r}, and the {field.noun} is expected in "
                 f"{units}: convert it, or name another unit"
             )
         if factor != 1.0:
@@ -499,7 +492,7 @@ def _reject_near_miss(text: str, source: object, read: Collection[str]) -> None:
         if field in read and (_is_near(bare, name) or (end and _is_near(end[1], name))):
             raise InputError(
                 f"{source}: unknown column {text[:60]!r}; did you mean {name!r}, the "
-                f"{declared()[field].what}?"
+                f"{QUANTITIES[field].noun}?"
             )
 
 

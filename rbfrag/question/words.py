@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbfrag.fragility.words import SYMBOLS
-from rbfrag.question.fields import declared, word_of
+from rbfrag.vocabulary.quantities import NUMBERS, QUANTITIES, word_of
 
 _LONGEST = 30
 """Letters of a label."""
@@ -13,8 +12,10 @@ _LONGEST = 30
 
 def number_in_words(name: str, value: float, digits: int = 4) -> tuple[str, str]:
     """Return what a field of a block is called, and its value with the unit."""
-    about = declared()[name]
-    label = SYMBOLS.get(name, about.what if len(about.what) <= _LONGEST else word_of(name))
+    about = QUANTITIES[name]
+    label = about.noun if len(about.noun) <= _LONGEST else word_of(name)
+    if name in NUMBERS:
+        label = about.symbol
     return label, f"{value:.{digits}g} {about.unit}".rstrip()
 
 

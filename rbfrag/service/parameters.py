@@ -13,29 +13,29 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, WithJsonSchema
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    OTHER_WORDS,
-    AnsweringFields,
-    AtRestFields,
-    BlockFields,
-    ComponentFields,
-    JointFields,
-    MeasureFields,
-    PlaneFields,
-    RequestFields,
-    ShakingFields,
-    ShapeFields,
-    SpaceFields,
-    WholeFields,
-    by_field,
-    declared,
-    name_of,
-    names_of,
-    parameter_of,
-)
-from rbfrag.question.fields import Field as Declared
 from rbfrag.question.keywords import LEVEL
 from rbfrag.service.documents import with_fields
+from rbfrag.vocabulary.quantities import (
+    ANSWERING,
+    AT_REST,
+    BLOCK,
+    COMPONENT,
+    INPUTS,
+    INTENSITY,
+    JOINT,
+    OTHER_WORDS,
+    PLANES,
+    QUANTITIES,
+    REQUEST,
+    SHAKING,
+    SHAPE,
+    SPACE,
+    WHOLE,
+    Limits,
+    inputs_from,
+    name_of,
+    parameter_of,
+)
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -45,28 +45,28 @@ Positive = Annotated[float, Field(gt=0.0)]
 Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, fail_fast=True)]
 """A number that stands for every element, or a list of one an element, null where there is none."""
 
-COLUMNS = frozenset(names_of(BlockFields, ShakingFields, "cohesion_pa", "density_kg_m3"))
+COLUMNS = frozenset((*BLOCK, *SHAKING, "cohesion_pa", "density_kg_m3"))
 """Fields of which many blocks have one each."""
 
-_TEXTS = frozenset(names_of(SpaceFields, ComponentFields, "drainage"))
+_TEXTS = frozenset((*SPACE, *COMPONENT, "drainage"))
 """Texts of which many blocks have one each."""
 
 _NOT_SENT = frozenset({"block", "db", "gmm"})
 """Fields that no request can state."""
 
-_HOW = ("kind", *names_of(RequestFields))
+_HOW = ("kind", *REQUEST)
 """Fields that say how a question is answered."""
 
 _DEFAULTS = {"level": LEVEL}
 
 
-def _limited(of: Any, about: Declared) -> Any:
+def _limited(of: Any, limits: Limits) -> Any:
     """Return a type whose schema states a range, which is not checked here."""
-    limits = {
-        "exclusiveMinimum": about.above, "minimum": about.least,
-        "exclusiveMaximum": about.below, "maximum": about.most,
+    keys = {
+        "exclusiveMinimum": limits.above, "minimum": limits.least,
+        "exclusiveMaximum": limits.below, "maximum": limits.most,
     }  # fmt: skip
-    stated = {word: limit for word, limit in limits.items() if limit is not None}
+    stated = {word: limit for word, limit in keys.items() if limit is not None}
     return Annotated[of, WithJsonSchema({"type": "number", **stated})]
 
 
@@ -84,21 +84,21 @@ def asking(
     words |= {word: name for word, name in OTHER_WORDS.items() if name in names}
     definitions: dict[str, Any] = {}
     for word, name in words.items():
-        about, default = declared()[name], _DEFAULTS.get(name)
+        type_, default = INPUTS[name].type, _DEFAULTS.get(name)
         of: Any = bool
-        if about.is_flag:
+        if type_ is bool:
             default = False
-        elif about.is_text:
+        elif type_ is str:
             of = Text | None
             if many and name in _TEXTS:
                 of = Annotated[list[Text | None], Field(min_length=1)] | of
         elif many and name in COLUMNS:
             of = Column | None
         else:
-            of = _limited(StrictFloat if many else float, about)
+            of = _limited(StrictFloat if many else float, QUANTITIES[name].range)
             of = of | None if default is None else of
         shown = [examples[word]] if examples and word in examples else None
-        field = Field(description=about.sentence(parameter_of), examples=shown)
+        field = Field(description=QUANTITIES[name].help(parameter_of), examples=shown)
         definitions[word] = (Annotated[of, field], default)
     return with_fields(definitions)
 
@@ -116,9 +116,9 @@ class Parameters(BaseModel):
         Raises:
             InputError: two words for one field.
         """
-        stated, known = self.model_fields_set, declared()
+        stated, known = self.model_fields_set, INPUTS
         values = self.__dict__.items()
-        return by_field(
+        return inputs_from(
             {word: v for word, v in values if word in stated and name_of(word) in known}
         )
 
@@ -129,13 +129,11 @@ class Parameters(BaseModel):
         return given, how
 
 
-_SHAPE = (
-    *names_of(ShapeFields, PlaneFields, SpaceFields, JointFields, "drainage"), "back_fracture",
-)  # fmt: skip
+_SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "drainage", "back_fracture")
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
-_AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *names_of(AtRestFields))
-_BLOCK = names_of(BlockFields, WholeFields)
-_QUESTION = (*_BLOCK, *names_of(ShakingFields, RequestFields))
+_AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *AT_REST)
+_BLOCK = (*BLOCK, *WHOLE)
+_QUESTION = (*_BLOCK, *SHAKING, *REQUEST)
 
 
 @asking(*_AT_REST, examples={"s1": 1.0, "s2": 0.6, "gamma": 25.0, "beta": 20.0, "phi": 40.0})
@@ -153,7 +151,7 @@ class PredictQuery(Parameters):
     """Parameters of `GET /v1/predict`."""
 
 
-@asking(*names_of(ShakingFields, RequestFields), "kind")
+@asking(*SHAKING, *REQUEST, "kind")
 class TableQuery(Parameters):
     """Parameters of `/v1/table`: kind of rows that name none, and shaking if no column has any."""
 
@@ -219,7 +217,7 @@ class CriticalQuery(Reading):
     """Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4."""
 
 
-@asking(*names_of(MeasureFields, AnsweringFields))
+@asking(*INTENSITY, *ANSWERING)
 class RockmassQuery(Parameters):
     """Parameters of `/v1/rockmass`."""
 
@@ -229,7 +227,7 @@ class RockmassQuery(Parameters):
     """Seed of the random numbers. Default: that of the body, else 1."""
 
 
-@asking(*_BLOCK, *names_of(AnsweringFields), examples={"p2": 3.0, "kr": 0.1})
+@asking(*_BLOCK, *ANSWERING, examples={"p2": 3.0, "kr": 0.1})
 class HazardQuery(Parameters):
     """Parameters of `/v1/hazard`."""
 

@@ -15,7 +15,6 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
 from rbfrag.fragility.lookup import models_in_memory
 from rbfrag.question.document import answer_block
-from rbfrag.question.fields import ShakingFields, names_of
 from rbfrag.question.question import ask, with_drained_bound
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays, TableAnswers
@@ -24,6 +23,7 @@ from rbfrag.service.problem import READ, SENT
 from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as, sent_file
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.service.work import WorkerPool, in_thread
+from rbfrag.vocabulary.quantities import SHAKING
 
 ELEMENTS_BESIDE = 20_000
 """So many elements are answered beside other requests; more than these, by another process."""
@@ -105,10 +105,8 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
         source, target = Path(folder, f"table.{query.form}"), Path(folder, "answers.csv")
         source.write_bytes(body)
         try:
-            with opened_table(
-                source, names_of(ShakingFields), sheet=query.sheet, ignore_columns=ignored
-            ) as table:
-                if not {*names_of(ShakingFields)}.isdisjoint(table.stated.columns):
+            with opened_table(source, SHAKING, sheet=query.sheet, ignore_columns=ignored) as table:
+                if not {*SHAKING}.isdisjoint(table.stated.columns):
                     inputs = {}
             summary = predict_table(
                 source, target, given=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,

@@ -18,9 +18,9 @@ from starlette.routing import Match
 
 from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
-from rbfrag.question.fields import parameter_of
 from rbfrag.service.documents import Problem
 from rbfrag.service.settings import ServiceSettings
+from rbfrag.vocabulary.quantities import parameter_of
 
 MEDIA_TYPE = "application/problem+json"
 

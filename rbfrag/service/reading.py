@@ -16,7 +16,6 @@ from python_multipart.exceptions import FormParserError
 
 from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
-from rbfrag.question.fields import parameter_of
 from rbfrag.question.table import field_of
 from rbfrag.results.diagnostic import with_diagnostics
 from rbfrag.service.problem import (
@@ -28,6 +27,7 @@ from rbfrag.service.problem import (
 )
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.solver.kinds import FREE_STANDING
+from rbfrag.vocabulary.quantities import parameter_of
 
 MULTIPART = "multipart/form-data"
 

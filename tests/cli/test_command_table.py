@@ -21,7 +21,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.refusals import CONFLICTS, NEEDS, refuse
 from rbfrag.cli.parameters.stack import stacked
 from rbfrag.errors import InputError
-from rbfrag.question.fields import option_of
+from rbfrag.vocabulary.quantities import option_of
 
 COMMAND_FOLDER = Path(__file__).parents[2] / "rbfrag" / "cli" / "commands"
 MODULES = [import_module(f"rbfrag.cli.commands.{name.replace('-', '_')}") for name in COMMANDS]

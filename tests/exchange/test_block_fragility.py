@@ -13,7 +13,7 @@ import rbfrag
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import read_models
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_fragility import CREDIBLE, FLOOR, block_functions
+from rbfrag.exchange.block_fragility import FLOOR, TOP, block_functions
 from rbfrag.exchange.fragility_function import FragilityFunction, chords, renamed
 from rbfrag.fragility.measures import ALONE, TERMS
 from rbfrag.fragility.model import FragilityModel
@@ -66,7 +66,7 @@ def test_chords_of_every_model_stay_within_one_percent(row: Any, measure: str) -
     for i, function in enumerate(functions_of(model, measure)):
         assert function.levels is not None
         assert function.levels.size <= 80
-        x = np.geomspace(function.levels[1], min(function.levels[-1], CREDIBLE[measure]), 3000)
+        x = np.geomspace(function.levels[1], min(function.levels[-1], TOP[measure]), 3000)
         error = relative_error(function, x, probability(model, i, measure, x))
         assert error < ALLOWED
         assert function.grid_error is not None

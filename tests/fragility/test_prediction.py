@@ -60,6 +60,7 @@ def test_keys_of_the_json_contract(row):
         "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "level",
         "model", "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
         "pgv_over_pga_s", "median_displacement_m", "block_sd", "data", "shaking", "how",
+        "drained",
     ]  # fmt: skip
     assert (answer.kind, answer.failure, answer.median_displacement_m) == (
         "toppling", "toppling", None,

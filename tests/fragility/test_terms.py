@@ -7,12 +7,12 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import (
     ALONE,
     MEASURES,
-    SPECTRAL,
     TERMS,
     intensity_term,
     least_inputs,
     terms_from,
 )
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 
 def test_terms_of_one_harmonic_motion_agree():

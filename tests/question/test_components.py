@@ -30,11 +30,11 @@ from rbfrag.question.components import (
     component_named,
 )
 from rbfrag.question.document import prediction_document
-from rbfrag.question.fields import option_of, parameter_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
+from rbfrag.vocabulary.quantities import option_of, parameter_of
 
 TOPPLING, ROCKING = {"p2": 3.0, "kr": 0.1}, {"p2": 3.0, "kr": 0.15, "kind": "rocking"}
 SLIDING = {"ky": 0.12, "displacement_m": 0.1}

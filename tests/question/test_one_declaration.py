@@ -13,15 +13,18 @@ import pytest
 import rbfrag
 
 PACKAGE = Path(rbfrag.__file__).parent
-DECLARED = (
-    '    hardness: Annotated[V, Field("Rebound hardness of the rock", "MPa", ("rebound",))]\n'
-)
+LINES = {
+    "failure": '        Quantity("hardness", "Rebound hardness of the rock", "MPa", '
+    'input=Input(aliases=("rebound",))),\n',
+    "measures": '        Quantity("csi_g", "Characteristic intensity", "g", "CI", NOT_NEGATIVE, '
+    'Input(), measure=Measure(power=1), credible=(0.0, 5.0, "larger than ever recorded")),\n',
+}
+"""A line by the group of quantities that it is added to."""
 
 ASKED = """
 import json, sys
 import numpy as np
 import rbfrag
-from rbfrag.question.fields import declared
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.db.location import REFERENCE
@@ -41,23 +44,22 @@ print(json.dumps({
 
 @pytest.fixture(scope="module")
 def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the package with one more line, which declares a field; its folder."""
+    """A copy of the package with two more lines, an input and an intensity measure; its folder."""
     folder = tmp_path_factory.mktemp("declared")
     package = folder / "rbfrag"
     package.mkdir()
     for each in PACKAGE.iterdir():
-        if each.name != "question":
+        if each.name != "vocabulary":
             (package / each.name).symlink_to(each)
-    (package / "question").mkdir()
-    for each in (PACKAGE / "question").glob("*.*"):
+    (package / "vocabulary").mkdir()
+    for each in (PACKAGE / "vocabulary").glob("*.*"):
         text = each.read_text(encoding="utf-8")
-        if each.name == "fields.py":
-            head, mark, rest = text.partition(
-                '"""What may be said of a block: numbers, or its sides and planes."""\n'
-            )
-            assert mark
-            text = f"{head}{mark}\n{DECLARED}{rest}"
-        (package / "question" / each.name).write_text(text, encoding="utf-8")
+        if each.name == "quantities.py":
+            for group, line in LINES.items():
+                head, mark, rest = text.partition(f'    "{group}": (\n')
+                assert mark
+                text = f"{head}{mark}{line}{rest}"
+        (package / "vocabulary" / each.name).write_text(text, encoding="utf-8")
     return folder
 
 
@@ -91,6 +93,31 @@ def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
     (copied / "blocks.csv").write_text("p2,kr,PGV [cm/s],Rebound [MPa]\n3,0.1,60,40\n")
     told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "blocks.csv")
     assert "column ignored: Rebound [MPa]" in told
+
+
+MEASURED = """
+import json, rbfrag
+from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, MEASURES
+single = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, csi_g=7.0)
+print(json.dumps({
+    "warnings": single.warnings, "help": rbfrag.predict.__doc__, "power": AMPLIFIED["csi_g"],
+    "known": "csi_g" in MEASURES and "csi_g" in CREDIBLE,
+}))
+"""
+
+
+def test_a_measure_is_a_line_too(copied: Path) -> None:
+    answer = json.loads(run(copied, "-c", MEASURED))
+    assert answer["known"]
+    assert answer["power"] == 1
+    assert any("csi_g was not used" in text for text in answer["warnings"])
+    assert "csi_g = 7 g is larger than ever recorded" in answer["warnings"]
+    assert "``csi_g``: Characteristic intensity [g]." in answer["help"]
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--help")
+    assert "--csi" in told
+    (copied / "csi.csv").write_text("p2,kr,PGV [cm/s],csi [%g]\n3,0.1,60,40\n")
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "csi.csv", "--json")
+    assert "csi" in told
 
 
 def test_the_data_dictionary_knows_it(copied: Path) -> None:

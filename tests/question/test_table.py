@@ -10,11 +10,11 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
-from rbfrag.question.fields import column_of, columns_declared, declared
 from rbfrag.question.question import predict
 from rbfrag.question.table import columns_in, field_of, header_of, header_row
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
+from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, column_of
 
 
 @pytest.mark.parametrize(
@@ -49,8 +49,8 @@ def test_a_column_states_a_field_under_any_of_its_names(
 
 def test_no_name_stands_for_two_fields() -> None:
     owners: dict[str, str] = {}
-    for name in columns_declared():
-        for each in {name, column_of(name), *declared()[name].others}:
+    for name in COLUMNS:
+        for each in {name, column_of(name), *INPUTS[name].aliases}:
             assert owners.setdefault(each, name) == name, each
 
 
@@ -69,12 +69,12 @@ def test_no_name_stands_for_two_fields() -> None:
 )
 def test_what_cannot_be_meant_is_refused(header: list[str], words: str) -> None:
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
-        columns_in(header, "blocks.csv", columns_declared())
+        columns_in(header, "blocks.csv", COLUMNS)
 
 
 def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewhere() -> None:
     header = ["height_m", "width_m", "dip direction", "note"]
-    stated = columns_in(header, "blocks.csv", columns_declared())
+    stated = columns_in(header, "blocks.csv", COLUMNS)
     with pytest.raises(InputError, match="'dip direction' is not understood and may be the dip of"):
         stated.check_unused("blocks.csv", stated.columns)
     # of a block given by its numbers the dip does not matter
@@ -83,7 +83,7 @@ def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewh
     (warning,) = stated.ignored(header, ("height_m", "width_m"))
     assert warning == "columns ignored: dip direction, note"
     assert warning.code == "ignored_columns"
-    left_out = columns_in(header, "blocks.csv", columns_declared(), ["dip direction"])
+    left_out = columns_in(header, "blocks.csv", COLUMNS, ["dip direction"])
     left_out.check_unused("blocks.csv", left_out.columns)
 
 
@@ -99,12 +99,12 @@ def test_columns_of_an_earlier_answer_are_named_as_ignored(tmp_path: Path) -> No
 
 
 def test_losses_are_in_any_currency() -> None:
-    stated = columns_in(["loss [EUR]", "weight (t)"], "a.csv", columns_declared())
+    stated = columns_in(["loss [EUR]", "weight (t)"], "a.csv", COLUMNS)
     assert [stated.columns[name].factor for name in ("loss", "weight")] == [1.0, 1.0]
 
 
 def test_a_name_for_a_column_states_its_field_and_unit() -> None:
-    for name in columns_declared():
+    for name in COLUMNS:
         assert columns_in([header_of(name)], "a.csv", [name]).columns[name].factor == 1.0
 
 

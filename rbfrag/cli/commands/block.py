@@ -17,7 +17,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import MeshOptions
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import block_in_words
-from rbfrag.question.fields import AtRestFields, JointFields, PlaneFields, ShapeFields, WholeFields
+from rbfrag.vocabulary.quantities import AT_REST, JOINT, PLANES, SHAPE, WHOLE
 
 FREE_STANDING = (
     "rbfrag predict --kind rocking  with the same options and a measure of the motion (--pgv 0.6) "
@@ -36,14 +36,7 @@ def block(
     *,
     given: Annotated[
         Given,
-        fields_of(
-            ShapeFields,
-            PlaneFields,
-            JointFields,
-            WholeFields,
-            AtRestFields,
-            without=("kind", "phi_residual_deg"),
-        ),
+        fields_of(*SHAPE, *PLANES, *JOINT, *WHOLE, *AT_REST, without=("kind", "phi_residual_deg")),
     ],
     mesh: MeshOptions,
     plot: str | None = option(

@@ -20,7 +20,7 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import critical_in_words, slides_in_words
 from rbfrag.errors import InputError
-from rbfrag.question.fields import JointFields, PlaneFields, ShapeFields, WholeFields
+from rbfrag.vocabulary.quantities import JOINT, PLANES, SHAPE, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -59,7 +59,7 @@ def critical(
     motion: options.Motion,
     given: Annotated[
         Given,
-        fields_of("p2", ShapeFields, PlaneFields, JointFields, WholeFields, without=("kind",)),
+        fields_of("p2", *SHAPE, *PLANES, *JOINT, *WHOLE, without=("kind",)),
     ],
     direction: options.Direction,
     reading: options.ReadingOptions,

@@ -11,7 +11,7 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
-from rbfrag.question.fields import AnsweringFields
+from rbfrag.vocabulary.quantities import ANSWERING
 
 if TYPE_CHECKING:
     from rbfrag.exchange.export import ExportAnswer
@@ -21,7 +21,7 @@ app = command_group(
     "Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml",
 )
 
-Answering = Annotated[Given, fields_of(AnsweringFields, without=("level",))]
+Answering = Annotated[Given, fields_of(*ANSWERING, without=("level",))]
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
 

@@ -23,9 +23,9 @@ from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stac
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import model_in_words
 from rbfrag.hazards.report import range_in_words, rate_in_words
-from rbfrag.question.fields import BlockFields, WholeFields
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.results.numbers import confidence, percent, return_period
+from rbfrag.vocabulary.quantities import BLOCK, QUANTITIES, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -87,7 +87,7 @@ def hazard(
         "logic tree.",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     blocks: BlocksOptions,
     meaning: options.Curve,
     answering: options.Answering,
@@ -282,7 +282,7 @@ def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
     from rbfrag.hazards.report import shares_between
 
-    unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
+    unit = QUANTITIES[answer.measure].unit
     levels, imt, parts = curve.levels, curve.imt, shares_between(answer, curve.levels)
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]

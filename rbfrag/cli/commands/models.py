@@ -34,7 +34,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     """
     from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
-    from rbfrag.question.fields import word_of
+    from rbfrag.vocabulary.quantities import word_of
 
     listed = model_list(stored_rows(db))
     if json:

@@ -19,14 +19,7 @@ from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    JointFields,
-    PlaneFields,
-    ShapeFields,
-    SpaceFields,
-    WholeFields,
-    names_of,
-)
+from rbfrag.vocabulary.quantities import JOINT, PLANES, SHAPE, SPACE, WHOLE
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -213,9 +206,7 @@ def plot_spectrum(
 def plot_response(
     motion: options.Motion,
     out: Out,
-    given: Annotated[
-        Given, fields_of("p2", "kr", ShapeFields, PlaneFields, JointFields, WholeFields)
-    ],
+    given: Annotated[Given, fields_of("p2", "kr", *SHAPE, *PLANES, *JOINT, *WHOLE)],
     direction: options.Direction,
     reading: options.ReadingOptions,
     db: options.Db = None,
@@ -242,7 +233,7 @@ def plot_response(
 @stacked
 def plot_planes(
     *,
-    planes: Annotated[Given, fields_of(SpaceFields)],
+    planes: Annotated[Given, fields_of(*SPACE)],
     out: Out,
 ) -> None:
     """Draw base, back and face of a block on a stereonet: lower hemisphere, equal area.
@@ -277,9 +268,7 @@ def plot_modes(
     *,
     planes: Annotated[
         Given,
-        fields_of(
-            PlaneFields, "back_fracture", "s1_m", JointFields, "cohesion_pa", "density_kg_m3"
-        ),
+        fields_of(*PLANES, "back_fracture", "s1_m", *JOINT, "cohesion_pa", "density_kg_m3"),
     ],
     out: Out,
     ended: Ultimate,
@@ -340,7 +329,7 @@ def plot_modes(
 def plot_rotation(
     *,
     out: Out,
-    given: Annotated[Given, fields_of(ShapeFields, PlaneFields, WholeFields, without=("kind",))],
+    given: Annotated[Given, fields_of(*SHAPE, *PLANES, *WHOLE, without=("kind",))],
     back_follows: str = option(
         "Shares of the block's rotation by which the back plane turns with it, from 0 to 1.",
         "0,0.5,1",
@@ -360,7 +349,7 @@ def plot_rotation(
         block, planes, *_ = on_planes(without_kv(given))
     if not planes.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
-    for name in planes.keys() - {*names_of(PlaneFields)}:
+    for name in planes.keys() - {*PLANES}:
         text = f"{name} does not go with yields over a rotation, which follows a first slip"
         raise InputError(f"{text}: leave it out", fields=(name,))
     shares = options.number_list(back_follows, "--back-follows")

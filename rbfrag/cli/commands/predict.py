@@ -17,7 +17,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import answer_in_short, table_in_words
 from rbfrag.fragility.words import units_to_check
-from rbfrag.question.fields import BlockFields, RequestFields, WholeFields
+from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
 
 SHOWN = 40
 """So many rows of a table are printed."""
@@ -64,9 +64,9 @@ class BatchOptions:
 @stacked
 def predict(
     *,
-    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     measures: options.Shaking,
-    request: Annotated[Given, fields_of(RequestFields)],
+    request: Annotated[Given, fields_of(*REQUEST)],
     block_draws: options.BlockDraws = None,
     record: RecordOptions,
     reading: options.ReadingOptions,

@@ -15,8 +15,8 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.question.fields import BlockFields, RequestFields, WholeFields
 from rbfrag.results.diagnostic import diagnostics
+from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
 
@@ -57,9 +57,9 @@ def report(
     sheet: str | None = option(options.SHEET, metavar="NAME"),
     ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME"),
     out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
-    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     shaking: options.Shaking,
-    request: Annotated[Given, fields_of(RequestFields, without=("component",))],
+    request: Annotated[Given, fields_of(*REQUEST, without=("component",))],
     rate: Hazard,
     meaning: options.Curve,
     heading: Heading,

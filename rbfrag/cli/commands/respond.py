@@ -20,15 +20,8 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    FailureFields,
-    JointFields,
-    PlaneFields,
-    ScatterFields,
-    ShapeFields,
-    WholeFields,
-)
 from rbfrag.results.numbers import percent
+from rbfrag.vocabulary.quantities import FAILURE, JOINT, PLANES, SCATTER, SHAPE, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -136,12 +129,12 @@ def respond(
             "p2",
             "kr",
             "ky",
-            FailureFields,
-            ShapeFields,
-            PlaneFields,
-            JointFields,
-            ScatterFields,
-            WholeFields,
+            *FAILURE,
+            *SHAPE,
+            *PLANES,
+            *JOINT,
+            *SCATTER,
+            *WHOLE,
             without=("kind", "ks_sigma", "ps2_sigma", "kct_sigma", "pct2_sigma"),
         ),
     ],

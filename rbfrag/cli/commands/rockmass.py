@@ -152,7 +152,7 @@ def rockmass(
     the blocks of each mode for which there is a fragility model.
     """
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
-    from rbfrag.fragility.measures import SPECTRAL
+    from rbfrag.vocabulary.quantities import SPECTRAL
 
     check_files(table=files.out, plot=files.plot, excel_text=files.excel_text)
     ground = upward = None
@@ -243,10 +243,10 @@ def _print(document: dict[str, Any], *, verbose: bool) -> None:
 
 
 def _print_scenario(scenario: dict[str, Any]) -> None:
-    from rbfrag.fragility.measures import STATED
+    from rbfrag.vocabulary.quantities import INTENSITY
 
     print()
-    names = (*STATED, "model", "level")
+    names = (*INTENSITY, "model", "level")
     others = {f"model of {_words(mode)}": name for mode, name in scenario["other_models"].items()}
     print_pairs({**{name: scenario[name] for name in names if name in scenario}, **others})
     rows = [

@@ -18,8 +18,8 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.question.fields import BlockFields, WholeFields
 from rbfrag.results.numbers import rounded
+from rbfrag.vocabulary.quantities import BLOCK, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer
@@ -59,7 +59,7 @@ def survival(
         "USGS NSHM JSON, or CSV of two columns whose header names their units.",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(BlockFields, WholeFields)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     blocks: TableOptions,
     known: Uncertainty,
     meaning: options.Curve,

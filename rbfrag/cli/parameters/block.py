@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rbfrag.cli.parameters.options import CRS, EXCEL_TEXT, IGNORE_COLUMNS, SHEET, column_names
 from rbfrag.cli.parameters.stack import Given, option
 from rbfrag.errors import InputError
-from rbfrag.question.fields import column_of
+from rbfrag.vocabulary.quantities import column_of
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,17 +10,17 @@ import typer
 from rbfrag.cli.parameters.completion import motion_ids
 from rbfrag.cli.parameters.stack import Given, fields_of, option
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    AnsweringFields,
-    FailureFields,
-    MeasureFields,
-    NumberFields,
-    PlaneFields,
-    RangeFields,
-    ShakingFields,
-    ShapeFields,
-    WholeFields,
-    declared,
+from rbfrag.vocabulary.quantities import (
+    ANSWERING,
+    FAILURE,
+    INTENSITY,
+    NUMBERS,
+    PLANES,
+    QUANTITIES,
+    RANGE,
+    SHAKING,
+    SHAPE,
+    WHOLE,
     option_of,
 )
 
@@ -54,7 +54,7 @@ Json = Annotated[
 ]
 
 Db = Annotated[
-    str | None, typer.Option("--db", metavar="URL", help=declared()["db"].sentence(option_of))
+    str | None, typer.Option("--db", metavar="URL", help=QUANTITIES["db"].help(option_of))
 ]
 
 Motion = Annotated[
@@ -93,21 +93,19 @@ AllowPartial = Annotated[
 INCLUDE_STRUCTURES = "Use records of sensors on structures (flag structure), excluded by default."
 Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
 
-Block = Annotated[
-    Given, fields_of(NumberFields, FailureFields, ShapeFields, PlaneFields, WholeFields)
-]
+Block = Annotated[Given, fields_of(*NUMBERS, *FAILURE, *SHAPE, *PLANES, *WHOLE)]
 """One block of which all is known that is stated, by field."""
 
-Measures = Annotated[Given, fields_of(MeasureFields)]
+Measures = Annotated[Given, fields_of(*INTENSITY)]
 """What may be known of a motion, by field."""
 
-Shaking = Annotated[Given, fields_of(ShakingFields)]
+Shaking = Annotated[Given, fields_of(*SHAKING)]
 """The same, how well it is known, and what may stand for it."""
 
-Answering = Annotated[Given, fields_of(AnsweringFields)]
+Answering = Annotated[Given, fields_of(*ANSWERING)]
 """Which fragility model answers, and how wide its interval is, by field."""
 
-Ranging = Annotated[Given, fields_of(RangeFields)]
+Ranging = Annotated[Given, fields_of(*RANGE)]
 """The same, and what the range of one earthquake is of."""
 
 BlockDraws = Annotated[

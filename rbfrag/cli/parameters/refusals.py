@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    OTHER_WORDS,
-    PlaneFields,
-    ScatterFields,
-    ShakingFields,
-    ShapeFields,
-    names_of,
-    option_of,
-)
+from rbfrag.vocabulary import quantities
 
 
-def _options(*classes: Any) -> tuple[str, ...]:
-    """Return the options of the fields that classes declare, with all that they are called."""
-    names = names_of(*classes)
-    words = (word for word, name in OTHER_WORDS.items() if name in names)
-    return (*map(option_of, names), *(f"--{word}" for word in words))
+def _options(names: Collection[str]) -> tuple[str, ...]:
+    """Return the options of inputs, with all that they are called."""
+    words = (word for word, name in quantities.OTHER_WORDS.items() if name in names)
+    return (*map(quantities.option_of, names), *(f"--{word}" for word in words))
 
 
 NUMBERS = ("--p2", "--kr")
-SHAPE = _options(ShapeFields)
-PLANES = (*_options(PlaneFields), "--no-back")
+SHAPE = _options(quantities.SHAPE)
+PLANES = (*_options(quantities.PLANES), "--no-back")
 FRICTION = tuple(each for each in PLANES if each not in ("--beta", "--dip"))
-SIGMAS = _options(ScatterFields)
-MEASURES = _options(ShakingFields)
+SIGMAS = _options(quantities.SCATTER)
+MEASURES = _options(quantities.SHAKING)
 
 ONCE = "a block is described once"
 

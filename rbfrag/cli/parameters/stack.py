@@ -14,17 +14,17 @@ import typer
 from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.refusals import refuse
 from rbfrag.errors import InputError
-from rbfrag.question.fields import (
-    GROUPS,
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.vocabulary.quantities import (
+    INPUTS,
     OTHER_WORDS,
-    by_field,
-    declared,
+    PANELS,
+    QUANTITIES,
+    inputs_from,
     name_of,
-    names_of,
     option_of,
     word_of,
 )
-from rbfrag.results.diagnostic import Diagnostic
 
 
 def option(
@@ -96,34 +96,34 @@ class _WithComma(float):
 
 
 class FieldOptions(NamedTuple):
-    """Fields of a question, each of which is an option of a command.
+    """Inputs, each of which is an option of a command.
 
     Args:
-        classes: what declares them, or names of single ones.
+        names: the inputs.
         without: those of them that the command does not take.
     """
 
-    classes: tuple[Any, ...]
+    names: tuple[str, ...]
     without: tuple[str, ...] = ()
 
     def options(self) -> Iterator[inspect.Parameter]:
         """Yield the options, as typer reads them."""
-        for name in names_of(*self.classes):
+        for name in self.names:
             if name in self.without:
                 continue
-            about = declared()[name]
-            panel = next((group for group, of in GROUPS.items() if name in names_of(*of)), None)
+            about, type_ = QUANTITIES[name], INPUTS[name].type
+            panel = next((group for group, of in PANELS.items() if name in of), None)
             if name == "block":
                 for word, help in FILES.items():
                     own = option(help, metavar="FILE", rich_help_panel=panel)
                     yield _parameter(word, str | None, own)
                 continue
             further = {"rich_help_panel": panel, **FURTHER.get(name, {})}
-            kind = bool if about.is_flag else str | None if about.is_text else float | None
+            kind = bool if type_ is bool else str | None if type_ is str else float | None
             # the word that people say has the help
             *others, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
-            help = about.sentence(option_of)
-            own = option(help, False if about.is_flag else None, **further)
+            help = about.help(option_of)
+            own = option(help, False if type_ is bool else None, **further)
             yield _parameter(first, kind, own)
             for word in others:
                 other = option(f"Another word for --{first}.", rich_help_panel="Planes and joints")
@@ -132,7 +132,7 @@ class FieldOptions(NamedTuple):
     def read(self, words: Mapping[str, Any]) -> Given:
         """Return what was given, by field; of a block file what no option states anew."""
         files = [words[word] for word in FILES if words.get(word) is not None]
-        given = Given(by_field({name: words[name] for name in words if name not in FILES}))
+        given = Given(inputs_from({name: words[name] for name in words if name not in FILES}))
         for name, value in given.items():
             if isinstance(value, _WithComma):
                 note = f"{option_of(name)} {value.text} is {float(value):g}"
@@ -161,9 +161,9 @@ FURTHER: dict[str, dict[str, Any]] = {
 """What typer is told of fields beside their help."""
 
 
-def fields_of(*classes: Any, without: tuple[str, ...] = ()) -> FieldOptions:
-    """Return the options of the fields that classes declare, for `Annotated[Given, …]`."""
-    return FieldOptions(classes, without)
+def fields_of(*names: str, without: tuple[str, ...] = ()) -> FieldOptions:
+    """Return the options of inputs, for `Annotated[Given, …]`."""
+    return FieldOptions(names, without)
 
 
 class Stacked:
@@ -278,7 +278,7 @@ def read_plainly(command: Any) -> None:
 
 def _write_panels(command: Any, context: Any, formatter: Any) -> None:
     """Write the options of a command by what they are about, as their fields declare it."""
-    panels: dict[str, list[Any]] = {name: [] for name in ("Arguments", *GROUPS, "Options")}
+    panels: dict[str, list[Any]] = {name: [] for name in ("Arguments", *PANELS, "Options")}
     for each in command.get_params(context):
         if record := each.get_help_record(context):
             kind = f"{each.param_type_name}s".capitalize()
@@ -308,7 +308,7 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
         from rbfrag.question.table import number_with_unit
 
         wanted = _NEEDS[kind]
-        about = declared().get(name_of(parameter.name)) if kind is float else None
+        about = QUANTITIES.get(name_of(parameter.name)) if kind is float else None
         read = None if about is None else number_with_unit(value, about.unit)
         if about is not None and read is not None:
             typed = _WithComma(read)

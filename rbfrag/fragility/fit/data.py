@@ -21,10 +21,11 @@ from rbfrag.errors import FitError
 from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
-from rbfrag.fragility.measures import STATED, Term
+from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -429,7 +430,10 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
-    return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in STATED}}
+    return {
+        "xp_m_s": source.xp_m_s,
+        **{name: getattr(table, name) for name in INTENSITY if QUANTITIES[name].stored},
+    }
 
 
 def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

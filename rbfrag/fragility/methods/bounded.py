@@ -26,9 +26,10 @@ from functools import partial
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.measures import SPECTRAL, spectral_velocity_m_s
+from rbfrag.fragility.measures import spectral_velocity_m_s
 from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear, log_strength
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 Values = Mapping[str, Any]
 

@@ -17,9 +17,10 @@ from rbfrag.fragility.shaking_points import ShakingPoints
 from rbfrag.fragility.uncertain import UncertainModel
 from rbfrag.hazards.maps.site_shaking import SiteShaking
 from rbfrag.question.components import Component
-from rbfrag.question.fields import AnsweringFields, V
-from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
+from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
+from rbfrag.question.keywords import LEVEL, model_for, parts_of
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 Indices = NDArray[np.intp]
 
@@ -95,7 +96,7 @@ def site_probability(
         question: the numbers of blocks that their one kind reads, NaN of an option for the
             blocks' own, and model, level and db as in :func:`rbfrag.predict`.
     """
-    given, answering = parts_of(numbers, question, BlockKeywords, AnsweringFields)
+    given, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
     kind, level = given.pop("kind", None), answering.get("level", LEVEL)
     shaking = SiteShaking.of(
         measures, component, std_ln or {}, model_for(answering, (*given, *measures), kind)

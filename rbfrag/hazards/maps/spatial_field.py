@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import SPECTRAL
 
 Indices = NDArray[np.intp]
 

@@ -14,7 +14,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.fragility import words
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.measures import STATED, TERMS
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.annual_rate import probability_in
@@ -28,15 +28,7 @@ from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures,
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.question.blocks import Shape, shape_of
 from rbfrag.question.document import answer_block
-from rbfrag.question.fields import (
-    BlockFields,
-    RangeFields,
-    RequestFields,
-    ShakingFields,
-    WholeFields,
-    names_of,
-    word_of,
-)
+from rbfrag.question.fields import RangeFields
 from rbfrag.question.question import OF_SHAKING, described, without_water
 from rbfrag.question.words import number_in_words
 from rbfrag.results.diagnostic import diagnostics
@@ -45,6 +37,15 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
+from rbfrag.vocabulary.quantities import (
+    BLOCK,
+    INTENSITY,
+    QUANTITIES,
+    REQUEST,
+    SHAKING,
+    WHOLE,
+    word_of,
+)
 
 SYMBOL = re.compile(r"\b([kp])_([a-z])(?![a-z_])")
 """A symbol with its index, k_r for example."""
@@ -145,15 +146,15 @@ def contents_of(
     Raises:
         InputError: a question that cannot be answered.
     """
-    options = {name: given[name] for name in ("kind", *names_of(RequestFields)) if name in given}
+    options = {name: given[name] for name in ("kind", *REQUEST) if name in given}
     inputs = {name: value for name, value in given.items() if name not in options}
     how: dict[str, Any] = {**options, **answering}
     document, read = answer_block(inputs, **how)
     facts = facts_of(document["kind"])
-    shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in BLOCK})
+    shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in OF_BLOCK})
     numbers = {name: value for name, value in read.items() if name not in OF_SHAKING}
     medians = {n: about["median"] for n, about in (document["shaking"] or {}).items()}
-    measures = {name: value for name, value in read.items() if name in STATED} | medians
+    measures = {name: value for name, value in read.items() if name in INTENSITY} | medians
     model = find_model(document["model"], TERMS[document["term"]].inputs, how.get("db"))
     answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), how)
     if answered is not None and document["drained"] is not None:
@@ -189,8 +190,8 @@ def contents_of(
     )
 
 
-BLOCK = frozenset(names_of(BlockFields, WholeFields))
-OF_REQUEST = (*names_of(ShakingFields), "component", "mechanism", "gmm")
+OF_BLOCK = frozenset((*BLOCK, *WHOLE))
+OF_REQUEST = (*SHAKING, "component", "mechanism", "gmm")
 """Fields of the shaking that a report prints as they were given."""
 
 
@@ -435,8 +436,8 @@ def _block_rows(
     if y_m_s is not None and of.size is not None:
         first = "toppling velocity" if facts.mode == "topple" else "velocity"
         k, p = (
-            words.SYMBOLS.get(of.strength, of.strength),
-            words.SYMBOLS.get(of.size, of.size).rstrip("²"),
+            QUANTITIES[of.strength].symbol,
+            QUANTITIES[of.size].symbol.rstrip("²"),
         )
         rows.append((f"{first}, y = {k} g/{p}", f"{y_m_s:.3g} m/s"))
     return tuple(rows)

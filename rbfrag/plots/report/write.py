@@ -16,8 +16,9 @@ from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import RateQuestion, Report, report_of
 from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
-from rbfrag.question.fields import RangeFields, ShakingFields, SourceFields
-from rbfrag.question.keywords import BlockKeywords, parts_of
+from rbfrag.question.fields import BlockKeywords, RangeFields, ShakingFields, SourceFields
+from rbfrag.question.keywords import parts_of
+from rbfrag.vocabulary.quantities import BLOCKS, RANGE, SHAKING, SOURCE
 
 SUFFIXES = (".pdf", ".png", ".html")
 """Forms of a report."""
@@ -76,7 +77,12 @@ def report(
         UnknownFieldError: a keyword that is none.
     """
     block, shaking, spectrum, meaning = parts_of(
-        (), question, BlockKeywords, _Scenario, _Spectrum, CurveKeywords
+        (),
+        question,
+        BLOCKS,
+        (*SHAKING, *SOURCE, *RANGE, "rotation_deg"),
+        ("sa_g",),
+        CurveKeywords.__optional_keys__,
     )
     given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     if (component := meaning.get("component")) is not None:

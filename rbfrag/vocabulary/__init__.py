@@ -1,0 +1,1 @@
+"""Every quantity once: name, label, unit, range, symbol, aliases, credible values, storage."""

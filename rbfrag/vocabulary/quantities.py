@@ -1,0 +1,670 @@
+"""The quantities, each declared once, in groups in the order of the help, and what they are called.
+
+One module, and plain classes, because each start of the program loads and makes all of it.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False  # that of `typing` would load it
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+
+class Limits:
+    """The values that a quantity may have; None for no such limit.
+
+    Args:
+        above: lower limit, excluded.
+        least: lower limit, included.
+        below: upper limit, excluded.
+        most: upper limit, included.
+    """
+
+    __slots__ = ("above", "below", "least", "most")
+
+    def __init__(
+        self,
+        above: float | None = None,
+        least: float | None = None,
+        below: float | None = None,
+        most: float | None = None,
+    ) -> None:
+        self.above, self.least, self.below, self.most = above, least, below, most
+
+    def holds(self, value: Any) -> Any:
+        """Return whether a number, or which of many, lies within; NaN does not."""
+        inside = value == value
+        if self.above is not None:
+            inside = inside & (value > self.above)
+        if self.least is not None:
+            inside = inside & (value >= self.least)
+        if self.below is not None:
+            inside = inside & (value < self.below)
+        if self.most is not None:
+            inside = inside & (value <= self.most)
+        return inside
+
+    @property
+    def words(self) -> str:
+        """The range in words."""
+        if self.above is not None and self.below is not None:
+            return f"between {self.above:g} and {self.below:g}"
+        high = "" if self.below is None else f"below {self.below:g}"
+        if self.most is not None:
+            high = f"up to {self.most:g}"
+        if self.above is not None:
+            return f"above {self.above:g} and {high}" if high else f"above {self.above:g}"
+        if self.least is not None:
+            least = f"{self.least:g}"
+            return f"from {least} to {high.removeprefix('up to ')}" if high else f"at least {least}"
+        return high
+
+
+ANY, POSITIVE, NOT_NEGATIVE = Limits(), Limits(above=0.0), Limits(least=0.0)
+
+
+class Input:
+    """How a quantity is given.
+
+    Args:
+        detail: what its help adds to the label; names in braces stand for their spelling in an
+            interface.
+        aliases: further names of its column, in small letters and without a unit.
+        column: its column in tables that are written; empty for its name.
+        word: what people call it; empty for its name without the unit.
+        type: float, str, or bool for a truth value that is true unless it is given.
+    """
+
+    __slots__ = ("aliases", "column", "detail", "type", "word")
+
+    def __init__(
+        self,
+        detail: str = "",
+        aliases: tuple[str, ...] = (),
+        *,
+        column: str = "",
+        word: str = "",
+        type: type = float,
+    ) -> None:
+        self.detail, self.aliases, self.column = detail, aliases, column
+        self.word, self.type = word, type
+
+
+class Measure:
+    """What makes a quantity an intensity measure.
+
+    Args:
+        title: name for people where that is not the symbol.
+        axis: label of an axis, without the unit; empty where no curve runs over it.
+        power: exponent of the amplitude of the shaking that it grows with; 0 for none.
+        period_s: oscillator period of a spectral acceleration [s].
+        imt: intensity measure type of OpenQuake; empty for none.
+        imt_factor: unit of that type in the unit of the quantity.
+        rank: position by skill among the measures that a shipped model reads alone; 0 for none.
+        uncertain: whether the standard deviation of its logarithm may be given.
+        top: strongest shaking that fragility functions for other tools cover.
+        largest: value beyond which the unit of a grid of shaking must be wrong.
+    """
+
+    __slots__ = (
+        "axis", "imt", "imt_factor", "largest", "period_s", "power", "rank", "title", "top",
+        "uncertain",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        title: str = "",
+        axis: str = "",
+        *,
+        power: int = 0,
+        period_s: float | None = None,
+        imt: str = "",
+        imt_factor: float = 1.0,
+        rank: int = 0,
+        uncertain: bool = False,
+        top: float | None = None,
+        largest: float | None = None,
+    ) -> None:
+        self.title, self.axis, self.power, self.period_s = title, axis, power, period_s
+        self.imt, self.imt_factor, self.rank, self.uncertain = imt, imt_factor, rank, uncertain
+        self.top, self.largest = top, largest
+
+
+class Quantity:
+    """One quantity.
+
+    Args:
+        name: name in Python, JSON and the database, with its unit.
+        label: what it is.
+        unit: its unit; empty for a pure number or a text.
+        symbol: its symbol in formulas.
+        range: the values that it may have.
+        input: how it is given; None where it is not.
+        credible: least and greatest credible value, and what is said of others.
+        prompt: what is to be given in place of a wrong value; empty for what label and unit say.
+        measure: what makes it an intensity measure; None where it is none.
+        stored: its meaning as a column of the database; empty where it is none.
+    """
+
+    __slots__ = (
+        "_prompt", "credible", "input", "label", "measure", "name", "range", "stored", "symbol",
+        "unit",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        name: str,
+        label: str,
+        unit: str = "",
+        symbol: str = "",
+        range: Limits = ANY,
+        input: Input | None = None,
+        *,
+        credible: tuple[float, float, str] | None = None,
+        prompt: str = "",
+        measure: Measure | None = None,
+        stored: str = "",
+    ) -> None:
+        self.name, self.label, self.unit, self.symbol = name, label, unit, symbol
+        self.range, self.input, self.credible = range, input, credible
+        self._prompt, self.measure, self.stored = prompt, measure, stored
+
+    @property
+    def noun(self) -> str:
+        """What it is, in a few words that continue a sentence: "dip of the base"."""
+        text = self.label
+        for mark in ",;(":
+            text = text.partition(mark)[0]
+        text = text.rpartition(": ")[2].strip()
+        return f"{text[:1].lower()}{text[1:]}".removeprefix("the ")
+
+    @property
+    def prompt(self) -> str:
+        """What is to be given in place of a wrong value."""
+        limit = "0 or more" if self.range.above is None else f"above {self.range.above:g}"
+        return self._prompt or f"the {self.noun} in {self.unit}, {limit}"
+
+    def help(self, spell: Callable[[str], str]) -> str:
+        """Return what it is, with its unit and the names of others as an interface spells them."""
+        detail = "" if self.input is None else self.input.detail
+        text = f"{self.label}{', ' if detail and detail[0] not in ';( ' else ''}{detail}"
+        text = text.format_map(_Spelling(spell))
+        return f"{text} [{self.unit}]." if self.unit else f"{text}."
+
+
+class _Spelling(dict[str, str]):
+    """Names as an interface spells them, made when they are asked for."""
+
+    def __init__(self, spell: Callable[[str], str]) -> None:
+        super().__init__()
+        self._spell = spell
+
+    def __missing__(self, name: str) -> str:
+        return self._spell(name)
+
+
+_SLOPE, _FRICTION = Limits(above=-90.0, below=90.0), Limits(least=0.0, below=90.0)
+_STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
+_SIGMA = "a standard deviation of a logarithm, 0 or more"
+_SAMPLES = "missing where the database was upgraded without the samples"
+
+
+def _block_scatter(name: str, logarithm: str) -> Quantity:
+    return Quantity(
+        name, f"Standard deviation of {logarithm} of what the block may be", range=NOT_NEGATIVE,
+        input=Input(),
+        prompt=f"the standard deviation of ln {name.removesuffix('_sigma')}, 0 or more",
+    )  # fmt: skip
+
+
+def _deviation(name: str, measure: str) -> Quantity:
+    detail = Input("of which the median is stated")
+    label = f"Standard deviation of ln {measure}"
+    return Quantity(name, label, range=NOT_NEGATIVE, input=detail, prompt=_SIGMA)
+
+
+def _stored_spectral(name: str, period_s: float) -> Quantity:
+    meaning = f"pseudo-spectral acceleration at {period_s:g} s, 5 % damping; {_SAMPLES}"
+    label, symbol = f"Spectral acceleration at {period_s:.1f} s", f"SA({period_s:g} s)"
+    return Quantity(name, label, "g", symbol, measure=Measure(period_s=period_s), stored=meaning)
+
+
+def _spectral(name: str, period_s: float, credible: float, rank: int = 0) -> Quantity:
+    imt, stored = f"SA({period_s:.1f})", _stored_spectral(name, period_s)
+    aliases = (name.partition("_")[0], imt.lower(), f"sa_{period_s:.1f}")
+    return Quantity(
+        name, stored.label, "g", stored.symbol, NOT_NEGATIVE, Input("5 % damping", aliases),
+        credible=(0.0, credible, "larger than ever recorded (it is in g): is it in g?"),
+        prompt=f"the spectral acceleration at {period_s:g} s and 5 % damping in g, 0 or more",
+        measure=Measure(
+            axis=f"spectral acceleration, SA({period_s:.1f} s), 5 % damping", power=1,
+            period_s=period_s, imt=imt, rank=rank, uncertain=True, top=10.0, largest=10.0,
+        ),
+        stored=stored.stored,
+    )  # fmt: skip
+
+
+# fmt: off
+GROUPS: dict[str, tuple[Quantity, ...]] = {
+    "numbers": (
+        Quantity("p2", "Frequency parameter p² of the block", "1/s²", "p²", POSITIVE,
+            Input(aliases=("p²", "p^2"), column="p2_1_s2"),
+            prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"),
+        Quantity("kr", "Rocking acceleration coefficient k_r = tan(critical angle)", "", "k_r",
+            input=Input("with {p2}", ("k_r",)),
+            credible=(
+                0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees",
+            ),
+            prompt="the block's yield acceleration coefficient at rest, tan(critical angle) (a "
+            "block with k_r <= 0 falls without an earthquake)"),
+        Quantity("ky", "Sliding: yield acceleration coefficient tan(phi - beta)", "", "k_y",
+            input=Input("with {beta_deg}", ("k_y",)), credible=(0.0, 5.0, _STEEP),
+            prompt="the block's yield acceleration coefficient of sliding, tan(phi - beta) (a "
+            "block with k_y <= 0 slides without an earthquake)"),
+        Quantity("ks", "Slumping: yield acceleration coefficient k_s", "", "k_s",
+            input=Input("with {ps2}", ("k_s",)), credible=(0.0, 5.0, _STEEP),
+            prompt="the block's yield acceleration coefficient of slumping (a block with k_s <= "
+            "0 slumps without an earthquake)"),
+        Quantity("ps2", "Slumping: frequency parameter p_s² at rest", "1/s²", "p_s²", POSITIVE,
+            Input(column="ps2_1_s2"),
+            prompt="p_s², the squared frequency parameter of slumping at rest"),
+        Quantity("kct", "Confined toppling: yield acceleration coefficient k_ct", "", "k_ct",
+            input=Input("with {pct2}", ("k_ct",)), credible=(0.0, 5.0, _STEEP),
+            prompt="the block's yield acceleration coefficient of confined toppling (a block "
+            "with k_ct <= 0 topples without an earthquake)"),
+        Quantity("pct2", "Confined toppling: frequency parameter p_ct² at rest", "1/s²", "p_ct²",
+            POSITIVE, Input(column="pct2_1_s2"), prompt="p_ct², the squared frequency parameter "
+            "of confined toppling at rest"),
+    ),
+    "failure": (
+        Quantity("displacement_m", "Sliding: the displacement that is too far", "m", range=POSITIVE,
+            input=Input(aliases=("displacement",)),
+            prompt="the displacement that is too far in m, above 0"),
+        Quantity("restitution", "Rocking: speed after an impact over that before it",
+            range=Limits(above=0.0, most=1.0),
+            input=Input("above 0 and up to 1; default: what angular momentum leaves"),
+            prompt="the speed after an impact over that before it, above 0 and up to 1"),
+    ),
+    "shape": (
+        Quantity("height_m", "Height of a rectangle", "m", range=POSITIVE,
+            input=Input("perpendicular to its base, with {width_m}", ("height", "h"))),
+        Quantity("width_m", "Width of a rectangle along its base", "m", range=POSITIVE,
+            input=Input("with {height_m}", ("width", "w", "b"))),
+        Quantity("alpha1_deg", "Angle from the normal of the base to the line centroid-heel", "deg",
+            range=_SLOPE, input=Input("with {alpha3_deg} and {r3_m}", ("alpha1", "α1"))),
+        Quantity("alpha3_deg", "The same angle of the toe", "deg", range=_SLOPE,
+            input=Input(aliases=("alpha3", "α3"))),
+        Quantity("r3_m", "Distance from centroid to toe", "m", range=POSITIVE,
+            input=Input(aliases=("r3",))),
+        Quantity("s1_m", "Spacing of the base fractures", "m", range=POSITIVE,
+            input=Input("with {s2_m} and {gamma_deg}", ("s1",))),
+        Quantity("s2_m", "Spacing of the back fractures", "m", range=POSITIVE,
+            input=Input(aliases=("s2",))),
+        Quantity("gamma_deg", "Dip of the back plane less dip of the base", "deg",
+            range=Limits(above=0.0, below=180.0), input=Input(aliases=("gamma",))),
+    ),
+    "planes": (
+        Quantity("beta_deg", "Dip of the base", "deg", range=_SLOPE,
+            input=Input("out of the slope positive; a rectangle's is 0 if not given",
+            ("beta", "dip", "dip_deg", "dip_angle", "β", "base_dip"), column="dip_deg"),
+            prompt="the dip of the base in degrees, out of the slope positive"),
+        Quantity("phi_deg", "Friction angle of the base", "deg", range=_FRICTION,
+            input=Input("; only a rectangle is assumed to topple without",
+            ("phi", "φ", "friction", "friction_angle"))),
+        Quantity("phi_back_deg", "Friction angle of the back plane", "deg", range=_FRICTION,
+            input=Input("; default: that of the base", ("phi_back",))),
+    ),
+    "joint": (
+        Quantity("water_m", "Height of the water in the back fracture above the heel", "m",
+            range=NOT_NEGATIVE, input=Input("with {density_kg_m3}", ("water", "water_level"))),
+        Quantity(
+            "jrc", "Joint roughness coefficient of the base", range=Limits(least=0.0, most=20.0),
+            input=Input("of samples of 10 cm, with {jcs_mpa} and {density_kg_m3}; {phi_deg} is "
+            "then the residual friction angle")),
+        Quantity("jcs_mpa", "Compressive strength of the walls of the base", "MPa", range=POSITIVE,
+            input=Input("of samples of 10 cm", ("jcs",), word="jcs")),
+        Quantity("joint_length_m", "Length of the joint that shears as one", "m", range=POSITIVE,
+            input=Input("; default: that of the base", ("joint_length",))),
+        Quantity("phi_residual_deg", "Friction angle of base and back that is left after the first "
+            "slip", "deg", range=_FRICTION,
+            input=Input("which ends cohesion and roughness", ("phi_residual",))),
+    ),
+    "block scatter": (
+        _block_scatter("p2_sigma", "ln p²"),
+        _block_scatter("kr_sigma", "ln k_r"),
+        _block_scatter("ky_sigma", "ln k_y"),
+        _block_scatter("ks_sigma", "ln k_s"),
+        _block_scatter("ps2_sigma", "ln p_s²"),
+        _block_scatter("kct_sigma", "ln k_ct"),
+        _block_scatter("pct2_sigma", "ln p_ct²"),
+        Quantity(
+            "restitution_sigma", "Standard deviation of the restitution of what the block may be",
+            range=NOT_NEGATIVE, input=Input(),
+            prompt="the standard deviation of the restitution, 0 or more"),
+    ),
+    "space": (
+        Quantity("base", "Plane of the base as dip/dip direction in deg",
+            input=Input("25/102, with {face}, instead of {beta_deg}", type=str)),
+        Quantity(
+            "back", "Plane of the back likewise", input=Input("with {s1_m} and {s2_m} along the "
+            "normals of the planes, instead of {gamma_deg}", type=str)),
+        Quantity("face", "Plane of the slope's face likewise: its dip direction is the section",
+            input=Input(type=str)),
+    ),
+    "whole": (
+        Quantity("block", "A block by its corners", input=Input("a rbfrag.Block")),
+        Quantity("back_fracture", "There is no fracture behind the block",
+            input=Input(word="no_back", type=bool)),
+        Quantity("drainage", "Drainage of the water in the back fracture",
+            input=Input(
+                "with {water_m}: undrained (its pressure keeps acting while the block moves) or "
+                "drained (it vanishes); default: undrained", type=str,
+            )),
+        Quantity("cohesion_pa", "Cohesion of the base", "Pa", range=NOT_NEGATIVE,
+            input=Input("with {density_kg_m3}")),
+        Quantity("density_kg_m3", "Density of the rock", "kg/m³", range=POSITIVE,
+            input=Input("; default: 2650", ("density",))),
+        Quantity(
+            "kind", "How the blocks fail: toppling", input=Input(" (backed by a slope), rocking "
+            "(free-standing), slumping, confined_toppling or sliding; default: what they are "
+            "given by", type=str)),
+    ),
+    "measures": (
+        Quantity("pgv_m_s", "Peak ground velocity", "m/s", "PGV", NOT_NEGATIVE,
+            Input(aliases=("pgv", "peak_ground_velocity")),
+            credible=(0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
+            measure=Measure(axis="peak ground velocity, PGV", power=1, imt="PGV", imt_factor=0.01,
+            rank=1, uncertain=True, top=5.0, largest=20.0),
+            stored="peak ground velocity, extreme of the exact integral"),
+        Quantity("pga_g", "Peak ground acceleration", "g", "PGA", NOT_NEGATIVE,
+            Input(aliases=("pga", "peak_ground_acceleration")),
+            credible=(
+                0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?",
+            ),
+            measure=Measure(axis="peak ground acceleration, PGA", power=1, imt="PGA", rank=3,
+            uncertain=True, top=5.0, largest=10.0),
+            stored="peak ground acceleration, max |a| over both signs"),
+        Quantity("tm_s", "Mean period", "s", "T_m", POSITIVE, Input(aliases=("tm", "mean_period")),
+            credible=(
+                0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?",
+            ),
+            measure=Measure("Tm"), stored="mean period of Rathje, Abrahamson and Bray (1998), "
+            "0.25 to 20 Hz; missing where it is not defined"),
+        Quantity("pgd_m", "Peak ground displacement", "m", "PGD", NOT_NEGATIVE,
+            Input(aliases=("pgd", "peak_ground_displacement")),
+            credible=(0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
+            measure=Measure(axis="peak ground displacement, PGD", power=1),
+            stored="peak ground displacement, extreme of the exact double integral"),
+        _spectral("sa03_g", 0.3, credible=10.0),
+        _spectral("sa10_g", 1.0, credible=10.0, rank=2),
+        _spectral("sa30_g", 3.0, credible=5.0),
+        Quantity(
+            "arias_m_s", "Arias intensity", "m/s", "I_a", NOT_NEGATIVE, Input("π/2g times ∫a² dt",
+            ("arias", "ia", "arias_intensity")),
+            credible=(0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
+            prompt="the Arias intensity in m/s, 0 or more",
+            measure=Measure("Arias intensity", power=2),
+            stored=f"Arias intensity, pi/(2 g) integral of a²; {_SAMPLES}"),
+        Quantity("magnitude", "Magnitude of the earthquake", "", "M", Limits(above=0.0, most=10.0),
+            Input(aliases=("mag", "mw", "moment_magnitude")),
+            credible=(3.0, 9.6, "not the magnitude of an earthquake that models are fitted to"),
+            prompt="the magnitude of the earthquake, above 0", measure=Measure("magnitude"),
+            stored="magnitude as the source gives it, scales not harmonised"),
+    ),
+    "scenario": (
+        _deviation("pgv_sigma", "PGV"),
+        _deviation("pga_sigma", "PGA"),
+        _deviation("sa03_sigma", "SA(0.3)"),
+        _deviation("sa10_sigma", "SA(1.0)"),
+        _deviation("sa30_sigma", "SA(3.0)"),
+        Quantity("pgv_tau", "Part of {pgv_sigma} that all sites of one earthquake share",
+            range=NOT_NEGATIVE, input=Input("for the range with {sites}"),
+            prompt=_SIGMA),
+        Quantity("rjb_km", "Distance from the surface projection of the rupture", "km",
+            range=NOT_NEGATIVE,
+            input=Input("instead of measures, with {magnitude} and {vs30_m_s}",
+            ("rjb", "r_jb", "joyner_boore_distance"))),
+        Quantity(
+            "vs30_m_s", "Mean velocity of shear waves in the upper 30 m", "m/s", range=POSITIVE,
+            input=Input(aliases=("vs30",))),
+        Quantity(
+            "amplification", "Factor on all measures for the shape of the ground", range=POSITIVE,
+            input=Input()),
+        Quantity(
+            "amplification_sigma", "Standard deviation of ln {amplification}", range=NOT_NEGATIVE,
+            input=Input(), prompt=_SIGMA),
+    ),
+    "record": (
+        Quantity("sa_g", "Spectral accelerations by their period in s", "g",
+            input=Input("as in {{1.0: 0.4}}")),
+        Quantity("motion", "The accelerogram itself or its file",
+            input=Input("instead of its measures")),
+        Quantity(
+            "polarity", "forward or reverse where it is known how the motion points at the slope",
+            input=Input("; both gives the mean of the two, which stand beside it (motion only)",
+            type=str)),
+    ),
+    "answering": (
+        Quantity(
+            "model", "Name of a stored model", input=Input("; default: the database's default if "
+            "the given measures suffice for it, else the best that they suffice for", type=str)),
+        Quantity("level", "Level of the interval of P", range=Limits(above=0.0, below=1.0),
+            input=Input("and of the range of one earthquake; default: 0.95")),
+        Quantity("db", "Database: a path or an SQLAlchemy URL",
+            input=Input("; default: RBFRAG_DB, else rbfrag.db in the current folder, else the "
+            "built-in data set", type=str)),
+    ),
+    "sites": (
+        Quantity("sites", "Number of sites shaken so in one earthquake: adds what share of such "
+            "blocks", range=Limits(least=1.0, most=10_000.0),
+            input=Input("facing all sides, fails there; default: one block, which falls or "
+            "stands")),
+    ),
+    "source": (
+        Quantity(
+            "mechanism", "How the fault moves", input=Input("with {rjb_km}: strike-slip, normal, "
+            "reverse or unspecified; default: unspecified", type=str)),
+        Quantity("gmm", "CSV table of medians and sigmas of another ground-motion model: rjb_km",
+            input=Input("pgv_m_s, pgv_sigma, pgv_tau and the like, a row a distance", type=str)),
+    ),
+    "component": (
+        Quantity("component", "Horizontal component of the measures of shaking: single",
+            input=Input("geometric_mean, rotd50, rotd100 or larger; default: single", type=str)),
+    ),
+    "request": (
+        Quantity("rotation_deg", "Slumping: rotation that counts as failure", "deg",
+            input=Input("of which there must be a model; default: failure past recovery")),
+    ),
+    "arrays": (
+        Quantity("nan", "propagate answers NaN with its reason where the input cannot be used",
+            input=Input("raise refuses such arrays", type=str)),
+        Quantity("interval", "False leaves interval and range out",
+            input=Input(" (their ends are then NaN), which takes less time")),
+        Quantity("weights", "Makes the arrays that describe the block draws of one block",
+            input=Input("of these weights (1: all the same): one answer, over all of them")),
+    ),
+    "at rest": (
+        Quantity("kv", "Vertical acceleration of the ground", "g", range=Limits(above=-1.0),
+            input=Input("up positive")),
+    ),
+    "names": (
+        Quantity("block_id", "Name of the block",
+            input=Input(aliases=("block", "name", "id"), type=str)),
+        Quantity("site_id", "Name of its site", input=Input(aliases=("site",), type=str)),
+    ),
+    "rows": (
+        Quantity("mode", "Its failure mode", input=Input(aliases=("failure_mode",), type=str)),
+        Quantity("lon", "Longitude", "deg", input=Input(aliases=("longitude",))),
+        Quantity("lat", "Latitude", "deg", input=Input(aliases=("latitude",))),
+        Quantity(
+            "x", "Place of the block in {crs}", input=Input("to the east", ("easting", "x_m"))),
+        Quantity("y", "Place likewise", input=Input("to the north", ("northing", "y_m"))),
+        Quantity("z", "Height of the place in {crs}", input=Input(aliases=("elevation", "z_m"))),
+        Quantity("crs", "Coordinate reference system", input=Input("as EPSG:2056", type=str)),
+        Quantity("strike_length_m", "Length of the block along the slope", "m", range=POSITIVE,
+            input=Input("for its volume", ("strike_length",))),
+        Quantity("count", "Number of like blocks", input=Input()),
+        Quantity("weight", "What a failure counts", input=Input()),
+        Quantity("loss", "What a failure costs", input=Input()),
+        Quantity("loss_sigma", "Standard deviation of the logarithm of the loss", input=Input()),
+    ),
+    "stored measures": (
+        _stored_spectral("sa05_g", 0.5),
+        _stored_spectral("sa20_g", 2.0),
+        Quantity("cav_m_s", "Cumulative absolute velocity", "m/s", "CAV", measure=Measure(),
+            stored=f"cumulative absolute velocity, integral of |a|; {_SAMPLES}"),
+        Quantity("d5_95_s", "Significant duration", "s", "D_5-95", measure=Measure(),
+            stored="significant duration, from 5 to 95 % of the Arias intensity; missing where "
+            "the ground is at rest, and as the measures before it"),
+    ),
+    "derived": (
+        Quantity("xp_m_s", "Toppling spectrum at the block's size", "m/s", "X(p)",
+            prompt="the toppling spectrum X(p) in m/s, 0 or more",
+            measure=Measure("toppling spectrum", "toppling spectrum at the block's size, $X(p)$")),
+        Quantity("intensity_m_s", "Intensity of the shaking", "m/s"),
+        Quantity("y_m_s", "Toppling velocity k_r g/p", "m/s", "y"),
+        Quantity("k_over_pga", "Strength over peak ground acceleration"),
+        Quantity("pgv_over_pga_s", "Peak ground velocity over peak ground acceleration", "s",
+            credible=(
+                0.005, 2.0, "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies "
+                "between 0.005 and 2 s): is PGV in m/s and PGA in g?",
+            )),
+    ),
+}
+# fmt: on
+
+QUANTITIES = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
+INPUTS = {name: each.input for name, each in QUANTITIES.items() if each.input is not None}
+MEASURES = {name: each.measure for name, each in QUANTITIES.items() if each.measure is not None}
+"""The quantities, those that can be given, and the intensity measures, by name."""
+
+
+def _names(*groups: str) -> tuple[str, ...]:
+    return tuple(quantity.name for group in groups for quantity in GROUPS[group])
+
+
+NUMBERS = _names("numbers")
+"""What a model of its kind reads of the shape of a block."""
+FAILURE = _names("failure")
+"""What a model reads of a block in addition to its numbers or its shape."""
+SHAPE = _names("shape")
+PLANES = _names("planes")
+JOINT = _names("joint")
+"""What ends with the first slip of a block, and what is left then."""
+SCATTER = _names("block scatter")
+"""How well a block is known: the median is given, and P is the mean over the rest."""
+BLOCK = (*NUMBERS, *FAILURE, *SHAPE, *PLANES, *JOINT, *SCATTER)
+SPACE = _names("space")
+"""Planes in space, as dip/dip direction."""
+WHOLE = _names("space", "whole")
+"""What holds for all blocks of a question."""
+BY_ROW = ("back_fracture", "cohesion_pa", "density_kg_m3")
+"""Those of them that a table may give row by row."""
+BLOCKS = (*BLOCK, *WHOLE)
+"""What the blocks of a question are."""
+INTENSITY = _names("measures")
+"""Intensity measures of one horizontal component."""
+SCENE = _names("scenario")
+"""How well measures are known, and what stands for them: the scenario and the site."""
+SCENARIO = frozenset({"rjb_km", "vs30_m_s", "amplification"})
+"""What is turned into measures before a model is asked."""
+SHAKING = (*INTENSITY, *SCENE)
+RECORD = _names("record")
+ANSWERING = _names("answering")
+"""Which model answers, and how wide its interval is."""
+RANGE = (*ANSWERING, *_names("sites"))
+SOURCE = _names("source")
+COMPONENT = _names("component")
+REQUEST = (*RANGE, *SOURCE, *COMPONENT, *_names("request"))
+ARRAYS = _names("arrays")
+QUESTION = (*BLOCKS, *SHAKING, *RECORD, *REQUEST, *ARRAYS)
+"""What :func:`rbfrag.predict` may be asked."""
+AT_REST = _names("at rest")
+ROW = (*_names("names"), "kind", *_names("rows"))
+"""What a row of a table holds in addition to its block and its shaking."""
+COLUMNS = tuple(
+    dict.fromkeys((*BLOCK, *SHAKING, *COMPONENT, *ROW, *SPACE, *BY_ROW, "mechanism", "drainage"))
+)
+"""What may be a column of a table."""
+
+PANELS = {
+    "First": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
+    "A block by its numbers": (*NUMBERS, *FAILURE),
+    "A block by its shape": ("block", *SHAPE),
+    "Planes and joints": (*PLANES, *JOINT, *WHOLE, *AT_REST),
+    "What the block may be": SCATTER,
+    "More of the shaking": (*INTENSITY, *COMPONENT, *RECORD),
+    "Earthquake, site and scatter of the shaking": (*SCENE, *SOURCE),
+    "What is asked": REQUEST,
+}
+"""Inputs by what they are about, a beginner's first; each belongs where it is found first."""
+
+SPECTRAL = {
+    measure.period_s: name
+    for name, measure in MEASURES.items()
+    if measure.period_s is not None and name in INPUTS
+}
+"""Spectral accelerations (5 % damping, one component) that can be given, by period [s]."""
+
+OTHER_WORDS = {"dip": "beta_deg"}
+"""Further words for inputs, which shell and requests accept, too."""
+
+_UNITS = ("_kg_m3", "_deg", "_m_s", "_pa", "_km", "_m", "_g", "_s")
+
+
+def column_of(name: str) -> str:
+    """Return what the column of an input is called in tables that are written."""
+    return INPUTS[name].column or name
+
+
+def word_of(name: str) -> str:
+    """Return what people call what has its unit in its name: ``beta`` of ``beta_deg``."""
+    if name in INPUTS and INPUTS[name].word:
+        return INPUTS[name].word
+    return name.removesuffix(next((unit for unit in _UNITS if name.endswith(unit)), ""))
+
+
+def option_of(name: str) -> str:
+    """Return what an input is called on the command line."""
+    return "--" + word_of(name).replace("_", "-")
+
+
+def parameter_of(name: str) -> str:
+    """Return what an input is called in requests: spectral accelerations as in tables."""
+    return name if name in SPECTRAL.values() else word_of(name)
+
+
+_BY_WORD = {parameter_of(name): name for name in INPUTS} | {
+    **{word_of(name): name for name in INPUTS},
+    **OTHER_WORDS,
+}
+
+
+def name_of(word: str) -> str:
+    """Return the input that people call so; the word itself where it is none."""
+    return _BY_WORD.get(word, word)
+
+
+def inputs_from(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return by name what was given in words of shell or requests; None and False are not given.
+
+    Raises:
+        InputError: two words for one input.
+    """
+    from rbfrag.errors import InputError
+
+    inputs: dict[str, Any] = {}
+    words_of: dict[str, str] = {}
+    for word, value in words.items():
+        name = name_of(word)
+        if value is None or (value is False and word != name):
+            continue
+        if name in inputs:
+            raise InputError(
+                f"{word} does not go with {words_of[name]}: both say the same",
+                fields=(word, words_of[name]),
+            )
+        words_of[name] = word
+        inputs[name] = False if INPUTS[name].type is bool and word != name else value
+    return inputs

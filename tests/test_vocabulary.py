@@ -1,0 +1,73 @@
+"""The vocabulary: what it loads, what types say of it, and that its facts stand nowhere else."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Collection
+
+import pytest
+
+from rbfrag.question import fields
+from rbfrag.vocabulary import quantities
+from rbfrag.vocabulary.quantities import INPUTS, MEASURES, QUANTITIES, name_of, option_of, word_of
+
+GROUPS: list[tuple[type, Collection[str]]] = [
+    (fields.NumberFields, quantities.NUMBERS),
+    (fields.FailureFields, quantities.FAILURE),
+    (fields.ShapeFields, quantities.SHAPE),
+    (fields.PlaneFields, quantities.PLANES),
+    (fields.SpaceFields, quantities.SPACE),
+    (fields.JointFields, quantities.JOINT),
+    (fields.ScatterFields, quantities.SCATTER),
+    (fields.BlockFields, quantities.BLOCK),
+    (fields.MeasureFields, quantities.INTENSITY),
+    (fields.ShakingFields, quantities.SHAKING),
+    (fields.SourceFields, quantities.SOURCE),
+    (fields.ComponentFields, quantities.COMPONENT),
+    (fields.WholeFields, quantities.WHOLE),
+    (fields.AtRestFields, quantities.AT_REST),
+    (fields.AnsweringFields, quantities.ANSWERING),
+    (fields.RangeFields, quantities.RANGE),
+    (fields.RequestFields, quantities.REQUEST),
+    (fields.RecordFields, quantities.RECORD),
+    (fields.ArrayFields, quantities.ARRAYS),
+    (fields.QuestionFields, quantities.QUESTION),
+    (fields.BlockKeywords, quantities.BLOCKS),
+]
+
+
+@pytest.mark.parametrize(("types", "names"), GROUPS, ids=lambda each: getattr(each, "__name__", ""))
+def test_types_are_declared_for_the_same_inputs(types: type, names: Collection[str]) -> None:
+    assert {*types.__annotations__} == {*names}
+
+
+def test_the_vocabulary_loads_no_library() -> None:
+    program = (
+        "import sys; before = set(sys.modules); import rbfrag.vocabulary.quantities; "
+        "print(*set(sys.modules) - before)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    loaded = set(done.stdout.split())
+    assert len(loaded) <= 40
+    assert not loaded & {"numpy", "typing", "re", "dataclasses"}
+
+
+def test_every_name_and_alias_means_one_quantity() -> None:
+    for name in INPUTS:
+        assert name_of(word_of(name)) == name
+        assert option_of(name).startswith("--")
+    aliases = [alias for each in INPUTS.values() for alias in each.aliases if alias != "block"]
+    assert len(aliases) == len({*aliases})
+
+
+def test_measures_have_a_range_and_a_unit() -> None:
+    for name in MEASURES:
+        assert QUANTITIES[name].unit or name == "magnitude"
+    for quantity in QUANTITIES.values():
+        if quantity.credible is not None:
+            low, high, hint = quantity.credible
+            assert low < high
+            assert hint
