@@ -70,7 +70,7 @@ def test_counts_by_something_else(refuses: Refuses) -> None:
 
 def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> None:
     found = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
-    assert "reference" in found["data"]
+    assert found["data"] == "the built-in data set"
     assert 0.0 < found["ci_low"] < found["probability"] < found["ci_high"] < 1.0
     assert found["in_domain"]
     more = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5")

@@ -98,10 +98,10 @@ def test_rubbish_is_refused(refuses: Refuses, suffix: str, content: bytes, tmp_p
     assert f"a.{suffix}" in refuses("block", "--mesh", f"a.{suffix}")
 
 
-def test_doubts_go_to_standard_error(shell: Shell, tmp_path: Path) -> None:
+def test_doubts_stand_below_the_answer(shell: Shell, tmp_path: Path) -> None:
     vertices, faces = box(0.4, 0.5, 1.1)
     write_obj(tmp_path / "a.obj", (1800.0 * vertices, faces[:, ::-1]))
     result = shell("block", "--mesh", "a.obj")
-    assert "1980 m across" in result.stderr
-    assert "12 of 12 faces pointed inwards and were turned" in result.stderr
+    assert "1980 m across" in result.stdout
+    assert "12 of 12 faces pointed inwards and were turned" in result.stdout
     assert "mass_kg          -" in result.stdout

@@ -78,8 +78,8 @@ def test_a_row_that_is_no_block_has_its_reason(shell: Shell, curve: Path, name: 
         "block_id,p2_1_s2,kr\nA7,3,0.1\nbad,x,0.1\nB2,10,0.3\nflat,3,-0.1\nshort,3\n"
     )
     done = shell("hazard", curve, "--blocks", "blocks.csv", "--out", name)
-    assert "3 of 5 blocks could not be used and are left out of all sums" in done.stderr
-    assert "the first is line 3 (block bad): p2_1_s2 = 'x' is not a number" in done.stderr
+    assert "3 of 5 blocks could not be used and are left out of all sums" in done.stdout
+    assert "the first is line 3 (block bad): p2_1_s2 = 'x' is not a number" in done.stdout
     names = ("annual_rate", "block_id", "reason")
     found = read_columns(name, names[:1], texts=names[1:])
     assert found["block_id"].tolist() == ["A7", "bad", "B2", "flat", "short"]

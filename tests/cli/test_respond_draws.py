@@ -32,7 +32,7 @@ def test_shares_are_those_of_python(shell: Shell) -> None:
     )  # fmt: skip
     assert {**told, "warnings": []} == {**own.as_dict(), "warnings": []}
     words = shell(*ASKED, "--kr", "0.12", "--draws", "5").stdout
-    assert "Of 5 blocks that it may be" in words
+    assert "of 5 drawn blocks)" in words
 
 
 def test_a_table_and_a_rectangle_are_drawn_from(shell: Shell) -> None:
@@ -71,6 +71,6 @@ def test_shapes_without_numbers_are_refused(refuses: Refuses) -> None:
 def test_what_never_moves_is_said_so(shell: Shell) -> None:
     write_at2(Path("weak.AT2"), 0.01 * shaking(3))
     block = ("--kind", "rocking", "--p2", "10", "--kr", "0.3")
-    assert "does not move the block" in shell("respond", "weak.AT2", *block).stdout
+    assert "The block does not move" in shell("respond", "weak.AT2", *block).stdout
     drawn = shell("respond", "weak.AT2", *block, "--kr-sigma", "0.1", "--draws", "20").stdout
-    assert "0 fail: 0 % (by the count alone 0 % to " in drawn
+    assert "P(failure) = 0 %   (sampling uncertainty 0–" in drawn

@@ -104,8 +104,8 @@ def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     assert found["uncovered_share"].keys() >= {"slide"}
     result = shell("rockmass", steep, "--pgv", "1.0")
     assert "covered blocks only" in result.stdout
-    assert "slide: " in result.stderr
-    assert "--displacement, how far is too far [m], gives them" in result.stderr
+    assert "slide: " in result.stdout
+    assert "--displacement, how far is too far [m], gives them" in result.stdout
 
 
 def test_water_shows_both_bounds(shell: Shell, mass: Path) -> None:
@@ -153,15 +153,15 @@ def test_a_chart_of_a_table_is_that_of_its_rock_mass(shell: Shell, mass: Path) -
     shell(*common, "--rockmass", mass, "--out", "a.png")
     result = shell(*common, "--blocks", "blocks.csv", "--out", "b.png")
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
-    assert "5 of 20000 rows are no block" in result.stderr
+    assert "5 of 20000 rows are no block" in result.stdout
     shell(*common, "--out", "c.png")
     assert Path("c.png").read_bytes() != Path("a.png").read_bytes()
 
 
 def test_a_chart_for_another_friction_is_doubted(shell: Shell, mass: Path) -> None:
     text = shell("plot", "modes", "--phi", "35", "--no-back", "--rockmass", mass, "--out", "a.png")
-    assert "friction angle of 35 deg, and that of the rock mass is: 40" in text.stderr
-    assert "has a back fracture, and the chart none" in text.stderr
+    assert "friction angle of 35 deg, and that of the rock mass is: 40" in text.stdout
+    assert "has a back fracture, and the chart none" in text.stdout
 
 
 def test_a_block_is_drawn(shell: Shell) -> None:

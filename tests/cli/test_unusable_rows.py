@@ -269,4 +269,4 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
 def test_a_chart_shows_the_blocks_that_it_can(shell: Shell) -> None:
     Path("b.csv").write_text("alpha1_deg,alpha3_deg\n-20,20\nsteep,20\n,20\n-30,10\n")
     done = shell("plot", "modes", "--phi", "30", "--blocks", "b.csv", "--out", "a.svg")
-    assert "2 of 4 rows are no block and not shown" in done.stderr
+    assert "2 of 4 rows are no block and not shown" in done.stdout

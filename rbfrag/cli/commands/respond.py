@@ -20,7 +20,7 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
-from rbfrag.results.numbers import percent
+from rbfrag.results.numbers import interval, percent
 from rbfrag.vocabulary.quantities import FAILURE, JOINT, PLANES, SCATTER, SHAPE, WHOLE
 
 if TYPE_CHECKING:
@@ -281,11 +281,6 @@ def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
     )
 
 
-def _end(share: float) -> str:
-    """Return the end of an interval in percent; what is rounding beside 0 is 0."""
-    return percent(share if share > 1e-9 else 0.0)
-
-
 def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
     """Print the answer to --draws."""
     answer = shares.as_dict()
@@ -293,10 +288,10 @@ def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
         print_json(answer)
         return
     warnings, outcomes = answer.pop("warnings"), answer.pop("outcomes")
+    low = shares.ci_low if shares.ci_low > 1e-9 else 0.0  # what is rounding beside 0 is 0
     print(
-        f"Of {shares.draws} blocks that it may be {shares.failed} fail: "
-        f"{percent(shares.share_failed)} (by the count alone {_end(shares.ci_low)} to "
-        f"{_end(shares.ci_high)})."
+        f"P(failure) = {percent(shares.share_failed)}   (sampling uncertainty "
+        f"{interval(low, shares.ci_high)}; {shares.failed} of {shares.draws} drawn blocks)"
     )
     print()
     print_pairs(answer)
