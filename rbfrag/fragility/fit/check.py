@@ -4,14 +4,14 @@ say."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model
 from rbfrag.db.rows import Selection
 from rbfrag.errors import FitError, InputError, ModelError
-from rbfrag.fragility.fit.data import FitSource, fit_data, read_source
+from rbfrag.fragility.fit.data import CERTIFIED, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.fit.scores import CalibrationBins, calibration_bins
 from rbfrag.fragility.measures import intensity_term
@@ -54,7 +54,13 @@ def selection_of(row: ModelRow) -> Selection:
 def source_of(connection: Connection, row: ModelRow) -> FitSource:
     """Return what the fit of a stored model would read today."""
     block = method_named(row.method).block
-    return read_source(connection, block, kind=row.kind, **selection_of(row))
+    source = read_source(connection, block, kind=row.kind, **selection_of(row))
+    return replace(source, narrow=narrow_of(row))
+
+
+def narrow_of(row: ModelRow) -> float:
+    """Return the greatest relative width of critical values that a fit counted as found."""
+    return float(cast("float", row.diagnostics.get("narrow", CERTIFIED)))
 
 
 def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
@@ -70,7 +76,7 @@ def _check(
         model = FragilityModel.from_row(row)
     except ModelError as error:
         return ModelCheck(row.name, "unreadable", str(error))
-    key = (row.kind, *selection_of(row).values())
+    key = (row.kind, narrow_of(row), *selection_of(row).values())
     try:
         if key not in sources:
             sources[key] = source_of(connection, row)

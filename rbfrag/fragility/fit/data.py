@@ -51,6 +51,9 @@ LEAST_DISPLACEMENT_M = 1e-3
 NARROW = 0.02
 """Greatest (upper - lower)/lower of a critical value that counts as found, certified or not."""
 
+CERTIFIED = 1e-6
+"""The same of models that do not state it: those that were fitted to certified values alone."""
+
 _CENSORED = ("below_limit", "no_motion")
 
 
@@ -70,6 +73,7 @@ class FitSource:
             (n, m), NaN where that is not stored; None where it is of none.
         of_block: what is stored of the blocks beside their size, by name, shape (n,).
         structures: number of motions that are excluded, recorded on structures.
+        narrow: greatest (upper - lower)/lower of a critical value that counts as found.
     """
 
     table: CombinationTable
@@ -81,6 +85,7 @@ class FitSource:
     sensitive: FloatArray | None = None
     of_block: Mapping[str, FloatArray] = field(default_factory=dict)
     structures: int = 0
+    narrow: float = NARROW
 
     @classmethod
     def of_table(cls, table: CombinationTable) -> FitSource:
@@ -92,7 +97,8 @@ class FitSource:
         """Return some of the combinations."""
         part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        del columns["table"], columns["of_block"], columns["structures"]
+        for name in ("table", "of_block", "structures", "narrow"):
+            del columns[name]
         return replace(
             self,
             table=CombinationTable(**part),
@@ -465,7 +471,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     status = table.status.astype(str)
     # a wide interval, which no scan could tighten, has two ends instead of a value
     highest = table.upper * pga_m_s2 / p
-    open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + NARROW))
+    open_above = np.isfinite(highest) & ~(table.upper <= table.kr_over_pga * (1.0 + source.narrow))
     observed = searched & ~open_above
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
     y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))

@@ -14,7 +14,7 @@ from rbfrag.db.model_file import ModelRow, refuse_taken
 from rbfrag.db.rows import IMPORTED, CombinationTable, Selection
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
-from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.data import NARROW, FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.dependence import estimate_dependence, observed_blocks
 from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
@@ -201,6 +201,7 @@ def fit_source(
             "standard_errors": result.standard_errors,
             "n": int(data.observed.sum()),
             "n_censored": int(data.censored.sum()),
+            "narrow": NARROW,
             "events": _events(data, of_outcomes),
             "scores": result.scores,
             "warnings": warnings,
