@@ -114,7 +114,8 @@ def write_table(
     if not excel_text and str(out).lower().endswith(".csv"):
         formulas = tuple(formula_warnings(columns))
     write_block_table(columns, out, excel_text=excel_text, notes=(*notes, *formulas))
-    print_warnings(formulas)
+    for text in formulas:  # they stand with the table; standard output may be a JSON document
+        print(f"warning: {spelled(text, ('excel_text',), option_of)}", file=sys.stderr)
 
 
 @cache

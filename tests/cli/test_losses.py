@@ -68,7 +68,7 @@ def test_the_same_in_python(shell: Shell, job: Path) -> None:
 def test_table_of_events_and_plot(shell: Shell, job: Path) -> None:
     files = ("--out", "events.csv", "--plot", "curve.svg")
     printed = shell("losses", job, "--blocks", "blocks.csv", *files).stdout
-    assert "failures a year are expected of 4 blocks" in printed
+    assert "/yr    4 blocks, 263-year event set" in printed
     assert "return_period_years" in printed
     with Path("events.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -119,7 +119,7 @@ def test_a_scenario(shell: Shell, job: Path) -> None:
     assert answer["average_annual_failures"] is None
     assert 0.0 < answer["expected_failures"] < 1.0
     printed = shell("losses", folder, "--blocks", "blocks.csv", "--plot", "curve.png").stdout
-    assert "are expected to fail" in printed
+    assert "Expected failures           0.501 of 4 blocks" in printed
 
 
 def test_bounds_are_printed_and_drawn(shell: Shell, job: Path) -> None:

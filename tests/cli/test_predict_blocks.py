@@ -66,7 +66,7 @@ def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch)
         "All 2 blocks are answered.",
         "",
         "block  kind      mode    probability  interval",
-        "A7     toppling  topple  1.1 %        0.4 % to 2.6 %",
+        "A7     toppling  topple  1.1 %        0.37–2.6 %",
     ]
     monkeypatch.setattr("rbfrag.cli.commands.predict.SHOWN", 1)
     monkeypatch.setattr("rbfrag.exchange.table_answers.MOST_LISTED", 1)

@@ -23,7 +23,7 @@ def test_sigmas_are_integrated_over_and_said(shell: Shell) -> None:
     assert told == own.as_dict()
     assert answers[0]["probability"] == own.probability
     words = shell(*ASKED, "--kr-sigma", "0.2").stdout
-    assert "P differs with a standard deviation of" in words
+    assert "block uncertainty: standard deviation of P" in words
     assert "uncertain" not in shell(*ASKED).stdout
 
 

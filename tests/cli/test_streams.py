@@ -15,9 +15,9 @@ COMMAND = (sys.executable, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--k
 @pytest.mark.parametrize(
     ("encoding", "written"),
     [
-        ("ascii", "The block has p2 = 3 1/s2 and"),
-        ("cp1252", "The block has p² = 3 1/s² and"),
-        ("utf-8", "The block has p² = 3 1/s² and"),
+        ("ascii", "Block     p2 = 3 s-2, k_r = 0.1;"),
+        ("cp1252", "Block     p² = 3 s-², k_r = 0.1;"),
+        ("utf-8", "Block     p² = 3 s⁻², k_r = 0.1;"),
     ],
 )
 def test_a_character_that_a_stream_cannot_write_is_replaced(encoding: str, written: str) -> None:

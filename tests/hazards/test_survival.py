@@ -283,7 +283,7 @@ def test_more_than_the_ranges_and_the_ends_is_told() -> None:
     assert "the curve begins at" in told
     assert "the curve ends at" in told
     assert "outside the ranges that the model was fitted on" in told
-    assert "backed by a slope" in told
+    assert "backed by a rock face" in told
 
 
 def test_a_free_block_of_los_angeles(formats_dir: Path) -> None:

@@ -46,8 +46,8 @@ def test_the_range_at_some_sites_is_a_second_band(tmp_path, caught) -> None:
     plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9, sites=5)
     axes = figures[0].axes[0]
     event, interval = axes.collections
-    assert "at 5 sites of one earthquake (90 %)" in event.get_label()
-    assert "interval of P" in interval.get_label()
+    assert "90 % prediction interval, 5 sites of one earthquake" in event.get_label()
+    assert "90 % confidence interval" in interval.get_label()
     x = axes.lines[0].get_xdata()[150]
     answer = predict(3.0, 0.1, pgv_m_s=float(x), model=model, level=0.9, sites=5)
     for band, ends in (

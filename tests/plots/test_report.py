@@ -171,7 +171,7 @@ def test_reports_of_blocks_that_slide_and_slump(shell: Shell) -> None:
     slumps = ("--ks", "0.2", "--ps2", "3")
     pga = ("--pga", "0.5")
     for block, pictures, words in (
-        (slides, 3, ("failure mode sliding", "slid further than 0.1 m", "displacement that is")),
+        (slides, 3, ("failure mode sliding", "displacement limit 0.1 m", "displacement that is")),
         # no curve of one measure is enough for a slump
         (slumps, 1, ("failure mode slumping", "p_s² 3 1/s²", "velocity, y = k_s g/p_s")),
     ):

@@ -132,7 +132,7 @@ def test_interfaces_give_the_same_bounds(shell: Shell) -> None:
     shaking = ("--pgv", "0.5", "--pga", "0.6")
     assert shell.json("predict", *words, *shaking)["drained"] == expected
     printed = shell("predict", *words, *shaking).stdout
-    assert "Drained, without water pressure: k_r = 0.115, P = 0.01 %" in printed
+    assert "Drained   k_r = 0.115, P = 0.012 %" in printed
     client = TestClient(make_app(ServiceSettings(db=str(REFERENCE))))
     assert client.get("/v1/predict", params=wet).json()["drained"] == expected
     listed = client.post(
@@ -164,7 +164,7 @@ def test_rates_have_the_drained_bound(shell: Shell) -> None:
     words = ("--height", "4", "--width", "2", "--dip", "20", "--phi", "40", "--water", "1")
     told = shell.json("hazard", "curve.csv", *words)
     assert told["drained"] == {"annual_rate": pytest.approx(dry.annual_rate[0], rel=1e-12)}
-    assert "Drained: once in 3,000 years." in shell("hazard", "curve.csv", *words).stdout
+    assert "Drained return period 3,000 years" in shell("hazard", "curve.csv", *words).stdout
     assert shell.json("hazard", "curve.csv", *words[:-2])["drained"] is None
     Path("blocks.csv").write_text(
         "height_m,width_m,dip_deg,phi_deg,water_m\n4,2,20,40,1\n4,2,20,40,0\n"

@@ -69,4 +69,4 @@ def test_the_reference_answers_where_there_is_no_database(tmp_path, monkeypatch,
     assert answer == json.loads(
         shell("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--json").stdout
     )
-    assert "reference" in answer["data"]
+    assert answer["data"] == "the built-in data set"

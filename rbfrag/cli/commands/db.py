@@ -207,7 +207,7 @@ def export(
     else:
         print_table(("table", "rows"), report.rows.items())
         print(f"written to {report.folder}")
-    print_warnings(report.warnings)
+        print_warnings(report.warnings)
 
 
 @app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")

@@ -113,7 +113,7 @@ def add(
         )
         if report.not_read:
             print(f"not read: {', '.join(report.not_read)}")
-    print_warnings(report.warnings)
+        print_warnings(report.warnings)
     for bad in report.failed:
         print(f"left out: {bad.path}: {bad.reason}", file=sys.stderr)
     if report.failed:

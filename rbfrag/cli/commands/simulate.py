@@ -210,7 +210,6 @@ def simulate(
     if printing.json:
         print_json(report)
         return
-    print_warnings(summary.warnings)
     if pairs is not None:
         print(
             f"{summary.combinations} sequences of {summary.kind} blocks are stored, "
@@ -219,12 +218,14 @@ def simulate(
         )
         print()
         print_table(_CONDITIONAL, map(_conditional_cells, pairs.conditional))
+        print_warnings(summary.warnings)
         return
     del report["warnings"]
     print(campaign_in_words(report))
     print()
     shown = report if printing.verbose else {name: report[name] for name in SHORT if report[name]}
     print_pairs(shown)
+    print_warnings(summary.warnings)
 
 
 _CONDITIONAL = (
