@@ -45,6 +45,8 @@ def lines(document: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[tup
         yield "Sites", _at_sites_in_words(document, sites)
     if block := block_in_words(document["method"], given):
         yield "Block", block
+    if (median_m := document.get("median_displacement_m")) is not None:
+        yield "", f"median displacement {median_m:.2g} m"
     if (sd := document.get("block_sd")) is not None:
         yield "", f"block uncertainty: standard deviation of P {sd:.2g}"
     if drained := drained_in_words(document):

@@ -221,5 +221,5 @@ def test_predict_starts_without_the_heavy_libraries(shell: Shell, tmp_path: Path
         text=True,
         check=True,
     )
-    assert set(json.loads(done.stdout)) == PREDICT_KEYS
+    assert set(json.loads(done.stdout)) == {*PREDICT_KEYS, "diagnostics"}
     assert done.stderr.strip() == "[]"

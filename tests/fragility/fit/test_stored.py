@@ -67,7 +67,7 @@ def test_the_built_in_data_are_fitted_where_there_is_no_database(
     (tmp_path / "built-in.db").write_bytes(before)
     said = shell("fit", "--term", "pgv", "--method", "wls")
     assert said.stdout.startswith("Model wls-pgv ")
-    assert "the model is not stored" in said.stderr
+    assert "the model is not stored" in said.stdout
     assert not Path("rbfrag.db").exists()
     assert (tmp_path / "built-in.db").read_bytes() == before
     assert rbfrag.read_table("motion").equals(rbfrag.read_table("motion", db="built-in.db"))

@@ -362,7 +362,7 @@ def test_a_model_can_be_chosen(open_page, ask):
     page = opened.page
     page.locator("#model-part summary").click()
     page.select_option("#model", "logistic-pgv")
-    expect(page.locator("#about")).to_contain_text("Model logistic-pgv of models.db.")
+    expect(page.locator("#about")).to_contain_text("Model logistic-pgv, models.db.")
     opened.settled()
     answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.6, model="logistic-pgv")
     assert agrees(probability_shown(page), answer["probability"])
@@ -393,7 +393,7 @@ def test_a_free_standing_block_is_answered_by_its_own_models(open_page, ask):
     assert agrees(probability_shown(page), answer["probability"])
     assert probability_shown(page) != backed
     expect(page.locator("#answer-title")).to_have_text("Probability of overturning")
-    expect(page.locator("#sentence")).to_contain_text("overturn")
+    expect(page.locator("#strip")).to_contain_text("overturn")
     expect(page.locator("#about")).to_contain_text("are sensitive")
     expect(page.get_by_text("It rocks about both edges")).to_be_visible()
     offered = page.locator("#model option").all_text_contents()
