@@ -29,7 +29,8 @@ def headline(document: Mapping[str, Any]) -> str:
         reason = "   the block is unstable without shaking" if p == 1.0 else ""
         return f"P({state}) = {p:g}{reason}   (by mechanics)"
     ends = confidence(document["level"], interval(document["ci_low"], document["ci_high"]))
-    return f"P({state}) = {percent(p)}   ({ends})"
+    value = percent(p)
+    return f"P({state}) {value if value[0] in '<>' else f'= {value}'}   ({ends})"
 
 
 def lines(document: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
