@@ -497,7 +497,7 @@ def test_a_single_block_that_is_unstable_at_rest_has_p_1(shell: Shell, client: T
     asked = ("--height", "3", "--width", "0.45", "--dip", "12", "--phi", "36", "--pgv", "0.5")
     assert shell.json("predict", *asked)["probability"] == 1.0
     printed = shell("predict", *asked)
-    assert printed.stdout.startswith("P(failure) = 1   the block is unstable without shaking")
+    assert printed.stdout.startswith("P(toppling) = 1   the block is unstable without shaking")
     words = {"height": 3, "width": 0.45, "dip": 12, "phi": 36, "pgv": 0.5}
     assert client.get("/v1/predict", params=words).json()["probability"] == 1.0
     assert client.post("/v1/predict", json=words).json()["how"] == "by mechanics"
