@@ -13,10 +13,6 @@ if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
 
 
-LIMIT_STATES = {"toppling": "toppling", "rocking": "overturning", "confined_toppling": "toppling"}
-"""Limit states of blocks that turn over, by kind; others are named by the answer itself."""
-
-
 def headline(document: Mapping[str, Any]) -> str:
     """Return the probability with its interval: "P(toppling) = 15 %   (95 % confidence …)".
 
@@ -24,7 +20,7 @@ def headline(document: Mapping[str, Any]) -> str:
         document: an answer under the keys of the JSON contract.
     """
     p, how = document["probability"], document["how"]
-    state = LIMIT_STATES.get(document["kind"], document["failure"])
+    state = document["failure"].replace("_", " ")
     if p in (0.0, 1.0) and how == BY_MECHANICS:
         reason = "   the block is unstable without shaking" if p == 1.0 else ""
         return f"P({state}) = {p:g}{reason}   (by mechanics)"
@@ -77,10 +73,8 @@ def _at_sites_in_words(document: Mapping[str, Any], sites: float) -> str:
     if document["event_low"] is None:
         return f"{where}: unknown which fraction of the blocks fails"
     ends = interval(document["event_low"], document["event_high"])
-    verb = {"toppling": "topple", "rocking": "overturn", "sliding": "slide too far",
-            "slumping": "slump", "confined_toppling": "topple"}  # fmt: skip
     level = f"{100.0 * document['level']:g} %"
-    return f"{where}, {ends} of the blocks {verb[document['kind']]} ({level} prediction interval)"
+    return f"{where}, {ends} of the blocks fail ({level} prediction interval)"
 
 
 def drained_in_words(document: Mapping[str, Any]) -> str:

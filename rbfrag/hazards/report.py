@@ -20,6 +20,7 @@ from rbfrag.results.numbers import (
 )
 from rbfrag.solver.kinds import by_model
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 
 def as_dict(
@@ -182,7 +183,8 @@ def range_in_words(answer: HazardAnswer) -> str:
     if not most > 2.0 * rate:
         return ""
     curve = answer.curves[0]
-    unit = {"pgv_m_s": "m/s"}.get(curve.measure, "g")
+    known = QUANTITIES.get(curve.measure)
+    unit = "g" if known is None else known.unit
     least = f"between {years(most)} and {return_period(rate)}"
     return (
         f"Return period of failure {least if rate > NEVER else f'at least {years(most)} years'}: "

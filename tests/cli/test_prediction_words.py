@@ -27,7 +27,7 @@ def test_the_headline_is_the_probability_with_its_interval() -> None:
     assert headline(document(0.148, 0.074, 0.261)) == (
         "P(toppling) = 15 %   (95 % confidence interval 7.4–26 %)"
     )
-    rocking = document(0.148, 0.074, 0.261, kind="rocking", level=0.9)
+    rocking = document(0.148, 0.074, 0.261, kind="rocking", failure="overturning", level=0.9)
     assert headline(rocking) == "P(overturning) = 15 %   (90 % confidence interval 7.4–26 %)"
     slide = document(0.5, 0.4, 0.6, kind="sliding", failure="displacement above 0.1 m")
     assert headline(slide).startswith("P(displacement above 0.1 m) = 50 %")
@@ -50,7 +50,7 @@ def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
     found = dict(lines(more, given))
     assert found["Shaking"] == "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67, integrated"
     assert found["Sites"] == (
-        "in one earthquake at 5 such sites, 0–10 % of the blocks topple (95 % prediction interval)"
+        "in one earthquake at 5 such sites, 0–10 % of the blocks fail (95 % prediction interval)"
     )
     assert found[""] == "block uncertainty: standard deviation of P 0.12"
     assert found["Model"].endswith("inputs outside the fitted range")
