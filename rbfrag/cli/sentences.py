@@ -57,11 +57,6 @@ YIELDS = {
 }
 """Headline of a block that stands, by its failure mode."""
 
-MODES = {
-    "slide": "sliding", "topple": "toppling", "slump": "slumping",
-    "confined_topple": "confined toppling",
-}  # fmt: skip
-
 
 def block_in_words(answer: Mapping[str, Any]) -> str:
     """Return how a block fails, and its yield acceleration.
@@ -70,10 +65,11 @@ def block_in_words(answer: Mapping[str, Any]) -> str:
         answer: an answer of `rbfrag block` under the keys of the JSON contract.
     """
     mode = answer["mode"]
+    named = mode.replace("_", " ")
     if answer["state"] == "locked":
-        return f"The block is locked in {MODES[mode]}: no horizontal acceleration moves it"
+        return f"The block is locked in {named}: no horizontal acceleration moves it"
     if answer["state"] == "unstable":
-        return f"The block is unstable at rest ({MODES[mode]}): it fails without an earthquake"
+        return f"The block is unstable at rest ({named}): it fails without an earthquake"
     return YIELDS[mode].format(k=rounded(answer["yield_acceleration"])) + _drained_yield(answer)
 
 
@@ -90,7 +86,7 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     """
     shares = {name: tally["share"] for name, tally in document["modes"].items()}
     most = sorted((name for name in shares if shares[name] > 0.0), key=lambda n: -shares[n])
-    parts = [f"{MODES.get(name, name)} {percent(shares[name])}" for name in most]
+    parts = [f"{name.replace('_', ' ')} {percent(shares[name])}" for name in most]
     yield f"Failure modes of {document['blocks']:,} blocks: {', '.join(parts) or 'none'}"
     answer, shaking = document["scenario"], document["shaking"]
     if answer is not None and answer["covered_only"]["probability"] is not None:
