@@ -170,7 +170,7 @@ def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
         )
     else:
         yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
-    yield "On a dipping base, displacements are larger by cos(φ − β)/cos φ"
+    yield "On a dipping base, displacements are cos(φ − β)/cos φ times these"
 
 
 def strongest_kr(spectrum: Mapping[str, Any]) -> list[float]:

@@ -160,9 +160,9 @@ class _Sorted:
         backed = np.asarray(given.get("back_fracture", 1.0), dtype=np.float64)
         self.backed = np.broadcast_to(backed != 0.0, (size,))
         """Behind which blocks a plane is; where that is not given, one is."""
-        words = np.asarray(given.get("drainage", UNDRAINED), dtype=object)
-        words = np.broadcast_to(np.where((words == "") | (words == None), UNDRAINED, words), size)  # noqa: E711
-        self.drainage: NDArray[np.object_] = words
+        words = np.ravel(np.array(given.get("drainage", UNDRAINED), dtype=object)).tolist()
+        stated = np.array([word or UNDRAINED for word in words], dtype=object)
+        self.drainage: NDArray[np.object_] = np.broadcast_to(stated, size)
         """What the water behind each block does while it moves; an empty word means undrained."""
         others = ("back_fracture", "drainage")
         self.given = {name: value for name, value in given.items() if name not in others}
