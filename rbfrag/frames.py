@@ -2,45 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class Tabular:
-    """An answer that turns into a table: one row, or one for each element of its arrays.
-
-    Base of dataclasses.
-    """
-
-    def table_columns(self) -> Mapping[str, Any]:
-        """Return the columns by name; arrays are flat."""
-        return columns_of(self)
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return the answer as a pandas table, with the names and units of its fields."""
-        return frame_of(self.table_columns())
-
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows, so that ``pandas.DataFrame(answer)`` is the same table."""
-        yield from self.to_frame().to_dict("records")
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        return html_of(self.to_frame())
-
-    def __repr__(self) -> str:
-        """Return name and columns on one line; of arrays their number."""
-        parts = (
-            f"{name}=[{value.size} values]" if hasattr(value, "ravel") else f"{name}={value!r}"
-            for name, value in self.table_columns().items()
-            if value is not None
-        )
-        return f"{type(self).__name__}({', '.join(parts)})"
 
 
 def columns_of(answer: Any) -> dict[str, Any]:

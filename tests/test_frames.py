@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import rbfrag
-from rbfrag.frames import Tabular
+from rbfrag.results.result import Tabular
 from tests.synthetic import shaking, write_at2
 
 

@@ -20,7 +20,6 @@ from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError, checked_name
-from rbfrag.frames import Tabular
 from rbfrag.motions.archive import archive_of, is_archive, members_of, records_among
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
@@ -34,6 +33,7 @@ from rbfrag.motions.processing import (
 )
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE, is_on_structure, quality_flags
 from rbfrag.motions.text.header_check import doubts
+from rbfrag.results.result import Tabular
 
 AS_SUPPLIED = "as supplied"
 

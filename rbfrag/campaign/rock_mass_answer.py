@@ -16,10 +16,10 @@ from rbfrag.files import as_path
 from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.model import Model
-from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.question.fields import MeasureFields
+from rbfrag.results.result import Tabular
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables

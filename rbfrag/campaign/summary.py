@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.conditional import ConditionalShare
-from rbfrag.frames import Tabular
+from rbfrag.results.result import Tabular
 
 _COUNTS = ("blocks", "earthquakes", "of_station", "fails", "intact_fails", "unknown")
 

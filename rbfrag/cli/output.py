@@ -12,12 +12,16 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
-from rbfrag.fragility import words
-from rbfrag.results.diagnostic import with_diagnostics
+from rbfrag.results.diagnostic import diagnostics, with_diagnostics
 from rbfrag.vocabulary.quantities import INPUTS, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
+
+    from rbfrag.results.result import Result
+
+_FIELDS = tuple(name for name in INPUTS if "_" in name)
+"""Inputs that notes name as Python does; a name without a unit is an everyday word."""
 
 
 def print_json(document: object) -> None:
@@ -79,6 +83,36 @@ def print_rows(rows: Sequence[Mapping[str, object]]) -> None:
 
 def _cut(text: str, size: int) -> str:
     return text if len(text) <= size else f"{text[: size - 1]}…"
+
+
+def print_result(
+    result: Result, *, json: bool, verbose: bool = False, fields: Collection[str] = _FIELDS
+) -> None:
+    """Print an answer: the number that decides, labelled lines, notes, tables.
+
+    Args:
+        result: the answer.
+        json: as one JSON document.
+        verbose: with every value.
+        fields: names in notes that are printed as options.
+    """
+    if json:
+        print_json(result.as_dict())
+        return
+    notes = diagnostics(result.warnings)
+    questions = [note for note in notes if note.code == "check_unit"]
+    print_sentences((*questions, *result.sentences()))
+    for label, text in result.lines():
+        print_labelled(label, text)
+    for note in notes:
+        if note not in questions:
+            print_note(note, fields)
+    for table in result.tables(verbose=verbose):
+        print()
+        if table.headers:
+            print_table(table.headers, table.rows)
+        else:
+            print_pairs({str(name): value for name, value in table.rows})
 
 
 def print_labelled(label: str, text: str) -> None:
@@ -247,60 +281,3 @@ class ProgressBar:
         self._bar.update(
             self._task, completed=done, total=total, about=about.strip(), rate=per_second
         )
-
-
-def show_prediction(
-    document: dict[str, Any],
-    given: Mapping[str, Any],
-    *,
-    json: bool,
-    verbose: bool = False,
-) -> None:
-    """Print what `rbfrag predict` answers for one block.
-
-    Args:
-        document: the answer under the keys of the JSON contract.
-        given: block and measures that it was asked for.
-        json: as one JSON document.
-        verbose: every value of every model.
-    """
-    if json:
-        print_json(document)
-        return
-    answers = document.pop("answers")
-    polarities = document.pop("polarities", None)
-    warnings = document["warnings"]
-    questions = words.units_to_check(warnings)
-    print_sentences((*questions, words.headline(document)))
-    for label, text in words.lines(document, given):
-        print_labelled(label, text)
-    fields = [name for name in INPUTS if "_" in name]
-    for text in warnings:
-        if text not in questions:
-            print_note(text, fields)
-    if verbose:
-        print()
-        apart = ("drained", "warnings", "shaking")
-        print_pairs({
-            key: value for key, value in document.items()
-            if key not in apart and (value or key not in _LEFT_OUT)
-        })  # fmt: skip
-    if polarities:
-        print()
-        print_table(
-            ("polarity", *_OF_POLARITY),
-            [(name, *map(answer.get, _OF_POLARITY)) for name, answer in polarities.items()],
-        )
-    if verbose and len(answers) > 1:
-        print()
-        columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
-        print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
-
-
-_OF_POLARITY = (
-    "probability", "ci_low", "ci_high", "intensity_m_s",
-)  # fmt: skip
-"""Keys that are shown of each polarity."""
-
-_LEFT_OUT = ("y_m_s", "median_displacement_m", "block_sd", "event_low", "event_high")
-"""Keys that a table leaves out where they do not apply."""

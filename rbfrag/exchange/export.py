@@ -20,12 +20,12 @@ from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.method import TOPPLING_BLOCK
-from rbfrag.frames import Tabular
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
 from rbfrag.question.words import numbers_in_words
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 

@@ -14,9 +14,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, Blocks
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
+from rbfrag.fragility import describe
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
-from rbfrag.fragility.words import row_in_words
-from rbfrag.frames import Tabular
 from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
 from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
@@ -26,6 +25,7 @@ from rbfrag.question.keywords import parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.question.words import numbers_in_words
 from rbfrag.results.diagnostic import codes_by_row
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
@@ -232,7 +232,7 @@ def shakemap(
             "seed": seed,
         },
         warnings=tuple(warnings),
-        title=f"{name}\n{_what(table, own)}; model {row_in_words(chosen.row)}"
+        title=f"{name}\n{_what(table, own)}; model {describe.stored_model(chosen.row)}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
         shape=(shaken.rows, shaken.columns)

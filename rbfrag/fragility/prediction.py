@@ -11,16 +11,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.numbers import confidence, interval, percent
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 
 if TYPE_CHECKING:
-    import pandas as pd
     from numpy.typing import ArrayLike
 
     from rbfrag.fragility.checks import Judgement, Remark
@@ -30,8 +32,21 @@ _SINGLE_TYPES = (float, int, str, bytes)
 MOST_SITES = 10_000
 
 
+OF_EACH_MODEL = (
+    "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
+    "in_domain", "how",
+)  # fmt: skip
+"""Keys of the answer of each suited model."""
+
+OF_POLARITY = ("probability", "ci_low", "ci_high", "intensity_m_s")
+"""Keys that are shown of each polarity."""
+
+_OPTIONAL = ("y_m_s", "median_displacement_m", "block_sd", "event_low", "event_high")
+"""Keys that a terminal does not show where they do not apply."""
+
+
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(Result):
     """Probability that one block fails in one motion.
 
     Args:
@@ -68,6 +83,10 @@ class Prediction:
         drained: of a block with water behind it the same answer without water pressure:
             ``probability``, ``ci_low``, ``ci_high`` and the yield by its name, such as ``kr`` (None
             of a block that is unstable at rest); None of a dry block.
+        inputs: numbers of the block and measures of the shaking that it is the answer for.
+        sites: number of sites of one earthquake that were asked for; None where none were.
+        alternatives: the answers of all models that the measures suffice for, the recommended
+            first; empty where one was asked.
     """
 
     kind: str
@@ -92,33 +111,88 @@ class Prediction:
     shaking: dict[str, dict[str, float]] | None = None
     how: str = ""
     drained: dict[str, float | None] | None = None
+    inputs: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    sites: int | None = field(default=None, repr=False)
+    alternatives: tuple[Prediction, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def mode(self) -> str:
         """Failure mode of the block."""
         return mode_of_kind(self.kind)
 
+    def sentences(self) -> Iterator[str]:
+        """Yield the probability with its interval: "P(toppling) = 15 %   (95 % confidence …)"."""
+        p, state = self.probability, self.failure.replace("_", " ")
+        if p in (0.0, 1.0) and self.how == BY_MECHANICS:
+            reason = "   the block is unstable without shaking" if p == 1.0 else ""
+            yield f"P({state}) = {p:g}{reason}   (by mechanics)"
+            return
+        ends = confidence(self.level, interval(self.ci_low, self.ci_high))
+        value = percent(p)
+        yield f"P({state}) {value if value[0] in '<>' else f'= {value}'}   ({ends})"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield what was asked, the prediction interval, the drained bound and the model."""
+        if shaking := describe.shaking(self.shaking or {}, self.inputs):
+            yield TextLine("Shaking", shaking)
+        if self.sites is not None:
+            yield TextLine("Sites", self._at_sites(self.sites))
+        if block := describe.block(self.method, self.inputs):
+            yield TextLine("Block", block)
+        if self.median_displacement_m is not None:
+            yield TextLine("", f"median displacement {self.median_displacement_m:.2g} m")
+        if self.block_sd is not None:
+            yield TextLine("", f"block uncertainty: standard deviation of P {self.block_sd:.2g}")
+        if self.drained is not None:
+            yield TextLine("Drained", describe.drained_bound(self.drained))
+        inside = "within" if self.in_domain else "outside"
+        model = self.model if self.how != BY_MECHANICS else "mechanics, not the model"
+        yield TextLine("Model", f"{model}, {self.data}; inputs {inside} the fitted range")
+
+    def _at_sites(self, sites: int) -> str:
+        where = f"in one earthquake at {sites:,g} such site{'s' if sites > 1 else ''}"
+        if self.event_low is None or self.event_high is None:
+            return f"{where}: unknown which fraction of the blocks fails"
+        ends = interval(self.event_low, self.event_high)
+        return f"{where}, {ends} of the blocks fail ({100.0 * self.level:g} % prediction interval)"
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the values and the answers of all suited models, if verbose."""
+        if not verbose:
+            return
+        apart = ("drained", "warnings", "shaking", "answers", "polarities")
+        yield TextTable(
+            (),
+            [(name, value) for name, value in self.as_dict().items()
+             if name not in apart and (value or name not in _OPTIONAL)],
+        )  # fmt: skip
+        if len(self.alternatives) > 1:
+            names = (
+                "model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended",
+            )  # fmt: skip
+            yield TextTable(
+                names, [[answer[name] for name in names] for answer in self.as_dict()["answers"]]
+            )
+
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
-        return {"kind": self.kind, "mode": self.mode, **vars(self), "warnings": list(self.warnings)}
+        values = {"kind": self.kind, "mode": self.mode, **vars(self)}
+        values["warnings"] = list(self.warnings)
+        del values["inputs"], values["alternatives"]
+        if self.sites is None:
+            del values["sites"]
+        if self.alternatives:
+            values["answers"] = [
+                {name: getattr(answer, name) for name in OF_EACH_MODEL} | {"recommended": i == 0}
+                for i, answer in enumerate(self.alternatives)
+            ]
+        return values
 
-    # not Tabular: `rbfrag predict` starts without its module
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Yield the one row, so that ``pandas.DataFrame(answer)`` is the table."""
-        yield from self.to_frame().to_dict("records")
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return the answer as a pandas table of one row."""
-        from rbfrag.frames import columns_of, frame_of
-
+    def table_columns(self) -> Mapping[str, Any]:
+        """Return the columns of the table of one row."""
         drained = {f"drained_{name}": value for name, value in (self.drained or {}).items()}
-        return frame_of({"kind": self.kind, "mode": self.mode, **columns_of(self), **drained})
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        from rbfrag.frames import html_of
-
-        return html_of(self.to_frame())
+        columns = {"kind": self.kind, "mode": self.mode, **super().table_columns(), **drained}
+        return {name: value for name, value in columns.items() if name != "sites"}
 
 
 @dataclass(frozen=True)
@@ -134,6 +208,17 @@ class MotionPrediction(Prediction):
 
     forward: Prediction | None = None
     reverse: Prediction | None = None
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the answers in both polarities among the tables."""
+        tables = [*super().tables(verbose=verbose)]
+        both = {"forward": self.forward, "reverse": self.reverse}
+        rows = [
+            (name, *(getattr(answer, key) for key in OF_POLARITY))
+            for name, answer in both.items()
+            if answer is not None
+        ]
+        yield from (*tables[:1], TextTable(("polarity", *OF_POLARITY), rows), *tables[1:])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract, and both polarities."""
@@ -366,6 +451,7 @@ def _answer_single(
         block_sd,
         model.data,
         how=how,
+        inputs=given,
     )
 
 

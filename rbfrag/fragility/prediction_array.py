@@ -19,7 +19,7 @@ from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
-from rbfrag.frames import Tabular
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import BY_MECHANICS, KINDS, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES

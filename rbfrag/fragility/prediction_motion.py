@@ -24,6 +24,7 @@ from rbfrag.fragility.prediction import (
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import INTENSITY, SPECTRAL
 
 Polarity = Literal["forward", "reverse", "both"]
@@ -106,8 +107,11 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
         one, other = getattr(forward, name), getattr(reverse, name)
         return None if one is None or other is None else 0.5 * (float(one) + float(other))
 
-    warnings = [f"forward: {text}" for text in forward.warnings]
-    warnings += [f"reverse: {text}" for text in reverse.warnings]
+    warnings = [
+        text.replaced(text=f"{polarity}: {text}")
+        for polarity, answer in (("forward", forward), ("reverse", reverse))
+        for text in diagnostics(answer.warnings)
+    ]
     means: dict[str, Any] = {
         name: mean(name) for name in ("probability", "ci_low", "ci_high", "intensity_m_s")
     }

@@ -20,7 +20,6 @@ from rbfrag.fragility.unusable import (
     refuse_elements,
     unusable_in_words,
 )
-from rbfrag.frames import Tabular
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.annual_rate import checked_years, probability_in
 from rbfrag.hazards.between_measures import LAW_TAU, TAU
@@ -51,6 +50,7 @@ from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import ALONE
-from rbfrag.frames import Tabular
 from rbfrag.question.shaking import doubts_about, doubts_about_rates
+from rbfrag.results.result import Tabular
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import SPECTRAL
 

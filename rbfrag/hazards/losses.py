@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
-from rbfrag.frames import Tabular
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
@@ -40,6 +39,7 @@ from rbfrag.hazards.uncertainty import (
     rate_interval,
     share_interval,
 )
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
 

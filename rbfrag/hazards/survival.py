@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
@@ -27,6 +26,7 @@ from rbfrag.hazards.standing_blocks import (
     StandingBlocks,
 )
 from rbfrag.question.keywords import LEVEL, parts_of
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rbfrag.fragility import describe
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.words import fitted_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
@@ -237,7 +237,7 @@ def _is_fitted(
 
 
 def _caption(model: FragilityModel, held: HeldMeasures) -> str:
-    fitted = fitted_in_words(model.row.diagnostics)
+    fitted = describe.fitted_data(model.row.diagnostics)
     return (
         f"{as_written(f'Probability that the block topples: model {model.name}', 85)}\n"
         f"{held.words + chr(10) if held.words else ''}"

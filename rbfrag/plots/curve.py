@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
-from rbfrag.fragility.words import at_sites, fitted_in_words, row_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -118,11 +118,12 @@ def plot_curve(
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
     conditions = ", ".join(_condition(name, held[name]) for name in others)
-    fitted = fitted_in_words(model.row.diagnostics)
+    fitted = describe.fitted_data(model.row.diagnostics)
+    model_name = f"model {describe.stored_model(model.row)}"
     axes.set_title(
         "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
         + "\n"
-        + as_written(", ".join(filter(None, (f"model {row_in_words(model.row)}", fitted))), 85),
+        + as_written(", ".join(filter(None, (model_name, fitted))), 85),
         fontsize=10,
     )
     legend_below(figure, 2)
@@ -166,7 +167,7 @@ def draw_curve(
     if sites is not None and not np.isnan(answer.event_low).all():
         axes.fill_between(
             x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,
-            label=f"{percent} prediction interval, {at_sites(sites)}",
+            label=f"{percent} prediction interval, {describe.at_sites(sites)}",
         )  # fmt: skip
     axes.fill_between(
         x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.fragility.words import model_in_words
+from rbfrag.fragility import describe
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
@@ -52,7 +52,7 @@ def plot_contribution(
     rate = float(answer.annual_rate[0])
     place = f" at {curve.place}" if curve.place else ""
     figure.suptitle(
-        as_written(f"hazard of {curve.imt}{place}, model {model_in_words(vars(answer))}", 75)
+        as_written(f"hazard of {curve.imt}{place}, model {describe.model(vars(answer))}", 75)
         + f"\nthe block fails {rate:.3g} times a year ({100 * answer.level:g} % interval "
         f"{answer.ci_low[0]:.3g} to {answer.ci_high[0]:.3g}),\n"
         f"{100 * answer.probability[0]:.3g} % in {answer.years:g} years",

@@ -1,4 +1,4 @@
-"""The answer to a question under the keys of the JSON contract, with that of every suited model."""
+"""The answer to a question about one block, with that of every suited model."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models, unused_measures
 from rbfrag.fragility.measures import AMPLIFIED
-from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
+from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks, with_values
 from rbfrag.question.components import SINGLE_ASSUMED, to_single_component
 from rbfrag.question.question import (
     OF_SHAKING,
     ask_at_rest,
-    bound_values,
     described,
-    is_wet,
-    no_drained_bound,
-    without_water,
+    with_drained_bound,
 )
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.vocabulary.quantities import INTENSITY, SCENARIO
@@ -31,66 +28,49 @@ if TYPE_CHECKING:
     from rbfrag.motions.recognise import MotionLike
 
 
-OF_EACH_MODEL = (
-    "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
-    "in_domain", "how",
-)  # fmt: skip
-"""What a document has of the answer of each suited model."""
-
 BESIDE_A_MOTION = (
     "the motion is the shaking at its site: omit rjb_km, vs30_m_s, amplification, mechanism, gmm "
     "and component"
 )
 
 
-def answer_block(
-    inputs: Mapping[str, Any], *, kind: str | None = None, **how: Any
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def answer_block(inputs: Mapping[str, Any], *, kind: str | None = None, **how: Any) -> Prediction:
     """Return the answer for one block, given by its shape or its numbers.
 
     Args:
         inputs: fields of block and shaking.
         kind: how the block fails; None for what it is given by.
-        how: as for :func:`prediction_document`.
-
-    Returns:
-        The document, and the numbers of the block and the measures that it is the answer for.
+        how: as for :func:`answer_numbers`.
 
     Raises:
-        InputError: as of :func:`prediction_document`, and a block that is described in part.
+        InputError: as of :func:`answer_numbers`, and a block that is described in part.
     """
-    document, numbers = _answer_as_given(inputs, kind=kind, **how)
-    if is_wet(inputs):
-        how.pop("remarks", None)
-        try:
-            bound = _answer_as_given(without_water(inputs), kind=kind, **how)
-            document["drained"] = bound_values(*bound)
-        except InputError as error:
-            document["warnings"] = [*document["warnings"], no_drained_bound(error)]
-    return document, numbers
+    warnings = how.pop("remarks", ())
+
+    def answer(question: Mapping[str, Any]) -> Prediction:
+        return _answer_described(question, kind=kind, **how)
+
+    result = with_drained_bound(answer, inputs, kind)
+    return with_values(result, warnings=diagnostics(warnings, result.warnings))
 
 
-def _answer_as_given(
-    inputs: Mapping[str, Any], *, kind: str | None, **how: Any
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any) -> Prediction:
     blocks = described(inputs, kind)
     (group,) = blocks.groups
     measures = {name: value for name, value in inputs.items() if name in OF_SHAKING}
-    numbers = {**group.numbers, **measures}
-    remarks = (*how.pop("remarks", ()), *blocks.remarks)
     if not blocks.at_rest:
-        how["remarks"] = remarks
-        return prediction_document(numbers, kind=group.kind, **how), numbers
+        numbers = {**group.numbers, **measures}
+        return answer_numbers(numbers, kind=group.kind, remarks=blocks.remarks, **how)
     # what is wrong with the shaking is found as for a block that stands
     motion = how.pop("motion", None)
     shaking = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})
     names = ("kind", "model", "level", "db", "mechanism", "gmm", "rotation_deg", "sites")
     options = {name: how[name] for name in names if how.get(name) is not None}
-    answer = with_remarks(ask_at_rest(shaking, blocks, **options), remarks)
-    return _document([answer], [], how.get("sites")), numbers
+    answer = with_remarks(ask_at_rest(shaking, blocks, **options), blocks.remarks)
+    return _with_alternatives(answer, [answer], measures, how.get("sites"))
 
 
-def prediction_document(
+def answer_numbers(
     given: Mapping[str, ArrayLike],
     *,
     kind: str | None = None,
@@ -106,8 +86,8 @@ def prediction_document(
     mechanism: str | None = None,
     gmm: str | PathLike[str] | None = None,
     component: str | None = None,
-) -> dict[str, Any]:
-    """Return the answer under the keys of the JSON contract, and that of every suited model.
+) -> Prediction:
+    """Return the answer of the best model, with those of all suited models.
 
     Args:
         given: block and what is known of the motion, by the names of :func:`predict`.
@@ -132,7 +112,7 @@ def prediction_document(
         DatabaseError: the database cannot be read.
     """
     is_component_assumed = component is None and motion is None
-    source = mechanism, gmm, component
+    source, inputs = (mechanism, gmm, component), given
     if source != (None, None, None) or not SCENARIO.isdisjoint(given):
         if motion is not None:
             fields = (*SCENARIO, "mechanism", "gmm", "component")
@@ -143,14 +123,14 @@ def prediction_document(
             is_component_assumed = False
         given, further = shaken(given, Source(mechanism, gmm), model, db, component)
         remarks = (*remarks, *further)
-    others: list[Prediction] = []
+    answers: list[Prediction] = []
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     if motion is not None:
         # Kept apart: a motion needs numpy.
         from rbfrag.fragility.prediction_motion import predict_motion
 
-        others = [
+        answers = [
             predict_motion(
                 given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
                 model=model, level=level, db=db, sites=sites,
@@ -168,41 +148,36 @@ def prediction_document(
             # here the measures are fields of the question, which each door spells
             error.fields = error.fields or INTENSITY
             raise
-        for each in models:
-            answer = answer_given(each, given, level, weights=weights, sites=sites)
+        for suited_model in models:
+            answer = answer_given(suited_model, given, level, weights=weights, sites=sites)
             assert isinstance(answer, Prediction)
-            others.append(answer)
+            answers.append(answer)
         unused = unused_measures(models[0], given)
-        if is_component_assumed and 0.0 < others[0].probability < 1.0:
+        if is_component_assumed and 0.0 < answers[0].probability < 1.0:
             notes = (_as_rotd50(models[0], given, weights),)
-    return _document(others, (*remarks, *unused), sites, notes)
+    warnings = diagnostics(remarks, unused, answers[0].warnings, notes)
+    return _with_alternatives(with_values(answers[0], warnings=warnings), answers, inputs, sites)
 
 
-def _document(
-    answers: Sequence[Prediction],
-    warnings: Sequence[str],
+def _with_alternatives(
+    answer: Prediction,
+    alternatives: Sequence[Prediction],
+    inputs: Mapping[str, Any],
     sites: float | None,
-    notes: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Return the answers of some models, the recommended first, under the keys of the contract."""
-    recommended = answers[0]
-    document = recommended.as_dict()
-    document["warnings"] = [*diagnostics(warnings, recommended.warnings, notes)]
-    if sites is not None:
-        document["sites"] = int(sites)
-    document["answers"] = [
-        {name: getattr(answer, name) for name in OF_EACH_MODEL}
-        | {"recommended": answer is recommended}
-        for answer in answers
-    ]
-    return document
+) -> Prediction:
+    return with_values(
+        answer,
+        alternatives=tuple(alternatives),
+        inputs=inputs,
+        sites=None if sites is None else int(sites),
+    )
 
 
 def _as_rotd50(
     model: FragilityModel, inputs: Mapping[str, ArrayLike], weights: ArrayLike | None
 ) -> Diagnostic:
     """Return the note that a single component is assumed, with P for RotD50."""
-    from rbfrag.fragility.words import measures_in_words
+    from rbfrag.fragility import describe
     from rbfrag.results.numbers import percent
 
     rotd50 = answer_given(model, to_single_component(inputs, "rotd50"), 0.95, weights=weights)
@@ -210,7 +185,7 @@ def _as_rotd50(
     names = [name for name in model.term.inputs if name in AMPLIFIED]
     are = "is" if len(names) == 1 else "are"
     return Diagnostic(
-        f"{measures_in_words(names)} {are} assumed to be of a single horizontal component; as "
+        f"{describe.measures(names)} {are} assumed to be of a single horizontal component; as "
         f"RotD50 P would be {percent(rotd50.probability)}",
         SINGLE_ASSUMED.code,
         fields=SINGLE_ASSUMED.fields,

@@ -165,7 +165,7 @@ def with_drained_bound(
         return with_remarks(result, (), (no_drained_bound(error),))
     if isinstance(bound, Prediction):
         (group,) = described(dry, kind).groups
-        return with_values(result, drained=bound_values(bound.as_dict(), group.numbers))
+        return with_values(result, drained=_bound_values(bound, group.numbers))
     import numpy as np
 
     wet = np.asarray(given["water_m"], dtype=np.float64) > 0.0
@@ -208,17 +208,15 @@ def is_wet(given: Mapping[str, Any]) -> bool:
 OF_BOUND = ("probability", "ci_low", "ci_high")
 
 
-def bound_values(
-    document: Mapping[str, Any], numbers: Mapping[str, Any]
-) -> dict[str, float | None]:
+def _bound_values(bound: Prediction, numbers: Mapping[str, Any]) -> dict[str, float | None]:
     """Return the drained bound of an answer: its values, and the yield by its name.
 
     Args:
-        document: the answer without water, under the keys of the JSON contract.
+        bound: the answer without water.
         numbers: of the dry block; empty for one that is unstable at rest.
     """
-    (name,) = {"kr", "ky", "ks", "kct"} & {*facts_of(document["kind"]).parameters}
-    return {n: document[n] for n in OF_BOUND} | {name: numbers.get(name)}
+    (name,) = {"kr", "ky", "ks", "kct"} & {*facts_of(bound.kind).parameters}
+    return {n: getattr(bound, n) for n in OF_BOUND} | {name: numbers.get(name)}
 
 
 def _keywords_in_words() -> str:
@@ -331,7 +329,7 @@ def ask_at_rest(
     return Prediction(
         group.kind, 1.0, 1.0, 1.0, None, None, level, chosen.row.name, chosen.term.name,
         chosen.method.name, group.kind, None, 0.0, True, (warning,), data=chosen.data,
-        how=BY_MECHANICS,
+        how=BY_MECHANICS, inputs=measures,
     )  # fmt: skip
 
 

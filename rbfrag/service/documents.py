@@ -14,9 +14,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.fragility.prediction import Prediction
+from rbfrag.fragility.prediction import OF_EACH_MODEL, Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.question.document import OF_EACH_MODEL
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.reports import STRENGTH_VALUES
 from rbfrag.solver.results import CriticalResult
@@ -48,14 +47,18 @@ def with_fields(definitions: dict[str, Any]) -> Callable[[type[T]], type[T]]:
     return extended
 
 
-def keys_of(*answers: type, names: Sequence[str] = ()) -> Callable[[type[T]], type[T]]:
-    """Return what gives a document the values of answers.
+def keys_of(
+    *answers: type, names: Sequence[str] = (), omitted: Sequence[str] = ()
+) -> Callable[[type[T]], type[T]]:
+    """Return a decorator that gives a document the values of answers.
 
     Args:
         answers: dataclasses.
-        names: what it has of their fields and properties; all fields where none is named.
+        names: fields and properties of the document; all fields by default.
+        omitted: fields that the document does not have.
     """
-    names = names or [each.name for answer in answers for each in fields(answer)]
+    names = names or [field.name for answer in answers for field in fields(answer)]
+    names = [name for name in names if name not in omitted]
     types: dict[str, Any] = {}
     for answer in answers:
         types |= get_type_hints(answer, localns=_NOT_LOADED)
@@ -116,7 +119,7 @@ class ModelAnswer(_Document):
     recommended: bool
 
 
-@keys_of(Prediction)
+@keys_of(Prediction, omitted=("inputs", "alternatives"))
 class PredictAnswer(_Answer):
     """Probability that one block fails: what `rbfrag predict` prints as JSON.
 

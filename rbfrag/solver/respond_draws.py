@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.results.result import Tabular
 from rbfrag.solver.excitation import excitation, motion_remarks
 from rbfrag.solver.kind import RunEnd
 from rbfrag.solver.quantity import not_negative, positive

@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
+from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
 from rbfrag.solver.stability.modes import DrainedYield, ModeName
 

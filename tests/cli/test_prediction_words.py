@@ -6,48 +6,48 @@ from typing import Any
 
 import pytest
 
-from rbfrag.fragility.words import (
-    block_in_words,
-    headline,
-    lines,
-    model_in_words,
-)
+from rbfrag.fragility import describe
+from rbfrag.fragility.prediction import Prediction
 from rbfrag.results.numbers import percent, with_interval
 from tests.cli.conftest import Shell
 
 
-def document(p: float, low: float, high: float, **more: Any) -> dict[str, Any]:
-    answer = {"probability": p, "level": 0.95, "ci_low": low, "ci_high": high, "how": "model m"}
-    answer |= {"kind": "toppling", "failure": "toppling", "model": "m", "data": "a file"}
-    answer |= {"method": "bounded", "in_domain": True, "event_low": None, "event_high": None}
-    return answer | more
+def answer(p: float, low: float, high: float, **values: Any) -> Prediction:
+    numbers = {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6, "pga_g": 0.5}
+    own: dict[str, Any] = {
+        "kind": "toppling", "failure": "toppling", "model": "m", "data": "a file", "term": "pgv_kr",
+        "method": "bounded", "in_domain": True, "event_low": None, "event_high": None,
+        "how": "model m", "level": 0.95, "y_m_s": 0.9, "intensity_m_s": 0.6, "inputs": numbers,
+    }  # fmt: skip
+    return Prediction(**{**own, "probability": p, "ci_low": low, "ci_high": high, **values})
 
 
 def test_the_headline_is_the_probability_with_its_interval() -> None:
-    assert headline(document(0.148, 0.074, 0.261)) == (
+    assert answer(0.148, 0.074, 0.261).headline() == (
         "P(toppling) = 15 %   (95 % confidence interval 7.4–26 %)"
     )
-    rocking = document(0.148, 0.074, 0.261, kind="rocking", failure="overturning", level=0.9)
-    assert headline(rocking) == "P(overturning) = 15 %   (90 % confidence interval 7.4–26 %)"
-    slide = document(0.5, 0.4, 0.6, kind="sliding", failure="displacement above 0.1 m")
-    assert headline(slide).startswith("P(displacement above 0.1 m) = 50 %")
-    ruled = {"how": "by mechanics"}
-    assert headline(document(0.0, 0.0, 0.0, **ruled)) == "P(toppling) = 0   (by mechanics)"
-    assert headline(document(1.0, 1.0, 1.0, **ruled)) == (
+    rocking = answer(0.148, 0.074, 0.261, kind="rocking", failure="overturning", level=0.9)
+    assert rocking.headline() == "P(overturning) = 15 %   (90 % confidence interval 7.4–26 %)"
+    slide = answer(0.5, 0.4, 0.6, kind="sliding", failure="displacement above 0.1 m")
+    assert slide.headline().startswith("P(displacement above 0.1 m) = 50 %")
+    assert answer(0.0, 0.0, 0.0, how="by mechanics").headline() == (
+        "P(toppling) = 0   (by mechanics)"
+    )
+    assert answer(1.0, 1.0, 1.0, how="by mechanics").headline() == (
         "P(toppling) = 1   the block is unstable without shaking   (by mechanics)"
     )
 
 
 def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
-    given = {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6, "pga_g": 0.5}
-    found = dict(lines(document(0.2, 0.1, 0.3), given))
+    found = dict(answer(0.2, 0.1, 0.3).lines())
     assert found["Shaking"] == "PGV 0.6 m/s, PGA 0.5 g"
     assert found["Block"].startswith("p² = 7.14 s⁻², k_r = 0.25; assumed backed by a rock face")
     assert found["Model"] == "m, a file; inputs within the fitted range"
     about = {"pgv_m_s": {"median": 0.17, "sigma": 0.67, "tau": None}}
-    more = document(0.2, 0.1, 0.3, shaking=about, sites=5, event_low=0.0, event_high=0.1,
-                    in_domain=False, block_sd=0.12)  # fmt: skip
-    found = dict(lines(more, given))
+    found = dict(
+        answer(0.2, 0.1, 0.3, shaking=about, sites=5, event_low=0.0, event_high=0.1,
+               in_domain=False, block_sd=0.12).lines()
+    )  # fmt: skip
     assert found["Shaking"] == "PGA 0.5 g, median PGV 0.17 m/s, σ_ln 0.67, integrated"
     assert found["Sites"] == (
         "in one earthquake at 5 such sites, 0–10 % of the blocks fail (95 % prediction interval)"
@@ -57,10 +57,10 @@ def test_labelled_lines_say_what_was_asked_and_which_model_answers() -> None:
 
 
 def test_the_block_is_named_with_how_it_is_assumed_to_stand() -> None:
-    assert "free-standing" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})
-    slide = block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3})
+    assert "free-standing" in describe.block("overturning", {"p2": 7.1, "kr": 0.25})
+    slide = describe.block("displacement", {"ky": 0.1, "displacement_m": 0.3})
     assert slide == "k_y = 0.1, displacement limit 0.3 m"
-    assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ""
+    assert describe.block("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ""
 
 
 @pytest.mark.parametrize(
@@ -93,12 +93,12 @@ def test_an_interval_that_says_no_more_is_left_out() -> None:
     ],
 )
 def test_models_have_names_that_people_say(term: str, method: str, said: str) -> None:
-    assert model_in_words({"term": term, "method": method, "model": "two names"}) == said
+    assert describe.model({"term": term, "method": method, "model": "two names"}) == said
 
 
 def test_models_of_the_reference_are_told_apart(shell: Shell) -> None:
     rows = shell.json("models", "list")
-    of = [(row["kind"], model_in_words({**row, "model": row["name"]})) for row in rows]
+    of = [(row["kind"], describe.model({**row, "model": row["name"]})) for row in rows]
     same = [each for each in of if of.count(each) > 1]
     assert {kind for kind, _ in same} == {"slumping"}  # which differ by what counts as failure
 

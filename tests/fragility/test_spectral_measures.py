@@ -14,7 +14,7 @@ from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.question.document import prediction_document
+from rbfrag.question.document import answer_numbers
 from rbfrag.question.question import predict
 from tests.fragility.conftest import model_row
 
@@ -62,10 +62,8 @@ def test_accelerations_are_given_by_period(model):
     eta = 0.1 + 3.0 * math.log(0.4 * G / (2.0 * math.pi) / y)
     assert answer.probability == pytest.approx(1.0 / (1.0 + math.exp(-eta)), rel=1e-12)
     assert predict(3.0, 0.1, sa_g={1: 0.4, 0.3: 0.9}, model=model) == answer
-    document = prediction_document(
-        {"p2": 3.0, "kr": 0.1, "sa10_g": 0.4, "sa03_g": 0.9}, model=model
-    )
-    assert document["probability"] == answer.probability
+    document = answer_numbers({"p2": 3.0, "kr": 0.1, "sa10_g": 0.4, "sa03_g": 0.9}, model=model)
+    assert document.probability == answer.probability
 
 
 def test_their_values_may_be_arrays(model):

@@ -19,7 +19,7 @@ from rbfrag.fragility.methods import method_named, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.question.document import prediction_document
+from rbfrag.question.document import answer_numbers
 from rbfrag.question.question import predict
 from rbfrag.solver.scatter import fraction
 from tests.fragility.test_overturning import T2, one, stored
@@ -250,7 +250,7 @@ def test_other_models_are_asked_of_the_uncertain_block_too():
         **{"p2": 0.677, "kr": 0.081, "kr_sigma": 0.575},
         **{"pgv_m_s": 0.194, "pga_g": 0.212, "tm_s": 0.984},
     }
-    document = prediction_document(question, db=REFERENCE)
+    document = answer_numbers(question, db=REFERENCE).as_dict()
     assert len(document["answers"]) > 3
     for each in document["answers"]:
         alone = predict(**question, db=REFERENCE, model=each["model"])

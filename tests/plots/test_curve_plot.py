@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.words import fitted_in_words
 from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
@@ -92,8 +92,8 @@ def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overla
 
 def test_a_model_of_outcomes_is_fitted_on_outcomes() -> None:
     about = {"n": 8579, "n_outcomes": 45766, "events": 100}
-    assert fitted_in_words(about) == "fitted on 45,766 outcomes of 100 earthquakes"
-    assert fitted_in_words({"n": 8579, "events": 100}) == (
+    assert describe.fitted_data(about) == "fitted on 45,766 outcomes of 100 earthquakes"
+    assert describe.fitted_data({"n": 8579, "events": 100}) == (
         "fitted on 8,579 critical values of 100 earthquakes"
     )
-    assert fitted_in_words({}) == ""
+    assert describe.fitted_data({}) == ""

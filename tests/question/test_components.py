@@ -29,7 +29,7 @@ from rbfrag.question.components import (
     SINGLE_ASSUMED,
     component_named,
 )
-from rbfrag.question.document import prediction_document
+from rbfrag.question.document import answer_numbers
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.service.app import make_app
@@ -103,11 +103,11 @@ def test_every_interface_equals_a_dense_integration(
     expected = dense(question, name)
     found = answer(question, component=name)
     assert found.probability == pytest.approx(expected, abs=1e-3)
-    document = prediction_document(
+    document = answer_numbers(
         {n: v for n, v in question.items() if n != "kind"}, kind=question.get("kind"),
         component=name, db=REFERENCE,
     )  # fmt: skip
-    assert document["probability"] == found.probability
+    assert document.probability == found.probability
     numbers = {n: [v, v] for n, v in question.items() if n != "kind"}
     many = rbfrag.predict(
         **numbers, kind=question.get("kind"), component=["single", name], db=REFERENCE
@@ -183,7 +183,7 @@ def test_what_does_not_go_with_a_component(
         question["motion"] = motion
         given = {"p2": 3.0, "kr": 0.1}
         with pytest.raises(InputError, match="component"):
-            prediction_document(given, motion=motion, component="rotd50", db=REFERENCE)
+            answer_numbers(given, motion=motion, component="rotd50", db=REFERENCE)
     with pytest.raises(InputError, match=expected) as error:
         rbfrag.predict(**question, db=REFERENCE)
     assert error.value.fields == ("component",)
@@ -191,7 +191,7 @@ def test_what_does_not_go_with_a_component(
 
 def test_the_note_names_the_measures_and_p_for_rotd50() -> None:
     question = {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.5, "pga_g": 0.3}
-    note = prediction_document(question, db=REFERENCE)["warnings"][-1]
+    note = answer_numbers(question, db=REFERENCE).warnings[-1]
     p = dense(question, "rotd50")
     assert note == (
         "PGV and PGA are assumed to be of a single horizontal component; as RotD50 P would be "
@@ -223,8 +223,8 @@ def test_there_is_no_note_where_the_component_is_known_or_does_not_matter(
     assert not any("component" in text for text in answer(question).warnings)
     numbers, name = {**question}, question.get("component")
     numbers.pop("component", None)
-    document = prediction_document(numbers, component=name, db=REFERENCE)
-    assert not any("component" in text for text in document["warnings"])
+    document = answer_numbers(numbers, component=name, db=REFERENCE)
+    assert not any("component" in text for text in document.warnings)
     many = rbfrag.predict(**{**numbers, "kr": [0.1, 0.1]}, component=name, db=REFERENCE)
     assert not any("component" in text for text in many.notes)
 

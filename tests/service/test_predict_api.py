@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import rbfrag
 from rbfrag.cli.main import app
-from rbfrag.cli.output import show_prediction
+from rbfrag.cli.output import print_result
 from rbfrag.question.document import answer_block
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
@@ -19,8 +19,7 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    document, _ = answer_block(given, **more, db=str(database))
-    show_prediction(document, given, json=True)
+    print_result(answer_block(given, **more, db=str(database)), json=True)
     return json.loads(capsys.readouterr().out)
 
 

@@ -16,7 +16,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.fragility.words import fitted_in_words
+from rbfrag.fragility import describe
 from rbfrag.results.numbers import rounded
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def fit_in_words(report: FitReport) -> Iterator[str]:
     )
     if why := report.details.get("why_method"):
         yield f"No method was named: {why}."
-    data = f"It is {fitted_in_words(report.model.row.diagnostics)}"
+    data = f"It is {describe.fitted_data(report.model.row.diagnostics)}"
     score = report.scores.get("log_loss_held_out")
     around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
     if score is None:

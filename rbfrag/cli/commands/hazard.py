@@ -21,7 +21,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import model_in_words
+from rbfrag.fragility import describe
 from rbfrag.hazards.report import range_in_words, rate_in_words
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.results.numbers import confidence, percent, return_period
@@ -247,7 +247,7 @@ def _print(
 
 def _short(document: dict[str, Any]) -> dict[str, Any]:
     """Return what is shown without --verbose."""
-    named = {**document, "model": model_in_words(document)}
+    named = {**document, "model": describe.model(document)}
     return rounded_values({name: named[name] for name in SHORT if named.get(name) is not None})
 
 

@@ -21,7 +21,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.fragility.words import row_in_words
+from rbfrag.fragility import describe
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
@@ -190,7 +190,7 @@ def _print(answer: LossAnswer, *, verbose: bool) -> None:
         document |= {f"{name}_{law}": value for name, value in bound.items()}
     known = {name: value for name, value in document.items() if value is not None}
     if not verbose:
-        known["model"] = "; ".join(map(row_in_words, answer.portfolio.models))
+        known["model"] = "; ".join(map(describe.stored_model, answer.portfolio.models))
     short = {name: known[name] for name in known if name.startswith(SHORT)}
     print_pairs(known if verbose else rounded_values(short))
     for curve in curves.values():

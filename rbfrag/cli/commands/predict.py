@@ -9,14 +9,14 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_result,
     print_rows,
     print_warnings,
-    show_prediction,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
 from rbfrag.cli.sentences import answer_in_short, table_in_words
-from rbfrag.fragility.words import units_to_check
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
 
 SHOWN = 40
@@ -107,7 +107,7 @@ def predict(
         )  # fmt: skip
         _show_table(summary, json=printing.json)
         return
-    from rbfrag.question.document import answer_block, prediction_document
+    from rbfrag.question.document import answer_block, answer_numbers
 
     question: dict[str, Any] = {**request}
     if record.motion is not None:
@@ -120,22 +120,22 @@ def predict(
     kind = inputs.pop("kind", None)
     if block_draws is None:
         with given.named():
-            document, inputs = answer_block(inputs, kind=kind, **question)
+            result = answer_block(inputs, kind=kind, **question)
     else:
         from rbfrag.exchange.block_draws import read_draws
 
         draws, weights = read_draws(block_draws)
         inputs = {**draws, **inputs}
-        document = prediction_document(inputs, kind=kind, weights=weights, **question)
-    show_prediction(document, inputs, json=printing.json, verbose=printing.verbose)
+        result = answer_numbers(inputs, kind=kind, weights=weights, **question)
+    print_result(result, json=printing.json, verbose=printing.verbose)
 
 
 def _show_table(summary: dict[str, Any], *, json: bool) -> None:
     if json:
         print_json(summary)
         return
-    warnings, rows = summary.pop("warnings"), summary.pop("blocks", None)
-    questions = units_to_check(warnings)
+    warnings, rows = diagnostics(summary.pop("warnings")), summary.pop("blocks", None)
+    questions = [text for text in warnings if text.code == "check_unit"]
     for text in (*questions, table_in_words(summary)):
         print(text)
     print()

@@ -19,7 +19,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility.words import model_in_words
+from rbfrag.fragility import describe
 from rbfrag.results.diagnostic import as_documents
 
 EXAMPLE = (
@@ -119,7 +119,7 @@ def shakemap(
         return
     print_sentences(map_in_words(document, own="lon" in several.columns))
     del document["warnings"]
-    named = {**document, "model": model_in_words(document)}
+    named = {**document, "model": describe.model(document)}
     short = rounded_values({name: named[name] for name in SHORT})
     print_pairs(document if printing.verbose else short)
     print_warnings(warnings)

@@ -14,7 +14,7 @@ from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_list import fitted_number
-from rbfrag.frames import Tabular
+from rbfrag.results.result import Tabular
 
 _FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.fragility import words
+from rbfrag.fragility import describe
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
@@ -149,7 +149,8 @@ def contents_of(
     options = {name: given[name] for name in ("kind", *REQUEST) if name in given}
     inputs = {name: value for name, value in given.items() if name not in options}
     how: dict[str, Any] = {**options, **answering}
-    document, read = answer_block(inputs, **how)
+    result = answer_block(inputs, **how)
+    document, read = result.as_dict(), result.inputs
     facts = facts_of(document["kind"])
     shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in OF_BLOCK})
     numbers = {name: value for name, value in read.items() if name not in OF_SHAKING}
@@ -168,10 +169,10 @@ def contents_of(
     warnings = diagnostics(document["warnings"], answered.document["warnings"] if answered else ())
     return Contents(
         sentences=(
-            *words.units_to_check(document["warnings"]),
-            words.headline(document),
+            *(text for text in warnings if text.code == "check_unit"),
+            *result.sentences(),
             *about_rate,
-            *(f"{label}: {text}" if label else text for label, text in words.lines(document, read)),
+            *(f"{label}: {text}" if label else text for label, text in result.lines()),
         ),
         tables=(
             ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
@@ -451,7 +452,9 @@ def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[T
     ]
     if document["event_low"] is not None:
         ends = document["event_low"], document["event_high"]
-        answer.append((f"share at {words.at_sites(document['sites'])} ({level})", interval(*ends)))
+        answer.append(
+            (f"share at {describe.at_sites(document['sites'])} ({level})", interval(*ends))
+        )
     inside = "inside" if document["in_domain"] else "outside"
     answer.append(("block and shaking", f"{inside} the fitted range"))
     hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
@@ -472,7 +475,7 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
 
 def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[str]:
     row = model.row
-    fitted = words.fitted_in_words(row.diagnostics) or "fitted"
+    fitted = describe.fitted_data(row.diagnostics) or "fitted"
     lines = [
         f"rbfrag {__version__}. Model {model.name} (method {row.method}, measures "
         f"{' '.join(model.term.inputs)}), {fitted}, {row.created[:10] or 'undated'}, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-from rbfrag.fragility.words import model_in_words
+from rbfrag.fragility import describe
 from rbfrag.plots.blocks.block import draw_block
 from rbfrag.plots.chart import draw_chart
 from rbfrag.plots.curve import AXIS, draw_curve
@@ -36,7 +36,7 @@ def panels_of(contents: Contents) -> list[Panel]:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))
     if contents.held is not None:
-        title = f"Design chart, model {model_in_words(contents.document)}"
+        title = f"Design chart, model {describe.model(contents.document)}"
         panels.append(Panel("chart", title, lambda part: _chart(part, contents)))
     if contents.rate is not None:
         title = "Hazard, and the shaking that the rate comes from"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
+from rbfrag.results.result import Tabular
 from rbfrag.solver.block.formulas import (
     array_elementwise,
     corner_distance,

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.result import Tabular
 from rbfrag.solver.quantity import positive
 
 Array = NDArray[np.float64]

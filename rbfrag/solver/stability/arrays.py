@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.result import Tabular
 from rbfrag.solver.block.arrays import REASONS, BlockArray, CodeArray, common_shape, in_chunks
 from rbfrag.solver.block.formulas import (
     SCALAR,

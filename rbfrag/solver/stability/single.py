@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any, Unpack
 
 from rbfrag.errors import InputError
-from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.result import Tabular
 from rbfrag.solver.block.formulas import SCALAR, bond_over_weight, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.quantity import (

@@ -1,0 +1,112 @@
+"""Blocks, shaking, models and their data in words, as the lines of answers print them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.results.numbers import with_interval
+from rbfrag.vocabulary.quantities import INTENSITY, MEASURES, NUMBERS, QUANTITIES
+
+if TYPE_CHECKING:
+    from rbfrag.db.model_file import ModelRow
+
+
+def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
+    """Return the measures of a question: "PGV 0.9 m/s, PGA 0.6 g"; medians where they scatter."""
+    parts = [
+        f"{_measure(name)} {inputs[name]:.4g} {QUANTITIES[name].unit}".rstrip()
+        for name in INTENSITY
+        if isinstance(inputs.get(name), int | float) and name not in uncertain
+    ]
+    parts += [
+        f"median {_measure(name)} {about['median']:.2g} {QUANTITIES[name].unit}, σ_ln "
+        f"{about['sigma']:.2g}, integrated"
+        for name, about in uncertain.items()
+    ]
+    return ", ".join(parts)
+
+
+def drained_bound(bound: Mapping[str, float | None]) -> str:
+    """Return the answer without water pressure: "k_r = 0.3, P = 8.4 % (6.4–11 %), without …"."""
+    yields = [
+        f"{QUANTITIES[name].symbol} = {value:.3g}, "
+        for name, value in bound.items()
+        if name in NUMBERS and value is not None
+    ]
+    p, low, high = (float(bound[name] or 0.0) for name in ("probability", "ci_low", "ci_high"))
+    return f"{''.join(yields)}P = {with_interval(p, low, high)}, without water pressure"
+
+
+def at_sites(number: float) -> str:
+    """Return what the range of one earthquake is of."""
+    return f"{number:,g} site{'s' if number > 1 else ''} of one earthquake"
+
+
+def block(method: str, inputs: Mapping[str, Any]) -> str:
+    """Return the numbers of a block and how it stands: "p² = 7.21 s⁻², k_r = 0.2; rock …".
+
+    Args:
+        method: the one that the model which answers is fitted by.
+        inputs: what the question gives, by the names of :func:`rbfrag.predict`.
+    """
+    from rbfrag.fragility.methods import method_named
+
+    model_block = method_named(method).block
+    values = {
+        name: inputs.get(name)
+        for name in (model_block.size, model_block.strength)
+        if name is not None
+    }
+    if not all(isinstance(value, (int, float)) for value in values.values()):
+        return ""
+    numbers = [
+        f"{QUANTITIES[name].symbol} = {value:.3g}{' s⁻²' if name == model_block.size else ''}"
+        for name, value in values.items()
+    ]
+    limit_m = inputs.get("displacement_m")
+    if isinstance(limit_m, (int, float)):
+        numbers.append(f"displacement limit {limit_m:g} m")
+    return "; ".join(filter(None, (", ".join(numbers), model_block.support)))
+
+
+def model(document: Mapping[str, Any]) -> str:
+    """Return what people call the model of an answer: what it reads, and what tells it apart."""
+    from rbfrag.fragility.measures import TERMS
+    from rbfrag.fragility.method import TOPPLING_BLOCK
+    from rbfrag.fragility.methods import method_named
+
+    if (term := TERMS.get(document["term"])) is None:  # several models
+        return str(document["model"])
+    read = map(_measure, term.inputs)
+    method = method_named(document["method"])
+    kind = "" if method.block is TOPPLING_BLOCK else method.block.kind.replace("_", " ")
+    own = "" if method.forms[term.name].rank == 0 else method.name
+    sized = "size-dependent" if "block's" in term.title else ""
+    return ", ".join(filter(None, (*read, sized, kind, own)))
+
+
+def stored_model(row: ModelRow) -> str:
+    """Return what people call a stored model."""
+    return model({"model": row.name, "term": row.term, "method": row.method})
+
+
+def measures(names: Sequence[str]) -> str:
+    """Return measures as people call them: "PGV and SA(1 s)"."""
+    *others, last = map(_measure, names)
+    return " and ".join(filter(None, (", ".join(others), last)))
+
+
+def _measure(name: str) -> str:
+    return MEASURES[name].title or QUANTITIES[name].symbol
+
+
+def fitted_data(diagnostics: Mapping[str, Any]) -> str:
+    """Return what a model is fitted on: outcomes, or critical values; empty where not stored."""
+    outcomes, events = diagnostics.get("n_outcomes"), diagnostics.get("events")
+    if not ((number := outcomes or diagnostics.get("n")) and events):
+        return ""
+    what = "outcomes" if outcomes else "critical values"
+    recorded = diagnostics.get("recorded_events") != 0
+    of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
+    return f"fitted on {number:,} {what} of {events:,} {of}"

@@ -1,0 +1,111 @@
+"""`Result`: an answer that every interface shows in the same words.
+
+The class of an answer states its sentences, its labelled lines and its tables; the command line,
+HTTP, the web page, reports and notebooks print these and write none of their own. The design
+follows result objects such as those of statsmodels (``summary()``): numbers and their presentation
+belong to one object, so that a warning cannot be lost on the way to one of the outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rbfrag.results.diagnostic import with_diagnostics
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class TextLine(NamedTuple):
+    """A labelled line of an answer: "Model     bounded-pgv_kr, …"; an empty label continues."""
+
+    label: str
+    text: str
+
+
+class TextTable(NamedTuple):
+    """A table for a terminal; without headers its rows are names and values."""
+
+    headers: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+
+class Tabular:
+    """An answer that turns into a table: one row, or one for each element of its arrays.
+
+    Base of dataclasses.
+    """
+
+    def table_columns(self) -> Mapping[str, Any]:
+        """Return the columns by name; arrays are flat."""
+        from rbfrag.frames import columns_of
+
+        return columns_of(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the answer as a pandas table, with the names and units of its fields."""
+        from rbfrag.frames import frame_of
+
+        return frame_of(self.table_columns())
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows, so that ``pandas.DataFrame(answer)`` is the same table."""
+        yield from self.to_frame().to_dict("records")
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        from rbfrag.frames import html_of
+
+        return html_of(self.to_frame())
+
+    def __repr__(self) -> str:
+        """Return name and columns on one line; of arrays their number."""
+        parts = (
+            f"{name}=[{value.size} values]" if hasattr(value, "ravel") else f"{name}={value!r}"
+            for name, value in self.table_columns().items()
+            if value is not None
+        )
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+class Result(Tabular):
+    """Base of the answers; a subclass is a dataclass with ``warnings``."""
+
+    warnings: Sequence[str]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number that decides, with its interval, and what belongs to it."""
+        raise NotImplementedError
+
+    def headline(self) -> str:
+        """Return the number that decides, with its interval."""
+        return next(self.sentences())
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield labelled lines: what was asked, and which model answers."""
+        return iter(())
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield tables for the terminal.
+
+        Args:
+            verbose: with every value.
+        """
+        return iter(())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        raise NotImplementedError
+
+    def document(self, *, text: bool = False) -> dict[str, Any]:
+        """Return the JSON document: the contract's keys and ``diagnostics``.
+
+        Args:
+            text: with the sentences and labelled lines under ``text``.
+        """
+        document: dict[str, Any] = with_diagnostics(self.as_dict())
+        if text:
+            lines = [line._asdict() for line in self.lines()]
+            document["text"] = {"sentences": [*self.sentences()], "lines": lines}
+        return document
