@@ -55,6 +55,7 @@ KIND_FILES = (
     "fragility/method.py",
     "fragility/methods/",
     "migrations/",
+    "vocabulary/headers.py",
 )
 """Where the name of a kind may stand as a string; elsewhere a kind is a value."""
 

@@ -1,23 +1,22 @@
 """Headers and cells of tables: which column is which field, in which unit.
 
-Names in five languages stand in ``headers.toml``. A column that is not understood is named as
-ignored; one that sounds like an input that would change the answer is rejected.
+Names in five languages stand in :mod:`rbfrag.vocabulary.headers`. A column that is not understood
+is named as ignored; one that sounds like an input that would change the answer is rejected.
 """
 
 from __future__ import annotations
 
 import re
-import tomllib
 import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.stability.joint import DRAINED, UNDRAINED
+from rbfrag.vocabulary import headers
 from rbfrag.vocabulary.quantities import COLUMNS, INPUTS, INTENSITY, QUANTITIES, column_of, word_of
 
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/m2": 1.0, "kn/m2": 1e3, "mn/m2": 1e6}
@@ -119,43 +118,7 @@ def _names() -> dict[str, str]:
     return by_name
 
 
-class _Vocabulary(NamedTuple):
-    """The contents of ``headers.toml``, ready to be looked up."""
-
-    concepts: Mapping[str, tuple[str, ...]]
-    patterns: tuple[tuple[str, frozenset[str], frozenset[str], str | None], ...]
-    phrases: Mapping[str, str]
-    loud: tuple[tuple[str, str], ...]
-    quiet: tuple[str, ...]
-    kinds: Mapping[str, str]
-    answers: Mapping[str, bool]
-    drainages: Mapping[str, str]
-
-
-@cache
-def _vocabulary() -> _Vocabulary:
-    text = Path(__file__).with_name("headers.toml").read_text(encoding="utf-8")
-    data = tomllib.loads(text)
-    concepts = {w: tuple(c.split()) for c, words in data["words"].items() for w in words}
-    concepts |= dict.fromkeys(data["words"]["filler"], ())
-    patterns = []
-    for field, texts in data["fields"].items():
-        for text in texts:
-            words, _, unit = text.partition(" = ")
-            optional = {w[1:] for w in words.split() if w[0] == "~"}
-            required = frozenset(w for w in words.split() if w[0] != "~")
-            patterns.append((field, required, required | optional | {"block"}, unit or None))
-    kinds = {w: kind for kind, words in data["kinds"].items() for w in words}
-    return _Vocabulary(
-        concepts,
-        tuple(patterns),
-        {phrase: field for field, phrases in data["phrases"].items() for phrase in phrases},
-        tuple((stem, field) for field, stems in data["loud"].items() for stem in stems),
-        tuple(data["quiet"]["words"]),
-        kinds | {kind.replace("_", " "): kind for kind in KINDS},
-        {w: name == "yes" for name, words in data["answers"].items() for w in words},
-        {w: name for name, words in data["drainage"].items() for w in words},
-    )
+_KINDS = headers.KINDS | {kind.replace("_", " "): kind for kind in KINDS}
 
 
 def normalized_words(text: str) -> list[str]:
@@ -198,16 +161,16 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
     name = _names().get(_as_name(text))
     if name is not None:
         return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
-    known, words = _vocabulary(), normalized_words(text)
-    column = known.phrases.get(" ".join(words))
+    words = normalized_words(text)
+    column = headers.PHRASES.get(" ".join(words))
     default = None
     if column is None:
         meaning: set[str] = set()
         for word in words:
-            if (concepts := known.concepts.get(word)) is None:
+            if (concepts := headers.CONCEPTS.get(word)) is None:
                 return None
             meaning.update(concepts)
-        for pattern in known.patterns:
+        for pattern in headers.PATTERNS:
             if pattern[1] <= meaning <= pattern[2]:
                 column, _, _, default = pattern
                 break
@@ -226,12 +189,12 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
 
 def kind_named(text: str) -> str | None:
     """Return the kind of failure that a word names, in any of five languages; None for no kind."""
-    return _vocabulary().kinds.get(" ".join(normalized_words(text)))
+    return _KINDS.get(" ".join(normalized_words(text)))
 
 
 def yes_or_no(text: str) -> bool | None:
     """Return whether a cell says yes; None where it says neither yes nor no."""
-    return _vocabulary().answers.get(" ".join(normalized_words(text)))
+    return headers.ANSWERS.get(" ".join(normalized_words(text)))
 
 
 def drainage_named(text: str) -> str:
@@ -241,7 +204,7 @@ def drainage_named(text: str) -> str:
     """
     word = " ".join(normalized_words(text))
     answer = yes_or_no(text)
-    named = _vocabulary().drainages.get(word, text)
+    named = headers.DRAINAGES.get(word, text)
     return named if answer is None else DRAINED if answer else UNDRAINED
 
 
@@ -253,7 +216,7 @@ def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | N
     """
     by_word = {cell: kind_named(cell) for cell in dict.fromkeys(cells) if cell.strip()}
     others = [word for word, kind in by_word.items() if kind is None]
-    near = next((w for w in others for k in _vocabulary().kinds if _is_near(w.lower(), k)), None)
+    near = next((w for w in others for k in _KINDS if _is_near(w.lower(), k)), None)
     if near is not None or (others and len(others) < len(by_word)):
         raise InputError(
             f"{source}: column {header!r}: {near or others[0]!r:.42} is not a kind of failure; use "
@@ -390,11 +353,11 @@ class Header(NamedTuple):
 
 def sounds_like(header: str) -> str | None:
     """Return the field that would change the answer and that a header sounds like."""
-    known, words = _vocabulary(), normalized_words(header)
-    if any(word.startswith(known.quiet) for word in words):
+    words = normalized_words(header)
+    if any(word.startswith(headers.REMARKS) for word in words):
         return None
     for word in words:
-        for stem, field in known.loud:
+        for stem, field in headers.STEMS:
             if word == stem[:-1] if stem[-1] == "=" else word.startswith(stem):
                 return field
     return None

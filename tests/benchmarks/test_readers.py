@@ -33,7 +33,6 @@ NO_READERS = {
     "campaign/machine.py:_processor": "the computer's own description",
     "exchange/openquake/datastore.py:_opened": "HDF5's own library, which damaged bytes may hang",
     "plots/coast.py:world": "the package's own coastline",
-    "question/table.py:_vocabulary": "the package's own names of columns",
     "rockmasses/file.py:rock_mass_of_toml": "is given the text",
     "service/app.py:lifespan": "opens the pool of processes",
     "service/app.py:make_app": "its inner function opens the pool of processes",
