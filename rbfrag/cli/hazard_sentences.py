@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.hazards import between_measures
@@ -29,19 +29,6 @@ def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
 def place_in_words(lon: float, lat: float) -> str:
     """Return a place of a longitude and latitude [deg] with letters in the place of signs."""
     return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
-
-
-def most_often(names: Sequence[str | None], rates: Sequence[float], most: int = 3) -> str:
-    """Return which of several blocks fail most often, each with its return period.
-
-    Args:
-        names: identifiers of the blocks; a block without one is called by its number.
-        rates: how often each fails [1/yr].
-        most: how many are named at most.
-    """
-    first = sorted(range(len(rates)), key=lambda i: -rates[i])[:most]
-    named = [f"{names[i] or f'block {i + 1}'} ({return_period(rates[i])})" for i in first]
-    return f"Shortest return periods: {', '.join(named)}"
 
 
 def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:

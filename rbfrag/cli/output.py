@@ -107,10 +107,11 @@ def print_result(
     for note in notes:
         if note not in questions:
             print_note(note, fields)
+    width = get_terminal_size().columns if sys.stdout.isatty() else None
     for table in result.tables(verbose=verbose):
         print()
         if table.headers:
-            print_table(table.headers, table.rows)
+            print_table(table.headers, table.rows, width=width)
         else:
             print_pairs({str(name): value for name, value in table.rows})
 

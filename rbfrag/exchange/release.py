@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, Blocks, read_blocks
 from rbfrag.exchange.tables.files import write_block_table
-from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.question.sections import in_sections
 from rbfrag.question.shapes import SHAPES
 from rbfrag.solver.block.arrays import BlockArray

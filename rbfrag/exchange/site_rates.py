@@ -14,9 +14,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
 from rbfrag.exchange.site_join import WITHIN_KM, join_sites
 from rbfrag.fragility.method import TOPPLING_BLOCK
-from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.report import rate_columns as rates_in_columns
+from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.question.blocks import numbers_in
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.solver.kinds import KINDS
@@ -164,7 +163,7 @@ def rate_columns(
         "lon": lon,
         "lat": lat,
         **numbers,
-        **rates_in_columns(answer),
+        **answer.rate_columns,
         "years": answer.years,
     }
     result: dict[str, NDArray[Any]] = {

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
@@ -33,6 +33,7 @@ from rbfrag.hazards.branches import (
 )
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
+from rbfrag.hazards.hazard_answer import BranchRate, HazardAnswer
 from rbfrag.hazards.joint_rate import JointRate, joint_at_sites
 from rbfrag.hazards.kernel import (
     KernelBlocks,
@@ -50,8 +51,6 @@ from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.results.result import Tabular
-from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
@@ -63,139 +62,6 @@ NUMERICAL_AIM = 1e-3
 
 NEVER = 1e-9
 """Annual rate below which no such warning is given: such rates come from the last level alone."""
-
-
-@dataclass(frozen=True, eq=False)
-class BranchRate:
-    """What one hazard curve of several says.
-
-    Args:
-        name: the branch or statistic that the curve is of, or where it comes from.
-        weight: its weight; None for a curve that is no branch.
-        annual_rate: rates of the blocks [1/a], shape (m,).
-        expected: mean number of failures a year of all blocks [1/a].
-    """
-
-    name: str
-    weight: float | None
-    annual_rate: FloatArray
-    expected: float
-
-    def as_dict(self) -> dict[str, object]:
-        """Return the numbers under the keys of the JSON contract."""
-        return {
-            "name": self.name, "weight": self.weight, "expected_failures_per_year": self.expected,
-        }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class HazardAnswer(Tabular):
-    """Annual rates of failure of m blocks at the sites of some hazard curves.
-
-    Args:
-        annual_rate: mean number of failures a year [1/a], shape (m,); NaN for a block that
-            cannot be used.
-        ci_low: lower end of the interval from the uncertain parameters of the model.
-        ci_high: upper end of it.
-        branches_low: rate that 5 % of the branches of a logic tree do not exceed, by their
-            weights; NaN without weights.
-        branches_high: the same of 95 %.
-        numerical_error: how far quadrature may be off, relative to the rates, shape (m,).
-        probability: probability of at least one failure in `years`, shape (m,).
-        years: the period [a].
-        level: confidence level of the interval.
-        model: name of the model that answered.
-        term: its intensity term.
-        method: how it was fitted.
-        site: index of the site of each block among `curves`, shape (m,).
-        curves: the curve of each site that answers, or the first of its branches.
-        edges: levels of the curve's measure between which contributions are given, (k + 1,).
-        contribution: part of the rate of the one block or class from each interval [1/a], shape
-            (1, k); without rows for several blocks.
-        above: part from beyond the last level, at least [1/a], shape (m,).
-        above_at_most: the same at most.
-        measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
-        joints: of each site earthquakes with at least one failure among its blocks; None where
-            that is not asked for, or there is one block.
-        curve_kind: what of a logic tree the curve is (mean, quantile-0.84, rlz-001), the weighted
-            branches, or None where that is not stated.
-        branches: what each of several curves says; empty for one.
-        quantiles: quantiles of the rates over branches with weights and the parameters of the
-            model together, by their probability, shape (m,) each; empty without weights.
-        total_low: lower end of the interval of the sum of all rates, from the model's parameters,
-            which all blocks have in common [1/a].
-        total_high: upper end of it.
-        warnings: what to know about the answer.
-        reason: why a block cannot be used, shape (m,); empty text elsewhere.
-        kinds: how each block fails, shape (m,); empty text where it cannot be used.
-        count: number of identical blocks of each row, shape (m,).
-        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
-            not known.
-        drained: rates of the blocks without water pressure [1/a], shape (m,), NaN where they have
-            none; None where all blocks are dry.
-    """
-
-    annual_rate: FloatArray
-    ci_low: FloatArray
-    ci_high: FloatArray
-    branches_low: FloatArray
-    branches_high: FloatArray
-    numerical_error: FloatArray
-    probability: FloatArray
-    years: float
-    level: float
-    model: str
-    term: str
-    method: str
-    site: Indices
-    curves: tuple[HazardCurve, ...]
-    edges: FloatArray
-    contribution: FloatArray
-    above: FloatArray
-    above_at_most: FloatArray
-    measure: str
-    joints: tuple[JointRate | None, ...]
-    curve_kind: str | None
-    branches: tuple[BranchRate, ...]
-    quantiles: Mapping[float, FloatArray]
-    total_low: float
-    total_high: float
-    warnings: tuple[str, ...]
-    reason: NDArray[np.object_]
-    kinds: NDArray[np.object_]
-    count: FloatArray
-    tau: float | None = None
-    drained: FloatArray | None = None
-
-    @property
-    def modes(self) -> NDArray[np.object_]:
-        """Failure mode of each block, shape (m,)."""
-        return np.array([mode_of_kind(kind) for kind in self.kinds], dtype=object)
-
-    @property
-    def joint(self) -> JointRate | None:
-        """What the blocks of the first site do together, where that is asked for."""
-        return self.joints[0]
-
-    @property
-    def annual_rate_any(self) -> float | None:
-        """Annual rate of earthquakes with at least one failure at the one site [1/a].
-
-        None for several blocks unless their joint answer is asked for, and where their dependence
-        is not known: `joint` has its bounds.
-        """
-        if len(self.curves) > 1:
-            return None
-        if self.joint is not None:
-            return self.joint.annual_rate_any
-        known = np.flatnonzero(~np.isnan(self.annual_rate))
-        alone = known.size == 1 and self.count[known[0]] == 1.0
-        return float(self.annual_rate[known[0]]) if alone else None
-
-    @property
-    def expected_failures_per_year(self) -> float:
-        """Mean number of failures a year of all blocks [1/a]: Σ count · rate of the rates known."""
-        return float(np.nansum(self.count * self.annual_rate))
 
 
 def hazard(

@@ -28,7 +28,6 @@ from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
 from rbfrag.hazards.kernel import interval_end
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.report import or_null
 from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 from rbfrag.hazards.uncertainty import (
@@ -41,6 +40,7 @@ from rbfrag.hazards.uncertainty import (
 )
 from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model, mode_of_kind
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray
 
 Run = Callable[[Iterator[SomeYears], int, EventYears], Iterator[PartCounts]]
@@ -304,7 +304,8 @@ class LossAnswer(Tabular):
         ends = (interval_end(rate, half, side) for side in (-1.0, 1.0))
         answered = zip(
             self.portfolio.block_ids, self.portfolio.site_ids,
-            *(or_null(values) for values in (rate, error, cost, *ends)), strict=True,
+            *(map(finite_or_none, values.tolist()) for values in (rate, error, cost, *ends)),
+            strict=True,
         )  # fmt: skip
         rows: list[dict[str, Any]] = [
             {**dict.fromkeys(names), **self.refused[i]}

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.fragility import describe
-from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.report import shares_between
+from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.plots import canvas
 from rbfrag.plots.curve import AXIS
 from rbfrag.plots.labels import as_written
@@ -67,7 +66,7 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
     top.set_ylabel("exceedances a year, λ [1/a]")
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
     edges = curve.levels
-    percent = 100.0 * shares_between(answer, edges)
+    percent = 100.0 * answer.fractions_between(edges)
     bottom.bar(
         edges[:-1], percent, width=np.diff(edges), align="edge",
         color="#2b6cac", edgecolor="white", linewidth=0.3,

@@ -30,6 +30,21 @@ class TextTable(NamedTuple):
     headers: Sequence[str]
     rows: Sequence[Sequence[object]]
 
+    @classmethod
+    def of_rows(cls, rows: Sequence[Mapping[str, object]], *, verbose: bool = False) -> TextTable:
+        """Return rows under their names, without the columns that are empty in all of them.
+
+        Args:
+            rows: values by name, the same names in each.
+            verbose: with all digits; else three significant digits.
+        """
+        names = [name for name in rows[0] if any(row[name] not in (None, "") for row in rows)]
+
+        def printed(value: object) -> object:
+            return value if verbose or not isinstance(value, float) else float(f"{value:.3g}")
+
+        return cls(names, [[printed(row[name]) for name in names] for row in rows])
+
 
 class Tabular:
     """An answer that turns into a table: one row, or one for each element of its arrays.

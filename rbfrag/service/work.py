@@ -133,7 +133,6 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     from rbfrag.hazards.answer import hazard_at_sites, with_drained_rates
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
-    from rbfrag.hazards.report import as_dict
 
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
@@ -158,7 +157,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         ),
         given,
     )
-    return json_text(as_dict(rates, [None] * len(curves)))
+    return json_text(rates.as_dict())
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:

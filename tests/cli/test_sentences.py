@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.hazard_sentences import campaign_in_words, most_often
+from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.sentences import rock_mass_in_words, table_in_words
-from rbfrag.hazards.report import rate_in_words
 from rbfrag.results.numbers import return_period, return_periods, rounded
 
 
@@ -28,20 +27,6 @@ def test_an_interval_of_return_periods_starts_with_the_shorter() -> None:
     assert return_periods(1.0 / 5312.0, 1.0 / 3704.0) == "3,700–5,300"
     assert return_periods(0.0, 1.0 / 3704.0) == "3,700–over 100 million"
     assert return_periods(0.001, 0.001001) == "1,000"
-
-
-def test_a_rate_with_its_interval_from_the_shorter_time_to_the_longer() -> None:
-    document = {
-        "annual_rate": 2.4e-4, "ci_low": 1.88e-4, "ci_high": 2.94e-4, "probability": 0.01195,
-        "years": 50.0, "level": 0.95,
-    }  # fmt: skip
-    assert rate_in_words(document) == (
-        "Return period of failure 4,200 years   (95 % confidence interval 3,400–5,300)",
-        "Mean annual rate 0.00024 /yr; P(failure in 50 years) = 1.2 % (0.94–1.5 %)",
-    )
-    drained = {**document, "drained": {"annual_rate": 1e-4}}
-    assert rate_in_words(drained)[2] == "Drained return period 10,000 years"
-    assert rate_in_words(drained, "Return period between")[0] == "Return period between"
 
 
 @pytest.mark.parametrize(
@@ -98,10 +83,3 @@ def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
             },
         }  # fmt: skip
         assert list(rock_mass_in_words(document))[1].endswith(end)
-
-
-def test_the_blocks_that_fail_most_often_come_first() -> None:
-    rates = [1e-3, 0.0, 4e-3, 2e-3, 1e-4]
-    assert most_often(["a", "b", None, "d", "e"], rates) == (
-        "Shortest return periods: block 3 (250 years), d (500 years), a (1,000 years)"
-    )

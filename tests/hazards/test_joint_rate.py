@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, cast
 
@@ -15,10 +16,10 @@ from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.hazards import joint_rate
 from rbfrag.hazards.annual_rate import failure_rate
-from rbfrag.hazards.answer import HazardAnswer, hazard, hazard_at_sites
+from rbfrag.hazards.answer import hazard, hazard_at_sites
 from rbfrag.hazards.branches import mixture_quantiles
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
-from rbfrag.hazards.report import as_dict
+from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.question import predict
 from tests.fragility.conftest import SHARED, model_row
@@ -214,7 +215,7 @@ def at_two_sites(joint: bool) -> HazardAnswer:
 
 
 def test_keys_of_several_sites() -> None:
-    found = as_dict(at_two_sites(joint=True), ["x", "y", "z"])
+    found = replace(at_two_sites(joint=True), names=("x", "y", "z")).as_dict()
     assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
         ("B", "x"), ("B", "y"), ("A", "z"),
     ]  # fmt: skip

@@ -2,45 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 from rbfrag.cli.commands.simulate import WorkerOptions
-from rbfrag.cli.hazard_sentences import most_often, rounded_values
-from rbfrag.cli.output import (
-    check_files,
-    print_json,
-    print_pairs,
-    print_rows,
-    print_table,
-    print_warnings,
-    write_table,
-)
+from rbfrag.cli.output import check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility import describe
-from rbfrag.hazards.report import range_in_words, rate_in_words
 from rbfrag.results.diagnostic import diagnostics
-from rbfrag.results.numbers import confidence, percent, return_period
-from rbfrag.vocabulary.quantities import BLOCK, QUANTITIES, WHOLE
+from rbfrag.vocabulary.quantities import BLOCK, WHOLE
 
 if TYPE_CHECKING:
-    from rbfrag.hazards.answer import HazardAnswer
     from rbfrag.hazards.curve import CurveKeywords
     from rbfrag.question.fields import AnsweringFields
-
-SHORT = (
-    "site", "annual_rate", "ci_low", "ci_high", "annual_rate_any", "expected_failures_per_year",
-    "expected_failures_low", "expected_failures_high", "branches_low", "branches_high",
-    "probability", "probability_any", "years", "model", "imt", "curve_kind",
-)  # fmt: skip
-"""Values that are shown without --verbose."""
-
-MOST_ROWS = 20
-"""Blocks that people are shown; JSON and tables have all."""
 
 EXAMPLE = (
     "Example:  rbfrag hazard pgv-curve.csv --height 2.4 --width 0.5 --dip 3 --component rotd50"
@@ -124,7 +100,6 @@ def hazard(
     from rbfrag.hazards.branches import branch_weights
     from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.kernel import rate_part
-    from rbfrag.hazards.report import as_dict
     from rbfrag.question.question import is_wet, no_drained_bound, without_water
 
     check_files(table=out, plot=plot, excel_text=excel_text)
@@ -171,125 +146,18 @@ def hazard(
             answer = replace(answer, drained=drained)
         except InputError as error:
             remarks += (no_drained_bound(error),)
-    notes = diagnostics(remarks, at.remarks, answer.warnings)
+    answer = replace(
+        answer, names=tuple(at.names), rejected={} if rows is None else rows.refused_by_row(),
+        warnings=diagnostics(remarks, at.remarks, answer.warnings),
+    )  # fmt: skip
     if out is not None:
         table = rate_columns(answer, at.columns, rows)
-        write_table(table, out, excel_text=excel_text, notes=notes)
+        write_table(table, out, excel_text=excel_text, notes=answer.warnings)
     if release is not None:
         table = release_columns(answer, at.columns)
-        write_table(table, release, excel_text=excel_text, notes=notes)
+        write_table(table, release, excel_text=excel_text, notes=answer.warnings)
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(at.sites[0][0], answer, plot)
-    document = as_dict(
-        answer, at.names, (*remarks, *at.remarks), None if rows is None else rows.refused_by_row()
-    )
-    if printing.json:
-        print_json(document)
-        return
-    _print(document, answer, at.names, verbose=printing.verbose)
-
-
-def _print(
-    document: dict[str, Any],
-    answer: HazardAnswer,
-    names: list[str | None],
-    *,
-    verbose: bool,
-) -> None:
-    from rbfrag.hazards import between_measures
-
-    warnings = document.pop("warnings")
-    branches = document.pop("branches", None)
-    spread = None if answer.tau is None else between_measures.in_words(answer.tau)
-    rows = document.pop("blocks", None)
-    if rows is not None:
-        for sentence in (*_of_all(answer), most_often(names, answer.annual_rate.tolist())):
-            print(sentence)
-        if spread is not None:
-            print(spread)
-        document.pop("sites", None)
-        for law, bound in document.pop("bounds", {}).items():
-            document |= {f"{name}_{law}": value for name, value in bound.items()}
-        counts = document.pop("annual_rate_at_least", None)
-        print_pairs(document if verbose else _short(document))
-        shown = rows[: len(rows) if verbose else MOST_ROWS]
-        wet = any(row["drained"] for row in rows)
-        for row in shown:
-            bound = row.pop("drained")
-            if wet:
-                row["drained_annual_rate"] = None if bound is None else bound["annual_rate"]
-        for some in filter(None, (counts, branches, shown)):
-            print()
-            if not verbose:
-                for row in some:
-                    row.pop("numerical_error", None)
-            print_rows(some if verbose else [rounded_values(row) for row in some])
-        if len(shown) < len(rows):
-            print(f"{len(rows) - len(shown):,} more: --out FILE writes all, --verbose prints them")
-    else:
-        for sentence in rate_in_words(document, range_in_words(answer)):
-            print(sentence)
-        del document["contributions"], document["drained"]
-        if spread is not None:
-            print(spread)
-        print()
-        print_pairs(document if verbose else _short(document))
-        if document["annual_rate"] > 0.0:
-            print()
-            print_table(["from", "to", "share_%"], _shares(answer, answer.curves[0]))
-        if branches:
-            print()
-            print_table(list(branches[0]), [list(row.values()) for row in branches])
-    print_warnings(warnings)
-
-
-def _short(document: dict[str, Any]) -> dict[str, Any]:
-    """Return what is shown without --verbose."""
-    named = {**document, "model": describe.model(document)}
-    return rounded_values({name: named[name] for name in SHORT if named.get(name) is not None})
-
-
-def _of_all(answer: HazardAnswer) -> Iterator[str]:
-    """Yield what all blocks do, in sentences."""
-    size, sites = int(answer.count.sum()), len(answer.curves)
-    expected = answer.expected_failures_per_year
-    ends = confidence(answer.level, f"{answer.total_low:.2g}–{answer.total_high:.2g}")
-    where = f" at {sites:,} sites" if sites > 1 else ""
-    yield f"Expected failures {expected:.2g} /yr of {size:,} blocks{where}   ({ends})"
-    for curve, joint in zip(answer.curves, answer.joints, strict=True):
-        if joint is None:
-            continue
-        place = f"{curve.place}: at" if curve.place else "At"
-        period = f"P in {answer.years:g} years"
-        rate, chance = joint.annual_rate_any, joint.probability_any
-        if rate is not None and chance is not None:
-            yield (
-                f"{place} least one failure: return period {return_period(rate)}; {period} "
-                f"{percent(chance)}"
-            )
-            continue
-        least, most = (
-            percent(joint.bounds[name]["probability_any"])
-            for name in ("fully_dependent", "independent")
-        )
-        ends = f"{least} (full dependence) to {most} (independent)"
-        yield f"{place} least one failure: {period} {ends}"
-
-
-def _shares(answer: Any, curve: Any) -> list[list[object]]:
-    """Return which shaking the rate comes from, between the levels of the curve."""
-    from rbfrag.hazards.report import shares_between
-
-    unit = QUANTITIES[answer.measure].unit
-    levels, imt, parts = curve.levels, curve.imt, shares_between(answer, curve.levels)
-    rows: list[list[object]] = [
-        [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
-        for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)
-        if share >= 5e-4
-    ]
-    beyond = answer.above[0] / answer.annual_rate[0]
-    if beyond >= 5e-4:
-        rows.append([f"{imt} {levels[-1]:.3g}", "beyond", round(100.0 * float(beyond), 1)])
-    return rows
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())

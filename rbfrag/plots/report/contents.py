@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
@@ -18,11 +19,11 @@ from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.annual_rate import probability_in
-from rbfrag.hazards.answer import HazardAnswer, hazard
+from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.branches import Weights
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.report import as_dict, range_in_words, rate_in_words
+from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
@@ -79,7 +80,11 @@ class Rate:
 
     curve: HazardCurve
     answer: HazardAnswer
-    document: dict[str, Any]
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The answer under the keys of the JSON contract."""
+        return self.answer.as_dict()
 
 
 class Drawing(NamedTuple):
@@ -162,10 +167,9 @@ def contents_of(
         (group,) = described(without_water(inputs), options.get("kind")).groups
         bound = _rate({**group.numbers, "kind": group.kind}, rate or RateQuestion(), how)
         if bound is not None:
-            answered.document["drained"] = {"annual_rate": bound.document["annual_rate"]}
-    about_rate: tuple[str, ...] = ()
-    if answered is not None:
-        about_rate = rate_in_words(answered.document, range_in_words(answered.answer))
+            drained = bound.answer.annual_rate
+            answered = replace(answered, answer=replace(answered.answer, drained=drained))
+    about_rate = () if answered is None else answered.answer.sentences()
     warnings = diagnostics(document["warnings"], answered.document["warnings"] if answered else ())
     return Contents(
         sentences=(
@@ -377,7 +381,7 @@ def _rate(
     answer = hazard(
         curves, weights=question.weights, years=question.years, **block, **question.meaning, **how
     )
-    return Rate(curves[0], answer, as_dict(answer, [None]))
+    return Rate(curves[0], answer)
 
 
 def _held(

@@ -1,0 +1,429 @@
+"""Annual rates of failure: the answer of `hazard`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.fragility import describe
+from rbfrag.hazards import between_measures
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.joint_rate import JointRate
+from rbfrag.hazards.mass import Indices
+from rbfrag.results.numbers import (
+    NEVER,
+    confidence,
+    percent,
+    return_period,
+    return_periods,
+    with_interval,
+    years,
+)
+from rbfrag.results.result import Result, TextLine, TextTable
+from rbfrag.solver.kinds import by_model, mode_of_kind
+from rbfrag.solver.quantity import finite_or_none
+from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import QUANTITIES
+
+ROWS_SHOWN = 20
+"""Blocks that a terminal lists; documents and written tables have all."""
+
+SHORTEST_SHOWN = 3
+"""Blocks that are named by their return periods."""
+
+SMALLEST_FRACTION = 5e-4
+"""Contributions below this fraction of a rate are not printed."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchRate:
+    """What one hazard curve of several says.
+
+    Args:
+        name: the branch or statistic that the curve is of, or where it comes from.
+        weight: its weight; None for a curve that is no branch.
+        annual_rate: rates of the blocks [1/a], shape (m,).
+        expected: mean number of failures a year of all blocks [1/a].
+    """
+
+    name: str
+    weight: float | None
+    annual_rate: FloatArray
+    expected: float
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the numbers under the keys of the JSON contract."""
+        return {
+            "name": self.name, "weight": self.weight, "expected_failures_per_year": self.expected,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HazardAnswer(Result):
+    """Annual rates of failure of m blocks at the sites of some hazard curves.
+
+    Args:
+        annual_rate: mean number of failures a year [1/a], shape (m,); NaN for a block that
+            cannot be used.
+        ci_low: lower end of the interval from the uncertain parameters of the model.
+        ci_high: upper end of it.
+        branches_low: rate that 5 % of the branches of a logic tree do not exceed, by their
+            weights; NaN without weights.
+        branches_high: the same of 95 %.
+        numerical_error: how far quadrature may be off, relative to the rates, shape (m,).
+        probability: probability of at least one failure in `years`, shape (m,).
+        years: the period [a].
+        level: confidence level of the interval.
+        model: name of the model that answered.
+        term: its intensity term.
+        method: how it was fitted.
+        site: index of the site of each block among `curves`, shape (m,).
+        curves: the curve of each site that answers, or the first of its branches.
+        edges: levels of the curve's measure between which contributions are given, (k + 1,).
+        contribution: part of the rate of the one block or class from each interval [1/a], shape
+            (1, k); without rows for several blocks.
+        above: part from beyond the last level, at least [1/a], shape (m,).
+        above_at_most: the same at most.
+        measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        joints: of each site earthquakes with at least one failure among its blocks; None where
+            that is not asked for, or there is one block.
+        curve_kind: what of a logic tree the curve is (mean, quantile-0.84, rlz-001), the weighted
+            branches, or None where that is not stated.
+        branches: what each of several curves says; empty for one.
+        quantiles: quantiles of the rates over branches with weights and the parameters of the
+            model together, by their probability, shape (m,) each; empty without weights.
+        total_low: lower end of the interval of the sum of all rates, from the model's parameters,
+            which all blocks have in common [1/a].
+        total_high: upper end of it.
+        warnings: what to know about the answer.
+        reason: why a block cannot be used, shape (m,); empty text elsewhere.
+        kinds: how each block fails, shape (m,); empty text where it cannot be used.
+        count: number of identical blocks of each row, shape (m,).
+        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
+            not known.
+        drained: rates of the blocks without water pressure [1/a], shape (m,), NaN where they have
+            none; None where all blocks are dry.
+        names: identifiers of the blocks; empty where they have none.
+        rejected: rows of the table of blocks that have no answer, by their index: ``block_id``,
+            ``site_id`` and ``reason``.
+    """
+
+    annual_rate: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    branches_low: FloatArray
+    branches_high: FloatArray
+    numerical_error: FloatArray
+    probability: FloatArray
+    years: float
+    level: float
+    model: str
+    term: str
+    method: str
+    site: Indices
+    curves: tuple[HazardCurve, ...]
+    edges: FloatArray
+    contribution: FloatArray
+    above: FloatArray
+    above_at_most: FloatArray
+    measure: str
+    joints: tuple[JointRate | None, ...]
+    curve_kind: str | None
+    branches: tuple[BranchRate, ...]
+    quantiles: Mapping[float, FloatArray]
+    total_low: float
+    total_high: float
+    warnings: tuple[str, ...]
+    reason: NDArray[np.object_]
+    kinds: NDArray[np.object_]
+    count: FloatArray
+    tau: float | None = None
+    drained: FloatArray | None = None
+    names: tuple[str | None, ...] = ()
+    rejected: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
+
+    @property
+    def modes(self) -> NDArray[np.object_]:
+        """Failure mode of each block, shape (m,)."""
+        return np.array([mode_of_kind(kind) for kind in self.kinds], dtype=object)
+
+    @property
+    def joint(self) -> JointRate | None:
+        """What the blocks of the first site do together, where that is asked for."""
+        return self.joints[0]
+
+    @property
+    def annual_rate_any(self) -> float | None:
+        """Annual rate of earthquakes with at least one failure at the one site [1/a].
+
+        None for several blocks unless their joint answer is asked for, and where their dependence
+        is not known: `joint` has its bounds.
+        """
+        if len(self.curves) > 1:
+            return None
+        if self.joint is not None:
+            return self.joint.annual_rate_any
+        known = np.flatnonzero(~np.isnan(self.annual_rate))
+        alone = known.size == 1 and self.count[known[0]] == 1.0
+        return float(self.annual_rate[known[0]]) if alone else None
+
+    @property
+    def expected_failures_per_year(self) -> float:
+        """Mean number of failures a year of all blocks [1/a]: Σ count · rate of the rates known."""
+        return float(np.nansum(self.count * self.annual_rate))
+
+    @property
+    def rate_columns(self) -> dict[str, FloatArray]:
+        """The rates and their uncertainty under the names of tables and JSON, shape (m,) each."""
+        columns = {
+            "annual_rate": self.annual_rate,
+            "ci_low": self.ci_low,
+            "ci_high": self.ci_high,
+            "numerical_error": self.numerical_error,
+            "probability": self.probability,
+        }
+        if self.drained is not None:
+            columns["drained_annual_rate"] = self.drained
+        if self.quantiles:
+            columns |= {"branches_low": self.branches_low, "branches_high": self.branches_high}
+        for q, values in self.quantiles.items():
+            columns[f"annual_rate_p{round(100.0 * q):02d}"] = values
+        return columns
+
+    def fractions_between(self, levels: FloatArray) -> FloatArray:
+        """Return the fractions of the first block's rate from shaking between levels."""
+        rate = max(float(self.annual_rate[0]), np.finfo(float).tiny)
+        below = np.append(0.0, self.contribution[0].cumsum()) / rate
+        return np.diff(np.interp(np.log(levels), np.log(self.edges), below))
+
+    @property
+    def _is_single(self) -> bool:
+        return self.annual_rate.size == 1 and not self.rejected
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the return period of one block, or the expected failures of several."""
+        yield from self._of_one_block() if self._is_single else self._of_all_blocks()
+        if self.tau is not None:
+            yield between_measures.in_words(self.tau)
+
+    def _of_one_block(self) -> Iterator[str]:
+        rate, low, high, chance = (
+            float(values[0])
+            for values in (self.annual_rate, self.ci_low, self.ci_high, self.probability)
+        )
+        ends = confidence(self.level, return_periods(low, high))
+        yield self._range() or f"Return period of failure {return_period(rate)}   ({ends})"
+        chances = [1.0 - math.exp(-end * self.years) for end in (low, high)]
+        yield (
+            f"Mean annual rate {rate:.2g} /yr; P(failure in {self.years:g} years) = "
+            f"{with_interval(chance, *chances)}"
+        )
+        if self.drained is not None and self.drained[0] >= 0.0:
+            yield f"Drained return period {return_period(float(self.drained[0]))}"
+
+    def _range(self) -> str:
+        """Return the range of the return period where the curve ends too early; else nothing.
+
+        Stronger shaking than the last level may more than double the rate of the block.
+        """
+        rate = float(self.annual_rate[0])
+        most = rate + float(self.above_at_most[0] - self.above[0])
+        if not most > 2.0 * rate:
+            return ""
+        curve = self.curves[0]
+        known = QUANTITIES.get(curve.measure)
+        unit = "g" if known is None else known.unit
+        least = f"between {years(most)} and {return_period(rate)}"
+        return (
+            f"Return period of failure {least if rate > NEVER else f'at least {years(most)} years'}"
+            f": the hazard curve ends at {curve.imt} = {curve.levels[-1]:g} {unit}"
+        )
+
+    def _of_all_blocks(self) -> Iterator[str]:
+        size, sites = int(self.count.sum()), len(self.curves)
+        expected = self.expected_failures_per_year
+        ends = confidence(self.level, f"{self.total_low:.2g}–{self.total_high:.2g}")
+        where = f" at {sites:,} sites" if sites > 1 else ""
+        yield f"Expected failures {expected:.2g} /yr of {size:,} blocks{where}   ({ends})"
+        for curve, joint in zip(self.curves, self.joints, strict=True):
+            if joint is None:
+                continue
+            place = f"{curve.place}: at" if curve.place else "At"
+            period = f"P in {self.years:g} years"
+            rate, chance = joint.annual_rate_any, joint.probability_any
+            if rate is not None and chance is not None:
+                yield (
+                    f"{place} least one failure: return period {return_period(rate)}; {period} "
+                    f"{percent(chance)}"
+                )
+                continue
+            least, most = (
+                percent(joint.bounds[name]["probability_any"])
+                for name in ("fully_dependent", "independent")
+            )
+            ends = f"{least} (full dependence) to {most} (independent)"
+            yield f"{place} least one failure: {period} {ends}"
+        rates, names = np.nan_to_num(self.annual_rate), self._names()
+        shortest = [
+            f"{names[i] or f'block {i + 1}'} ({return_period(rates[i])})"
+            for i in np.argsort(-rates, kind="stable")[:SHORTEST_SHOWN].tolist()
+        ]
+        yield f"Shortest return periods: {', '.join(shortest)}"
+
+    def _names(self) -> tuple[str | None, ...]:
+        return self.names or (None,) * self.annual_rate.size
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the hazard curve, the period and the model."""
+        curve = self.curves[0]
+        place = curve.place if len(self.curves) == 1 else ""
+        yield TextLine("Curve", ", ".join(filter(None, (curve.imt, place, self.curve_kind))))
+        if self.quantiles and self._is_single:
+            low, high = float(self.branches_low[0]), float(self.branches_high[0])
+            yield TextLine(
+                "Branches", f"return period {return_periods(low, high)} years (5th–95th percentile)"
+            )
+        if not self._is_single:
+            yield TextLine("Period", f"{self.years:g} years")
+        yield TextLine("Model", describe.model(vars(self)))
+        rows = self.annual_rate.size + len(self.rejected)
+        if not self._is_single and rows > ROWS_SHOWN:
+            yield TextLine("Blocks", f"{rows:,}, of which the first {ROWS_SHOWN} are listed")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield contributions of the shaking, branches and rows of blocks; all values if verbose.
+
+        Args:
+            verbose: with every value and every row.
+        """
+        document = self.as_dict()
+        rows = document.pop("blocks", [])
+        apart = ("warnings", "branches", "sites", "contributions", "drained", "bounds",
+                 "annual_rate_at_least")  # fmt: skip
+        if verbose:
+            bounds = {
+                f"{name}_{law}": value
+                for law, values in document.get("bounds", {}).items()
+                for name, value in values.items()
+            }
+            values = {name: value for name, value in document.items() if name not in apart}
+            yield TextTable((), [*(values | bounds).items()])
+        if self._is_single and self.annual_rate[0] > 0.0:
+            yield TextTable(("from", "to", "share_%"), self._contributions())
+        shown = [
+            {
+                name if name != "drained" else "drained_annual_rate": (
+                    value["annual_rate"] if name == "drained" and value else value
+                )
+                for name, value in row.items()
+                if verbose or name != "numerical_error"
+            }
+            for row in (rows if verbose else rows[:ROWS_SHOWN])
+        ]
+        counts = [
+            {name: value for name, value in row.items() if verbose or name != "numerical_error"}
+            for row in document.get("annual_rate_at_least") or ()
+        ]
+        for table in (counts, document.get("branches"), shown):
+            if table:
+                yield TextTable.of_rows(table, verbose=verbose)
+
+    def _contributions(self) -> list[list[object]]:
+        """Return the percentages of the rate between the levels of the curve."""
+        curve, unit = self.curves[0], QUANTITIES[self.measure].unit
+        parts = self.fractions_between(curve.levels).tolist()
+        rows: list[list[object]] = [
+            [f"{curve.imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * part, 1)]
+            for low, high, part in zip(curve.levels[:-1], curve.levels[1:], parts, strict=True)
+            if part >= SMALLEST_FRACTION
+        ]
+        beyond = float(self.above[0] / self.annual_rate[0])
+        if beyond >= SMALLEST_FRACTION:
+            rows.append([f"{curve.imt} {curve.levels[-1]:.3g}", "beyond", round(100.0 * beyond, 1)])
+        return rows
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract.
+
+        One block is an object with its contributions. Several are a list in it, beside what they do
+        in common, at several sites beside a list of that; rejected rows have no numbers.
+        """
+        sites = [curve.place or None for curve in self.curves]
+        columns = self.rate_columns
+        rows: list[dict[str, Any]] = [
+            {"site": sites[site], "block_id": name, **dict(zip(columns, values, strict=True))}
+            for site, name, *values in zip(
+                self.site.tolist(), self._names(),
+                *(map(finite_or_none, column.tolist()) for column in columns.values()),
+                strict=True,
+            )
+        ]  # fmt: skip
+        for row in rows:
+            bound = row.pop("drained_annual_rate", None)
+            row["drained"] = None if bound is None else {"annual_rate": bound}
+        shared = {
+            "years": self.years,
+            "level": self.level,
+            "how": by_model(self.model),
+            "model": self.model,
+            "term": self.term,
+            "method": self.method,
+            "imt": self.curves[0].imt,
+            "curve_kind": self.curve_kind,
+            "between_measures": between_measures.as_dict(self.tau),
+        }
+        if self.branches:
+            shared["branches"] = [branch.as_dict() for branch in self.branches]
+        warnings = list(self.warnings)
+        if not self._is_single:
+            return {
+                **self._in_common(sites), **shared, "blocks": self._with_rejected(rows),
+                "warnings": warnings,
+            }  # fmt: skip
+        del rows[0]["block_id"]
+        contributions = [
+            {"from": low, "to": high, "annual_rate": part}
+            for low, high, part in zip(
+                self.edges[:-1].tolist(), self.edges[1:].tolist(),
+                self.contribution[0].tolist(), strict=True,
+            )
+        ]  # fmt: skip
+        return {**rows[0], **shared, "contributions": contributions, "warnings": warnings}
+
+    def _with_rejected(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return the rows with their reasons, the rejected ones among them."""
+        empty = dict.fromkeys(rows[0])
+        answered = iter([{**row, "reason": ""} for row in rows])
+        rejected = {
+            i: {**empty, "site": about.get("site_id"), "block_id": about["block_id"],
+                "reason": about["reason"]}
+            for i, about in self.rejected.items()
+        }  # fmt: skip
+        indices = range(max(len(rows) + len(rejected), *rejected, 0) + 1)
+        merged = (rejected[i] if i in rejected else next(answered, None) for i in indices)
+        return [row for row in merged if row is not None]
+
+    def _in_common(self, sites: list[str | None]) -> dict[str, Any]:
+        """Return the joint rates of each site and the sums over all blocks."""
+        common: dict[str, Any] = {"annual_rate_any": self.annual_rate_any}
+        if len(sites) == 1:
+            common = {"site": sites[0], **common}
+            if self.joint is not None:
+                common |= self.joint.as_dict()
+        elif any(self.joints):
+            common["sites"] = [
+                {"site": site, **joint.as_dict()}
+                for site, joint in zip(sites, self.joints, strict=True)
+                if joint is not None
+            ]
+        return {
+            **common,
+            "expected_failures_per_year": self.expected_failures_per_year,
+            "expected_failures_low": self.total_low,
+            "expected_failures_high": self.total_high,
+        }
