@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.results.numbers import interval, percent, rounded, with_interval
+from rbfrag.results.numbers import percent, rounded, with_interval
 
 STATUS = {
     "below_limit": "The record topples no block of this size down to the search limit",
@@ -213,39 +213,3 @@ def motion_in_words(document: Mapping[str, Any], *, flags: int) -> str:
         f"{document['name']}: PGA {rounded(document['pga_g'])} g, PGV "
         f"{rounded(document['pgv_m_s'])} m/s in {document['duration_s']:.4g} s; {treated}, {marks}."
     )
-
-
-def answer_in_short(row: Mapping[str, Any]) -> dict[str, object]:
-    """Return what people read of the answer for one block of a table.
-
-    Args:
-        row: one of ``blocks`` of `rbfrag predict --blocks --json`.
-    """
-    ends = row["ci_low"], row["ci_high"]
-    columns = {"probability": "probability", "drained_probability": "drained"}
-    shown = {
-        word: None if row[name] is None else percent(row[name])
-        for name, word in columns.items()
-        if name in row
-    }
-    return {
-        "block": row["block_id"],
-        "kind": row["kind"],
-        "mode": row["mode"],
-        "probability": shown.pop("probability"),
-        "interval": None if None in ends else interval(*ends),
-        **shown,
-        "reason": row["reason"],
-    }
-
-
-def table_in_words(summary: Mapping[str, Any]) -> str:
-    """Return how many rows of a table of blocks are answered.
-
-    Args:
-        summary: what `rbfrag predict --blocks --json` prints.
-    """
-    rows, answered, outside = summary["rows"], summary["answered"], summary["without_answer"]
-    if not outside:
-        return f"All {rows:,} blocks are answered." if rows != 1 else "The block is answered."
-    return f"{answered:,} of {rows:,} blocks are answered; {outside:,} without answer."

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -30,6 +30,8 @@ from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
 from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
+from rbfrag.results.numbers import interval, percent
+from rbfrag.results.result import Result, TextTable
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, column_of
 
@@ -52,6 +54,99 @@ MOST_PAIRED = 700
 MOST_LISTED = 10_000
 """So many answers are listed; a file has them all."""
 
+SHOWN = 40
+"""Rows that a terminal shows."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TableAnswer(Result):
+    """Answers for the blocks of a table.
+
+    Args:
+        rows: number of rows.
+        answered: number of rows with a probability.
+        without_answer: number of rows without one.
+        in_domain: number of rows within the fitted range.
+        expected_failures: expected number of blocks that fail.
+        failures_low: lower end of the prediction interval of the number that fails if one
+            earthquake shakes all blocks; None where it is unknown.
+        failures_high: upper end of it.
+        kind: response kinds of the blocks.
+        model: names of the models that answer.
+        term: their intensity terms.
+        method: how they are fitted.
+        blocks: the answers of the first :data:`MOST_LISTED` rows, one mapping a row; None where a
+            file has them.
+        warnings: warnings about the table and its answers.
+    """
+
+    rows: int
+    answered: int
+    without_answer: int
+    in_domain: int
+    expected_failures: float
+    failures_low: float | None
+    failures_high: float | None
+    kind: str
+    model: str
+    term: str
+    method: str
+    blocks: list[dict[str, Any]] | None
+    warnings: tuple[Diagnostic, ...]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of rows that are answered."""
+        if self.without_answer:
+            yield (
+                f"{self.answered:,} of {self.rows:,} blocks are answered; "
+                f"{self.without_answer:,} without answer."
+            )
+        else:
+            yield (
+                "The block is answered."
+                if self.rows == 1
+                else (f"All {self.rows:,} blocks are answered.")
+            )
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the answers of the first rows, all that are listed if verbose, and the totals."""
+        if self.blocks is not None:
+            shown = self.blocks if verbose else self.blocks[:SHOWN]
+            rows = [_row_in_short(answer) for answer in shown]
+            names = [name for name in rows[0] if name != "reason" or any(r[name] for r in rows)]
+            yield TextTable(names, [[row[name] for name in names] for row in rows])
+        totals = self.as_dict()
+        yield TextTable(
+            (), [(name, totals[name]) for name in totals if name not in ("blocks", "warnings")]
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        values = {**vars(self), "warnings": [*self.warnings]}
+        if self.blocks is None:
+            del values["blocks"]
+        return values
+
+
+def _row_in_short(row: Mapping[str, Any]) -> dict[str, object]:
+    """Return the cells that a terminal shows of the answer for a row."""
+    ends = row["ci_low"], row["ci_high"]
+    columns = {"probability": "probability", "drained_probability": "drained"}
+    shown = {
+        word: None if row[name] is None else percent(row[name])
+        for name, word in columns.items()
+        if name in row
+    }
+    return {
+        "block": row["block_id"],
+        "kind": row["kind"],
+        "mode": row["mode"],
+        "probability": shown.pop("probability"),
+        "interval": None if None in ends else interval(*ends),
+        **shown,
+        "reason": row["reason"],
+    }
+
 
 def predict_table(
     source: str | PathLike[str],
@@ -64,7 +159,7 @@ def predict_table(
     excel_text: bool = False,
     remarks: Sequence[str] = (),
     **question: Any,
-) -> dict[str, Any]:
+) -> TableAnswer:
     """Answer every block of a table, and write the table with the answers or list these.
 
     A row that cannot be answered, as one with a cell that is no number, keeps an empty probability
@@ -83,11 +178,6 @@ def predict_table(
         remarks: warnings about the options, which go before those of the answer.
         question: ``rotation_deg``, ``component``, ``mechanism``, ``model``, ``level`` and ``db`` of
             :func:`rbfrag.predict`.
-
-    Returns:
-        Counts: rows, answered, without an answer, in_domain; expected_failures and, if one
-        earthquake shakes all rows, failures_low and failures_high; kind, model, term, method;
-        without a target ``blocks``, one mapping a row, of the first :data:`MOST_LISTED`; warnings.
 
     Raises:
         InputError: a file that cannot be read or written, a missing column, no row that can be
@@ -161,16 +251,16 @@ def predict_table(
         )
     if goal is not None:
         write_csv_notes(goal, notes)
-    return {
-        "rows": total,
-        "answered": answered,
-        "without_answer": total - answered,
-        "in_domain": inside,
+    return TableAnswer(
+        rows=total,
+        answered=answered,
+        without_answer=total - answered,
+        in_domain=inside,
         **_total_failures(together, [*chosen["model"]], question),
-        **{name: ", ".join(each) for name, each in chosen.items()},
-        **({"blocks": rows} if goal is None else {}),
-        "warnings": notes,
-    }
+        **{name: ", ".join(words) for name, words in chosen.items()},
+        blocks=rows if goal is None else None,
+        warnings=diagnostics(notes),
+    )
 
 
 def _gather(by_row: dict[str, Diagnostic], warnings: Sequence[str], start: int) -> None:
@@ -185,7 +275,7 @@ def _total_failures(
     together: Sequence[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]],
     models: Sequence[str],
     question: Mapping[str, Any],
-) -> dict[str, float | None]:
+) -> dict[str, Any]:
     """Return the expected number of failures, and its range if one earthquake shakes all rows.
 
     The blocks face unknown azimuths and stand at one site where no other is named. They are taken

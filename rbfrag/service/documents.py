@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from rbfrag.db.model_file import ModelRow
+from rbfrag.exchange.table_answers import TableAnswer
 from rbfrag.fragility.prediction import OF_EACH_MODEL, Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.solver.block.geometry import Block
@@ -154,23 +155,13 @@ class PredictArrays(_Answer):
     drained: dict[str, list[float | None]] | None
 
 
+@keys_of(TableAnswer, omitted=("blocks",))
 class TableAnswers(_Answer):
     """A table of blocks with its answers: what `rbfrag predict --blocks` prints as JSON.
 
     `table` is the CSV file that is written, with the notes below it.
     """
 
-    rows: int
-    answered: int
-    without_answer: int
-    in_domain: int
-    expected_failures: float
-    failures_low: float | None
-    failures_high: float | None
-    kind: str
-    model: str
-    term: str
-    method: str
     warnings: list[str]
     table: str
 

@@ -107,20 +107,19 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
             with opened_table(source, SHAKING, sheet=query.sheet, ignore_columns=ignored) as table:
                 if not {*SHAKING}.isdisjoint(table.stated.columns):
                     inputs = {}
-            summary = predict_table(
+            answer = predict_table(
                 source, target, given=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,
                 excel_text=True, db=db, **how,
             )  # fmt: skip
         except InputError as error:
             raise InputError(str(error).replace(f"{source}", "the table")) from None
-        if summary["rows"] > row_limit:
+        if answer.rows > row_limit:
             raise InputError(
-                f"the table has {summary['rows']:,} rows; one request may hold {row_limit:,}: "
-                "split it"
+                f"the table has {answer.rows:,} rows; one request may hold {row_limit:,}: split it"
             )
         answers = target.read_text(encoding="utf-8-sig")
-        answers += notes_below(summary["warnings"], dialect_of(target).delimiter)
-    return json_text({**summary, "table": answers})
+        answers += notes_below(answer.warnings, dialect_of(target).delimiter)
+    return json_text({**answer.as_dict(), "table": answers})
 
 
 def notes_below(warnings: Sequence[str], delimiter: str) -> str:

@@ -61,16 +61,15 @@ def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -
 
 @pytest.mark.usefixtures("book")
 def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = shell("predict", *ASKED, "--pgv", "0.6").stdout.splitlines()
-    assert lines[:4] == [
-        "All 2 blocks are answered.",
-        "",
+    head, _, table = shell("predict", *ASKED, "--pgv", "0.6").stdout.partition("\n\n")
+    assert head == "All 2 blocks are answered."
+    assert table[table.index("\n\n") :].splitlines()[2:4] == [
         "block  kind      mode    probability  interval",
         "A7     toppling  topple  1.1 %        0.37–2.6 %",
     ]
-    monkeypatch.setattr("rbfrag.cli.commands.predict.SHOWN", 1)
+    monkeypatch.setattr("rbfrag.exchange.table_answers.SHOWN", 1)
     monkeypatch.setattr("rbfrag.exchange.table_answers.MOST_LISTED", 1)
-    assert "... and 1 more: --out FILE" in shell("predict", *ASKED, "--pgv", "0.6").stdout
+    assert "... 1 of 2 rows: --out FILE" in shell("predict", *ASKED, "--pgv", "0.6").stdout
     cut = shell.json("predict", *ASKED, "--pgv", "0.6")
     assert (cut["rows"], len(cut["blocks"])) == (2, 1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words
-from rbfrag.cli.sentences import rock_mass_in_words, table_in_words
+from rbfrag.cli.sentences import rock_mass_in_words
 from rbfrag.results.numbers import return_period, return_periods, rounded
 
 
@@ -56,15 +56,6 @@ def test_what_a_campaign_has_stored(report: dict[str, int], said: str) -> None:
     others = dict.fromkeys(("no_motion", "outside_model", "not_searched"), 0)
     whole = {"kind": "toppling", "combinations": 24, **others, **report}
     assert campaign_in_words(whole) == said
-
-
-def test_how_many_rows_are_answered() -> None:
-    assert table_in_words({"rows": 100_000, "answered": 99_999, "without_answer": 1}) == (
-        "99,999 of 100,000 blocks are answered; 1 without answer."
-    )
-    assert table_in_words({"rows": 3, "answered": 3, "without_answer": 0}) == (
-        "All 3 blocks are answered."
-    )
 
 
 def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:

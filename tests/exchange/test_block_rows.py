@@ -139,7 +139,7 @@ def test_predictions_name_the_same_row(tmp_path: Path, form: str, kind: str) -> 
     target = tmp_path / f"out{source.suffix}"
     told: Any = predict_table(source, target, given={"pgv_m_s": 0.6}, ignore_columns=("weight",))
     place = f"{WORDS.get(form, 'row')} {FIRST.get(form, 1) + 2}"
-    (said,) = (text for text in told["warnings"] if "could not be used" in text)
+    (said,) = (text for text in told.warnings if "could not be used" in text)
     assert said.startswith("1 of 4 blocks could not be used; the reasons stand in the column")
     assert f"; it is {place}: " in said
     reasons = read_columns(target, ("probability",), texts=("reason",))
@@ -163,8 +163,8 @@ def test_lines_are_those_of_an_editor(
     told: Any = predict_table(
         source, tmp_path / "b.csv", given={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
-    assert (told["rows"], told["without_answer"]) == (4, 2)
-    assert "the first is line 6: kr is not a number" in str(told["warnings"])
+    assert (told.rows, told.without_answer) == (4, 2)
+    assert "the first is line 6: kr is not a number" in str(told.warnings)
 
 
 def _no_arrow() -> None:
@@ -183,7 +183,7 @@ def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None
     told = predict_table(
         source, tmp_path / "b.csv", given={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
-    assert (told["rows"], told["answered"]) == (3, 2)
+    assert (told.rows, told.answered) == (3, 2)
 
 
 def test_what_a_command_does_not_read_is_no_concern_of_it() -> None:

@@ -66,8 +66,7 @@ def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
     first, second, _ = out.read_text().splitlines()[1:]
     assert first.replace('"', "").startswith("'=1+1,3" if excel_text else "=1+1,3")
     assert second.replace('"', "").startswith("-2.5,3")
-    warnings = summary["warnings"]
-    assert isinstance(warnings, list)
+    warnings = summary.warnings
     assert any("excel_text" in text for text in warnings) is not excel_text
 
 

@@ -15,7 +15,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import table_answers
-from rbfrag.exchange.table_answers import ANSWERS, predict_table
+from rbfrag.exchange.table_answers import ANSWERS, TableAnswer, predict_table
 from rbfrag.exchange.tables import csv_file, parts
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.fragility.joint import UNKNOWN, Placement
@@ -28,7 +28,7 @@ from tests.fragility.portfolio_draws import LAW, SHARED
 HEAD = "block_id,p2_1_s2,kr,pgv_m_s"
 TABLE = f'{HEAD}\n"A, upper",3,0.1,0.6\nB,10,0.3,\nC,3,-0.1,0.6\nD,3,0.1,0\n'
 
-Answer = Callable[..., dict[str, object]]
+Answer = Callable[..., TableAnswer]
 
 
 @pytest.fixture(params=["with pyarrow", "without pyarrow"])
@@ -46,7 +46,7 @@ def answer(
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
 
-    def run(source: Path, target: Path, **given: float) -> dict[str, object]:
+    def run(source: Path, target: Path, **given: float) -> TableAnswer:
         return predict_table(source, target, given=given, model=None, level=0.95, db=str(database))
 
     return run
@@ -61,7 +61,7 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(TABLE)
     told = answer(source, target)
-    assert (told["rows"], told["answered"], told["without_answer"]) == (4, 3, 1)
+    assert (told.rows, told.answered, told.without_answer) == (4, 3, 1)
     first, second, third, fourth = rows_of(target)
     assert first["block_id"] == "A, upper"
     expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
@@ -93,11 +93,11 @@ def test_a_table_has_one_range_for_its_total(tmp_path: Path, sites: int) -> None
     ys = np.random.default_rng(0).uniform(0.05, 0.2, n)
     rows = "".join(f"{i},3.0,{ys[i]},0.6,s{i % sites}\n" for i in range(n))
     told = total_of(tmp_path, SHARED, rows)
-    p = np.array([row["probability"] for row in told["blocks"]])
+    p = np.array([row["probability"] for row in told.blocks])
     blocks = Placement.of(0.0, np.log(ys), site=np.arange(n) % sites, polarity=UNKNOWN)
     counts = JointSampler(LAW, blocks).failures(p, 20_000, np.random.default_rng(1)).sum(axis=1)
-    assert told["expected_failures"] == pytest.approx(p.sum())
-    low, high = told["failures_low"], told["failures_high"]
+    assert told.expected_failures == pytest.approx(p.sum())
+    low, high = told.failures_low, told.failures_high
     assert np.quantile(counts, [0.05, 0.95]) == pytest.approx((low, high), abs=4.0)
     assert high - low > 2.0 * 1.645 * np.sqrt((p * (1.0 - p)).sum())
 
@@ -111,12 +111,12 @@ def test_of_many_rows_some_tell_what_pairs_share(
     (tmp_path / "model.db").unlink()
     some = total_of(tmp_path, SHARED, rows)
     for name in ("failures_low", "failures_high"):
-        assert some[name] == pytest.approx(whole[name], rel=0.1)
+        assert getattr(some, name) == pytest.approx(getattr(whole, name), rel=0.1)
 
 
 def test_what_is_not_known_of_a_total_is_none(tmp_path: Path) -> None:
     told = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
-    assert told["failures_low"] is told["failures_high"] is None
+    assert told.failures_low is told.failures_high is None
     with pytest.raises(InputError, match="rows of a table stand where"):
         predict_table(tmp_path / "a.csv", given={}, sites=3)
 
@@ -159,9 +159,9 @@ def test_an_empty_column_says_nothing(
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     head, rows = "p2_1_s2,kr,pgv_m_s,pga_g\n", "3,0.1,,\n3,0.2,,\n"
     source.write_text(head + rows)
-    assert answer(source, target, pgv_m_s=0.6)["answered"] == 2
+    assert answer(source, target, pgv_m_s=0.6).answered == 2
     source.write_text(head + rows + "3,0.1,0.5,\n")
-    assert answer(source, target, pgv_m_s=0.6)["answered"] == 3  # the option fills the empty cells
+    assert answer(source, target, pgv_m_s=0.6).answered == 3  # the option fills the empty cells
     model = str(tmp_path / "model.db")
     filled, _, own = (float(row["probability"]) for row in rows_of(target))
     assert filled == pytest.approx(predict(3.0, 0.1, pgv_m_s=0.6, db=model).probability)
@@ -212,9 +212,9 @@ def test_a_bad_row_far_down_is_answered_with_its_reason(answer: Answer, tmp_path
     lines[70_000], lines[80_000] = "x,3,?,0.6", "y,3,0.1"
     source.write_text("\n".join([HEAD, *lines]))
     told = answer(source, target)
-    assert (told["rows"], told["answered"], told["without_answer"]) == (100_000, 99_998, 2)
-    assert "2 of 100,000 blocks could not be used" in str(told["warnings"])
-    assert "line 70002: kr = '?' is not a number" in str(told["warnings"])
+    assert (told.rows, told.answered, told.without_answer) == (100_000, 99_998, 2)
+    assert "2 of 100,000 blocks could not be used" in str(told.warnings)
+    assert "line 70002: kr = '?' is not a number" in str(told.warnings)
     rows = rows_of(target)
     assert {row["probability"] for row in rows[:70_000]} == {rows[-1]["probability"]} != {""}
     assert (rows[70_000]["kr"], rows[70_000]["probability"]) == ("?", "")
@@ -242,7 +242,7 @@ def test_parquet(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.parquet", tmp_path / "b.parquet"
     write_block_table(columns, source)
     told = answer(source, target)
-    assert (told["rows"], told["without_answer"]) == (50, 1)
+    assert (told.rows, told.without_answer) == (50, 1)
     found = read_columns(target, ["probability", "kr"])
     expected = predict(
         columns["p2_1_s2"], columns["kr"], pgv_m_s=columns["pgv_m_s"],
@@ -265,7 +265,7 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     )
     given = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
     told = predict_table(source, target, given=given, model=None, level=0.95, db=str(REFERENCE))
-    assert (told["kind"], told["rows"], told["answered"]) == ("sliding", 3, 2)
+    assert (told.kind, told.rows, told.answered) == ("sliding", 3, 2)
     assert [row["kind"] for row in rows_of(target)] == ["sliding", "sliding", "toppling"]
     first, second, third = rows_of(target)
     expected = predict(ky=0.1, beta_deg=10.0, **given, db=str(REFERENCE))
@@ -276,7 +276,7 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     told = predict_table(
         source, target, given={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
     )
-    assert told["model"] == "slumping-2deg-pgv_pga"
+    assert told.model == "slumping-2deg-pgv_pga"
     expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, pga_g=0.6, db=str(REFERENCE))
     (row,) = rows_of(target)
     assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-12)

@@ -15,7 +15,7 @@ import pytest
 
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.exchange.table_answers import predict_table
+from rbfrag.exchange.table_answers import TableAnswer, predict_table
 from rbfrag.exchange.tables import workbook
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.curve_file import read_hazard_curves
@@ -35,7 +35,7 @@ def save(path: Path, *rows: tuple[object, ...]) -> Path:
     return path
 
 
-def answer(source: Path, target: Path, **given: float) -> dict[str, object]:
+def answer(source: Path, target: Path, **given: float) -> TableAnswer:
     return predict_table(source, target, given=given, model=None, level=0.95, db=None)
 
 
@@ -62,9 +62,9 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
     book.active["E2"].data_type = "s"  # a text, as our own writer has it, not a formula
     book.save(source)
     told = answer(source, tmp_path / "out.xlsx")
-    assert (told["rows"], told["answered"]) == (7, 2)
-    assert "5 of 7 blocks could not be used" in str(told["warnings"])
-    assert "row 3: kr is the date 2024-03-01" in str(told["warnings"])
+    assert (told.rows, told.answered) == (7, 2)
+    assert "5 of 7 blocks could not be used" in str(told.warnings)
+    assert "row 3: kr is the date 2024-03-01" in str(told.warnings)
     rows = rows_of(tmp_path / "out.xlsx")
     plain = tmp_path / "plain.csv"
     plain.write_text("p2_1_s2,kr,pgv_m_s\n3,0.1,0.6\n")
@@ -90,7 +90,7 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
         assert np.isfinite(found["probability"]).tolist() == [True, False, True] + [False] * 4
         assert found["reason"].tolist()[3:] == reasons[3:]
     again = answer(tmp_path / "out.xlsx", tmp_path / "again.xlsx")
-    assert (again["rows"], again["answered"]) == (7, 3)  # the cell beside the table is gone
+    assert (again.rows, again.answered) == (7, 3)  # the cell beside the table is gone
 
 
 def test_formulas_are_read_as_their_values(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_csv_is_answered_as_it_is_written(
     table = "Größe,p2_1_s2,kr,pgv_m_s\nä,3,0.1,0.6\nb,3,1e-1,0.6\nc,3,x,0.6\n"
     written = table.replace(",", delimiter).replace(".", decimal)
     source.write_text(mark + written, encoding="utf-8")
-    assert answer(source, target)["answered"] == 2
+    assert answer(source, target).answered == 2
     text = target.read_text(encoding="utf-8")
     assert text.startswith(f"{mark}Größe{delimiter}")
     head, first, second, third = text.removeprefix(mark).splitlines()
@@ -144,24 +144,25 @@ def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
     for count in (3, 150_000):
         source.write_text("\n".join([title + names, *[row] * count, ""]))
         told = answer(source, target)
-        assert (told["rows"], told["answered"]) == (count, count)
-        assert told["warnings"] == [
+        assert (told.rows, told.answered) == (count, count)
+        assert [*told.warnings] == [
             SINGLE_ASSUMED,
             "the names of the columns are in line 5: the lines above are ignored",
         ]
         assert target.read_text().count("\n") == count + 1
     source.write_text("\n".join([title + names, row, row.replace("3", "x")]))
-    assert "line 7: p2 = 'x'" in str(answer(source, target)["warnings"])
+    assert "line 7: p2 = 'x'" in str(answer(source, target).warnings)
 
 
 def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
     source = tmp_path / "a.csv"
     source.write_text("p2_1_s2;kr;pgv_m_s\n3;0,1;0,6\n3;1.234;0,6\n")
     told = answer(source, tmp_path / "b.csv")
-    assert told["answered"] == 1
-    assert "kr = '1.234' has a decimal point, and the table has decimal commas" in str(told)
+    assert told.answered == 1
+    words = "kr = '1.234' has a decimal point, and the table has decimal commas"
+    assert words in str(told.warnings)
     source.write_text('p2_1_s2,kr\n3,"0,1"\n')
-    assert answer(source, tmp_path / "b.csv", pgv_m_s=0.6)["answered"] == 1
+    assert answer(source, tmp_path / "b.csv", pgv_m_s=0.6).answered == 1
     source.write_text('p2_1_s2,kr\n3,"1,100"\n')
     with pytest.raises(InputError, match=r"line 2: kr = '1,100' is 1\.100 or 1100"):
         read_blocks(source)
@@ -174,9 +175,9 @@ def test_one_bad_row_of_many(tmp_path: Path) -> None:
     source, target = tmp_path / "a.xlsx", tmp_path / "b.csv"
     write_block_table({"p2_1_s2": np.full(size, 3.0), "kr": kr}, source)
     told = answer(source, target, pgv_m_s=0.6)
-    assert (told["rows"], told["without_answer"]) == (size, 1)
-    assert "1 of 10,000 blocks could not be used" in str(told["warnings"])
-    assert "row 5434: kr = '?' is not a number" in str(told["warnings"])
+    assert (told.rows, told.without_answer) == (size, 1)
+    assert "1 of 10,000 blocks could not be used" in str(told.warnings)
+    assert "row 5434: kr = '?' is not a number" in str(told.warnings)
 
 
 @pytest.mark.parametrize(
@@ -237,9 +238,7 @@ def test_an_open_document_spreadsheet_is_answered_as_a_workbook_is(tmp_path: Pat
     save(tmp_path / "blocks.xlsx", *rows)
     told = answer(source, tmp_path / "a.csv")
     same = answer(tmp_path / "blocks.xlsx", tmp_path / "b.csv")
-    assert (
-        (told["rows"], told["without_answer"]) == (same["rows"], same["without_answer"]) == (3, 1)
-    )
+    assert (told.rows, told.without_answer) == (same.rows, same.without_answer) == (3, 1)
     first, second = (
         read_columns(tmp_path / name, ("probability",), texts=("block_id",))
         for name in ("a.csv", "b.csv")

@@ -5,22 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from rbfrag.cli.output import (
-    check_files,
-    print_json,
-    print_pairs,
-    print_result,
-    print_rows,
-    print_warnings,
-)
+from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
-from rbfrag.cli.sentences import answer_in_short, table_in_words
-from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
-
-SHOWN = 40
-"""So many rows of a table are printed."""
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
@@ -95,17 +83,19 @@ def predict(
     may be, and block_sd how much P differs among them.
     """
     if table.blocks is not None:
-        from rbfrag.exchange.table_answers import predict_table
+        from rbfrag.exchange.table_answers import SHOWN, predict_table
 
         check_files(table=table.out, excel_text=table.excel_text)
         for_all = {**given, **measures}
         kind = for_all.pop("kind", None)
-        summary = predict_table(
+        answer = predict_table(
             table.blocks, table.out, given=for_all, kind=kind,
             sheet=table.sheet, ignore_columns=options.column_names(table.ignore_columns),
             excel_text=table.excel_text, remarks=(*given.notes, *measures.notes), **request,
         )  # fmt: skip
-        _show_table(summary, json=printing.json)
+        print_result(answer, json=printing.json, verbose=printing.verbose)
+        if answer.blocks is not None and answer.rows > SHOWN and not printing.json:
+            print(f"... {SHOWN} of {answer.rows:,} rows: --out FILE writes them all")
         return
     from rbfrag.question.document import answer_block, answer_numbers
 
@@ -128,21 +118,3 @@ def predict(
         inputs = {**draws, **inputs}
         result = answer_numbers(inputs, kind=kind, weights=weights, **question)
     print_result(result, json=printing.json, verbose=printing.verbose)
-
-
-def _show_table(summary: dict[str, Any], *, json: bool) -> None:
-    if json:
-        print_json(summary)
-        return
-    warnings, rows = diagnostics(summary.pop("warnings")), summary.pop("blocks", None)
-    questions = [text for text in warnings if text.code == "check_unit"]
-    for text in (*questions, table_in_words(summary)):
-        print(text)
-    print()
-    if rows is not None:
-        print_rows([answer_in_short(row) for row in rows[:SHOWN]])
-        if more := summary["rows"] - len(rows[:SHOWN]):
-            print(f"... and {more:,} more: --out FILE writes them all")
-        print()
-    print_pairs(summary)
-    print_warnings(text for text in warnings if text not in questions)
