@@ -112,9 +112,7 @@ class TableAnswer(Result):
         """Yield the answers of the first rows, all that are listed if verbose, and the totals."""
         if self.blocks is not None:
             shown = self.blocks if verbose else self.blocks[:SHOWN]
-            rows = [_row_in_short(answer) for answer in shown]
-            names = [name for name in rows[0] if name != "reason" or any(r[name] for r in rows)]
-            yield TextTable(names, [[row[name] for name in names] for row in rows])
+            yield TextTable.of_rows([_row_in_short(answer) for answer in shown])
         totals = self.as_dict()
         yield TextTable(
             (), [(name, totals[name]) for name in totals if name not in ("blocks", "warnings")]
@@ -219,7 +217,7 @@ def predict_table(
             write = _written(table, columns, partial, stack, formulas, notes, excel_text=excel_text)
         for part in table.parts:
             predicted, answer, count = _answer(table, part, given, kind, question, empty)
-            _gather(by_row, predicted.notes, int(counts[0]))
+            _gather(by_row, predicted.warnings, int(counts[0]))
             write(part, answer)
             for name, words in chosen.items():
                 own = getattr(predicted, name)
@@ -251,13 +249,14 @@ def predict_table(
         )
     if goal is not None:
         write_csv_notes(goal, notes)
+    model_names: dict[str, Any] = {name: ", ".join(words) for name, words in chosen.items()}
     return TableAnswer(
         rows=total,
         answered=answered,
         without_answer=total - answered,
         in_domain=inside,
         **_total_failures(together, [*chosen["model"]], question),
-        **{name: ", ".join(words) for name, words in chosen.items()},
+        **model_names,
         blocks=rows if goal is None else None,
         warnings=diagnostics(notes),
     )
@@ -375,7 +374,7 @@ def _answer(
     answer["in_domain"][bad] = False
     answer["how"][bad] = ""
     answer["reason"][bad] = [*faults.values()]
-    answer["warnings"] = codes_by_row(predicted.notes, count.size)
+    answer["warnings"] = codes_by_row(predicted.warnings, count.size)
     return predicted, answer, np.where(whole, count, 1.0)
 
 

@@ -237,8 +237,7 @@ def with_remarks(answer: A, remarks: tuple[str, ...], last: tuple[str, ...] = ()
     """Return an answer with what is to be said of its blocks, first, and of its shaking, last."""
     if not remarks and not last:
         return answer
-    field = "warnings" if isinstance(answer, Prediction) else "notes"
-    return with_values(answer, **{field: (*remarks, *getattr(answer, field), *last)})
+    return with_values(answer, warnings=(*remarks, *answer.warnings, *last))
 
 
 def with_values(answer: A, **values: Any) -> A:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,7 +19,8 @@ from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import count_of, interval
+from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.kinds import BY_MECHANICS, KINDS, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES
@@ -31,6 +32,13 @@ T = TypeVar("T")
 
 Texts = NDArray[np.object_]
 ReasonPart = tuple[NDArray[np.intp], Texts | Callable[[], Texts]]
+
+OF_ARRAYS = (
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain", "how",
+    "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
+    "drained",
+)  # fmt: skip
+"""Keys of the JSON document."""
 
 CHUNK = 1 << 14
 """Rows that are worked on at a time: what they need stays near the processor."""
@@ -50,9 +58,17 @@ class Reasons:
             result.flat[places] = texts() if callable(texts) else texts
         return result
 
+    def text_at(self, index: int) -> str:
+        """Return the text of one element, by its index in the flat array."""
+        text = ""
+        for places, texts in self.parts:
+            if (hits := np.flatnonzero(places == index)).size:
+                text = (texts() if callable(texts) else texts)[hits[-1]]
+        return text
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PredictionArray(Tabular):
+class PredictionArray(Result):
     """Probabilities of many blocks or motions; all arrays have the broadcast shape.
 
     Args:
@@ -71,7 +87,7 @@ class PredictionArray(Tabular):
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
-        notes: sentences about the model that hold for every element.
+        warnings: what to know about the answer.
         block_sd: standard deviation of P over what each uncertain block may be; None where all are
             certain.
         data: the database that the model is of; None of a model that was given itself.
@@ -99,7 +115,7 @@ class PredictionArray(Tabular):
     model: str
     term: str
     method: str
-    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     block_sd: FloatArray | None = None
     data: str | None = None
     index: pd.Index | None = None
@@ -130,22 +146,46 @@ class PredictionArray(Tabular):
             return np.full(self.probability.shape, mode_of_kind(self.kind), dtype=object)
         return np.array([*MODES, ""], dtype=object)[self.mode_codes]
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is to be said of the whole answer: its notes, and how many have no answer."""
-        missing = np.isnan(self.probability)
-        count = int(np.count_nonzero(missing))
-        if not count:
-            return self.notes
-        first = int(np.argmax(missing.ravel()))
-        reason = self.reason.ravel()[first]
-        places = [f"element {first}"]
-        return (*self.notes, *unusable_in_words(count, missing.size, places, [reason]))
-
     @cached_property
     def reason(self) -> NDArray[np.object_]:
         """Why an answer is missing, ruled or to be doubted; empty text elsewhere."""
         return self.reasons.array()
+
+    def with_rejected_elements(self) -> PredictionArray:
+        """Return the answer with a warning where elements have no probability."""
+        missing = np.isnan(self.probability)
+        count = int(np.count_nonzero(missing))
+        if not count:
+            return self
+        first = int(np.argmax(missing.ravel()))
+        reason = self.reasons.text_at(first)
+        warnings = unusable_in_words(count, missing.size, [f"element {first}"], [reason])
+        return replace(self, warnings=(*self.warnings, *warnings))
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the range of the probabilities: "P(toppling) = 0.1–47 % of 12 blocks"."""
+        p = self.probability[~np.isnan(self.probability)]
+        missing = self.probability.size - p.size
+        text = "No probability"
+        if p.size:
+            state = self.kind.replace("_", " ") if self.kind in KINDS else "failure"
+            ends = interval(float(p.min()), float(p.max()))
+            text = f"P({state}) {ends if ends[0] in '<>' else f'= {ends}'}"
+        without = f"; {missing:,} without answer" if missing else ""
+        yield f"{text} of {count_of(p.size or missing, 'block')}{without if p.size else ''}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the models and the number of elements within their fitted ranges."""
+        inside = f"{np.count_nonzero(self.in_domain):,} of {self.in_domain.size:,}"
+        yield TextLine("Model", f"{self.model}, {self.data}; {inside} within the fitted range")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract; NaN stands for null."""
+        values = {name: getattr(self, name) for name in OF_ARRAYS}
+        values["warnings"] = [*self.warnings]
+        if self.drained is not None:
+            values["drained"] = {name: column.tolist() for name, column in self.drained.items()}
+        return {n: v.tolist() if hasattr(v, "tolist") else v for n, v in values.items()}
 
     def table_columns(self) -> dict[str, Any]:
         """Return the columns by name; arrays are flat."""
@@ -241,7 +281,7 @@ def predict_many(
         model=model.name,
         term=model.term.name,
         method=model.method.name,
-        notes=model.notes,
+        warnings=model.notes,
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,

@@ -238,7 +238,7 @@ def _together(
     def named(name: str) -> str:
         return ", ".join(dict.fromkeys(getattr(part, name) for part in answers))
 
-    notes = dict.fromkeys(note for part in answers for note in part.notes)
+    warnings = dict.fromkeys(text for part in answers for text in part.warnings)
     codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes}
     grid: dict[str, Any] = {n: each.reshape(shape) for n, each in codes.items() if each is not None}
     return PredictionArray(
@@ -249,7 +249,7 @@ def _together(
         model=named("model"),
         term=named("term"),
         method=named("method"),
-        notes=(*blocks.remarks, *notes),
+        warnings=(*blocks.remarks, *warnings),
         data=next((part.data for part in answers if part.data), None),
         index=index if index is not None and shape == (len(index),) else None,
         **{name: column.reshape(shape) for name, column in columns.items()},

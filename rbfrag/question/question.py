@@ -139,7 +139,8 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
             return _answer_motion(inputs, motion, kind, polarity, options)
         return ask(inputs, kind=kind, **options)
 
-    return with_drained_bound(answer, given, kind)
+    result = with_drained_bound(answer, given, kind)
+    return result if isinstance(result, Prediction) else result.with_rejected_elements()
 
 
 def with_drained_bound(

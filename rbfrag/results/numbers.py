@@ -64,6 +64,11 @@ def return_periods(low: float, high: float) -> str:
     return "–".join(dict.fromkeys(ends))
 
 
+def count_of(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural unless it is one: "12 blocks"."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 def rounded(value: float) -> str:
     """Return a number with three digits and without an exponent where people write none."""
     if value != 0.0 and not 1e-4 <= abs(value) < 1e7:

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 from rbfrag.db.model_file import ModelRow
 from rbfrag.exchange.table_answers import TableAnswer
 from rbfrag.fragility.prediction import OF_EACH_MODEL, Prediction
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.prediction_array import OF_ARRAYS, PredictionArray
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.reports import STRENGTH_VALUES
 from rbfrag.solver.results import CriticalResult
@@ -135,14 +135,6 @@ class PredictAnswer(_Answer):
     mode: str
     answers: list[ModelAnswer]
     sites: int | None = None
-
-
-OF_ARRAYS = (
-    "probability", "ci_low", "ci_high", "event_low", "event_high", "block_sd", "in_domain", "how",
-    "reason", "kind", "kinds", "modes", "level", "model", "term", "method", "data", "warnings",
-    "drained",
-)  # fmt: skip
-"""What is answered of many blocks."""
 
 
 @keys_of(PredictionArray, names=OF_ARRAYS)

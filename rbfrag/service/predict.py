@@ -14,10 +14,11 @@ from fastapi import APIRouter, Query, Request
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables.csv_file import NOTE, dialect_of
 from rbfrag.fragility.lookup import models_in_memory
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.document import answer_block
 from rbfrag.question.question import ask, with_drained_bound
 from rbfrag.results.diagnostic import diagnostics
-from rbfrag.service.documents import OF_ARRAYS, PredictAnswer, PredictArrays, TableAnswers
+from rbfrag.service.documents import PredictAnswer, PredictArrays, TableAnswers
 from rbfrag.service.parameters import COLUMNS, PredictQuery, PredictRows, TableQuery
 from rbfrag.service.problem import READ, SENT
 from rbfrag.service.reading import check_json, json_of, json_text, read_as, sent_as, sent_file
@@ -73,11 +74,8 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
         for name, value in given.items()
     }
     answers = with_drained_bound(lambda inputs: ask(inputs, **how, db=db), arrays)
-    columns = {name: getattr(answers, name) for name in OF_ARRAYS}
-    document = {n: v.tolist() if hasattr(v, "tolist") else v for n, v in columns.items()}
-    if document["drained"]:
-        document["drained"] = {n: v.tolist() for n, v in document["drained"].items()}
-    return json_text(document)
+    assert isinstance(answers, PredictionArray)
+    return json_text(answers.with_rejected_elements().as_dict())
 
 
 def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None) -> bytes:

@@ -183,10 +183,10 @@ def test_ranges_of_one_earthquake_are_of_sites(sites: int | None) -> None:
 def test_a_model_that_does_not_know_what_blocks_share_says_so() -> None:
     model = drawn_model(0, 1, None)
     given = drawn_questions(model, np.random.default_rng(1), 5)
-    assert answer_given(model, given, 0.95).notes == ()
+    assert answer_given(model, given, 0.95).warnings == ()
     many = answer_given(model, given, 0.95, sites=3)
     assert np.isnan([many.event_low, many.event_high]).all()
-    assert many.notes == (NO_EVENT_RANGE,)
+    assert many.warnings == (NO_EVENT_RANGE,)
     one = answer_given(model, {name: float(v[0]) for name, v in given.items()}, 0.95, sites=3)
     assert one.event_low is one.event_high is None
     assert NO_EVENT_RANGE in one.warnings

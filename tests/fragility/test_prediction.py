@@ -14,6 +14,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.question import predict
+from rbfrag.results.numbers import interval
 
 G = 9.80665
 
@@ -333,6 +334,18 @@ def test_suspicious_values_are_mentioned(row, changes, words):
     many = predict(**{**arguments, "p2": [3.0]}, model=row())
     assert words in many.reason[0]
     assert many.probability[0] == pytest.approx(answer.probability, rel=1e-12)
+
+
+def test_arrays_have_a_headline(row):
+    many = predict(3.0, [0.1, 0.05, -0.1, np.nan], pgv_m_s=0.6, model=row())
+    low, high = np.nanmin(many.probability), np.nanmax(many.probability)
+    assert many.headline() == (f"P(toppling) = {interval(low, high)} of 3 blocks; 1 without answer")
+    document = many.document(text=True)
+    assert document["text"]["sentences"] == [many.headline()]
+    assert "element 3" in many.warnings[-1]
+    assert document["warnings"] == [*many.warnings]
+    alone = predict(3.0, [np.nan], pgv_m_s=0.6, model=row())
+    assert alone.headline() == "No probability of 1 block"
 
 
 def test_a_model_of_an_unknown_method_or_a_torn_row_is_refused(row):

@@ -200,7 +200,7 @@ def test_the_note_names_the_measures_and_p_for_rotd50() -> None:
     assert isinstance(note, Diagnostic)
     assert note.code == "single_component"
     assert SINGLE_ASSUMED in answer(question).warnings
-    assert SINGLE_ASSUMED in rbfrag.predict(3.0, [0.1, 0.2], pgv_m_s=0.5, db=REFERENCE).notes
+    assert SINGLE_ASSUMED in rbfrag.predict(3.0, [0.1, 0.2], pgv_m_s=0.5, db=REFERENCE).warnings
     for same in (pickle.loads(pickle.dumps(note)), copy.deepcopy(note)):
         assert (same, same.code) == (note, "single_component")
     assert json.loads(json.dumps({"warnings": [note]})) == {"warnings": [str(note)]}
@@ -226,7 +226,7 @@ def test_there_is_no_note_where_the_component_is_known_or_does_not_matter(
     document = answer_numbers(numbers, component=name, db=REFERENCE)
     assert not any("component" in text for text in document.warnings)
     many = rbfrag.predict(**{**numbers, "kr": [0.1, 0.1]}, component=name, db=REFERENCE)
-    assert not any("component" in text for text in many.notes)
+    assert not any("component" in text for text in many.warnings)
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_arrays_have_the_bounds_and_codes_of_single_blocks() -> None:
     found = rbfrag.predict(**blocks, **others)
     assert isinstance(found, PredictionArray)
     assert found.drained is not None
-    codes = codes_by_row(found.notes, n)
+    codes = codes_by_row(found.warnings, n)
     seen: set[str] = set()
     about = {"undrained", "drained", "no_drained_bound", "density_assumed", "toe_slips",
              "heel_tips", "cohesion_without_effect", "check_unit"}  # fmt: skip
@@ -122,7 +122,7 @@ def test_a_pulse_that_tips_a_slide_is_a_warning_of_each_such_row() -> None:
     pga_g = np.array([0.33, 0.34])
     arrays = rbfrag.predict(**block, pga_g=pga_g)
     assert isinstance(arrays, PredictionArray)
-    assert codes_by_row(arrays.notes, 2).tolist() == ["", "heel_tips"]
+    assert codes_by_row(arrays.warnings, 2).tolist() == ["", "heel_tips"]
     single = [rbfrag.predict(**block, pga_g=value).warnings for value in pga_g.tolist()]
     assert [any("tip the block" in text for text in texts) for texts in single] == [False, True]
 
@@ -200,7 +200,7 @@ def test_a_bound_that_has_no_answer_is_named(shell: Shell) -> None:
     assert (answer.kind, answer.drained) == ("toppling", None)
     assert any("no drained bound: the block slides" in text for text in answer.warnings)
     arrays = rbfrag.predict(**block, water_m=[0.93, 0.0])
-    assert "no_drained_bound" in codes_by_row(arrays.notes, 2)[0].split()
+    assert "no_drained_bound" in codes_by_row(arrays.warnings, 2)[0].split()
     words = [f"--{name.partition('_')[0]}={value}" for name, value in block.items()]
     told = shell.json("predict", *words, "--water", "0.93")
     assert told["drained"] is None

@@ -78,6 +78,6 @@ def test_scalars_and_arrays_of_one_block_have_the_same_codes() -> None:
         several = rbfrag.predict(**{**block, "height_m": [2.0, 2.0]}, **further)
         own, codes = (
             {text.code for text in texts if isinstance(text, Diagnostic)} - {"note"}
-            for texts in (one.warnings, several.notes)  # type: ignore[attr-defined]
+            for texts in (one.warnings, several.warnings)  # type: ignore[attr-defined]
         )
         assert own - codes <= {"back_friction_neglected"}, further
