@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
@@ -50,6 +50,8 @@ def test_series_keep_their_index_and_are_not_joined_by_position() -> None:
 def test_one_prediction_is_a_table_of_one_row() -> None:
     answer = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6)
     pd.testing.assert_frame_equal(pd.DataFrame(answer), answer.to_frame())
+    # it is made without its initializer, which takes as long as the answer
+    assert {*vars(answer)} == {field.name for field in fields(answer)}
 
 
 CURVE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.5,0.001\n2,0.00001\n"

@@ -6,7 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.results.numbers import with_interval
-from rbfrag.vocabulary.quantities import INTENSITY, MEASURES, NUMBERS, QUANTITIES
+from rbfrag.vocabulary.quantities import (
+    INTENSITY,
+    JOINT,
+    MEASURES,
+    NUMBERS,
+    PLANES,
+    QUANTITIES,
+    SHAPE,
+    SPACE,
+    word_of,
+)
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
@@ -16,7 +26,7 @@ def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
     """Return the measures of a question: "PGV 0.9 m/s, PGA 0.6 g"; medians where they scatter."""
     parts = [
         f"{_measure(name)} {inputs[name]:.4g} {QUANTITIES[name].unit}".rstrip()
-        for name in INTENSITY
+        for name in (*INTENSITY, "rjb_km", "vs30_m_s")
         if isinstance(inputs.get(name), int | float) and name not in uncertain
     ]
     parts += [
@@ -67,7 +77,22 @@ def block(method: str, inputs: Mapping[str, Any]) -> str:
     limit_m = inputs.get("displacement_m")
     if isinstance(limit_m, (int, float)):
         numbers.append(f"displacement limit {limit_m:g} m")
-    return "; ".join(filter(None, (", ".join(numbers), model_block.support)))
+    described = ": ".join(filter(None, (_shape(inputs), ", ".join(numbers))))
+    return "; ".join(filter(None, (described, model_block.support)))
+
+
+def _shape(inputs: Mapping[str, Any]) -> str:
+    """Return dimensions and planes, "rectangle 2 m × 0.4 m, dip of the base 5°"; or nothing."""
+    values = {name: value for name, value in inputs.items() if isinstance(value, int | float)}
+    parts = [f"{name} {inputs[name]}" for name in SPACE if inputs.get(name)]
+    if values.keys() >= {"height_m", "width_m"}:
+        parts.append(f"rectangle {values.pop('height_m'):g} m × {values.pop('width_m'):g} m")
+    for name in (*SHAPE, *PLANES, *JOINT):
+        if name in values:
+            quantity = QUANTITIES[name]
+            label = word_of(name) if name in SHAPE else quantity.noun
+            parts.append(f"{label} {values[name]:g} {quantity.unit}".replace(" deg", "°").rstrip())
+    return ", ".join(parts)
 
 
 def model(document: Mapping[str, Any]) -> str:
@@ -98,7 +123,8 @@ def measures(names: Sequence[str]) -> str:
 
 
 def _measure(name: str) -> str:
-    return MEASURES[name].title or QUANTITIES[name].symbol
+    title = MEASURES[name].title if name in MEASURES else ""
+    return title or QUANTITIES[name].symbol
 
 
 def fitted_data(diagnostics: Mapping[str, Any]) -> str:

@@ -429,29 +429,20 @@ def _answer_single(
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
         median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
-    return Prediction(
-        model.row.kind,
-        probability,
-        low,
-        high,
-        None,
-        None,
-        quantiles.level,
-        model.row.name,
-        model.term.name,
-        method.name,
-        model.row.kind if method.failure is None else method.failure(given, model.criterion),
-        values.get("y_m_s"),
-        x,
-        in_domain,
-        warnings,
-        values.get("pgv_over_pga_s"),
-        median,
-        block_sd,
-        model.data,
-        how=how,
-        inputs=given,
-    )
+    # frozen dataclasses set attributes one by one, which takes as long as the answer
+    result = object.__new__(Prediction)
+    vars(result).update(
+        kind=model.row.kind, probability=probability, ci_low=low, ci_high=high, event_low=None,
+        event_high=None, level=quantiles.level, model=model.row.name, term=model.term.name,
+        method=method.name,
+        failure=model.row.kind if method.failure is None
+        else method.failure(given, model.criterion),
+        y_m_s=values.get("y_m_s"), intensity_m_s=x, in_domain=in_domain, warnings=warnings,
+        pgv_over_pga_s=values.get("pgv_over_pga_s"), median_displacement_m=median,
+        block_sd=block_sd, data=model.data, shaking=None, how=how, drained=None, inputs=given,
+        sites=None, alternatives=(),
+    )  # fmt: skip
+    return result
 
 
 def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:

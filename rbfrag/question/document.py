@@ -60,7 +60,8 @@ def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any
     measures = {name: value for name, value in inputs.items() if name in OF_SHAKING}
     if not blocks.at_rest:
         numbers = {**group.numbers, **measures}
-        return answer_numbers(numbers, kind=group.kind, remarks=blocks.remarks, **how)
+        answer = answer_numbers(numbers, kind=group.kind, remarks=blocks.remarks, **how)
+        return with_values(answer, inputs={**inputs, **numbers})
     # what is wrong with the shaking is found as for a block that stands
     motion = how.pop("motion", None)
     shaking = measures | ({} if motion is None else {"xp_m_s": 0.0, "pga_g": 0.0})

@@ -113,6 +113,16 @@ class Result(Tabular):
         """Return the answer under the keys of the JSON contract."""
         raise NotImplementedError
 
+    def _repr_html_(self) -> str:
+        """Return the answer as a notebook shows it: sentences, lines, warnings, numbers."""
+        from html import escape
+
+        lines = (f"{label}: {text}" if label else text for label, text in self.lines())
+        notes = (f"Note: {text}" for text in dict.fromkeys(self.warnings))
+        first, *others = (escape(text) for text in (*self.sentences(), *lines, *notes))
+        body = "<br>".join((f"<b>{first}</b>", *others))
+        return f"<p>{body}</p>{super()._repr_html_()}"
+
     def document(self, *, text: bool = False) -> dict[str, Any]:
         """Return the JSON document: the contract's keys and ``diagnostics``.
 

@@ -107,10 +107,25 @@ class DiagnosticDocument(_Document):
     row_count: int
 
 
+class LineDocument(_Document):
+    """A labelled line of an answer."""
+
+    label: str
+    text: str
+
+
+class TextDocument(_Document):
+    """An answer in words: its sentences, the first with the number that decides, and lines."""
+
+    sentences: list[str]
+    lines: list[LineDocument]
+
+
 class _Answer(_Document):
-    """An answer; `diagnostics` are its warnings with their codes."""
+    """An answer; `diagnostics` are its warnings with their codes, `text` is there on request."""
 
     diagnostics: list[DiagnosticDocument]
+    text: TextDocument | None = None
 
 
 @keys_of(Prediction, names=OF_EACH_MODEL)

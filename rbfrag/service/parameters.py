@@ -129,6 +129,13 @@ class Parameters(BaseModel):
         return given, how
 
 
+class Answered(Parameters):
+    """Parameters of an operation that returns an answer."""
+
+    text: bool = False
+    """With the sentences and the labelled lines of the answer under ``text``."""
+
+
 _SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "drainage", "back_fracture")
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
 _AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *AT_REST)
@@ -147,7 +154,7 @@ class DrawingQuery(Parameters):
 
 
 @asking(*_QUESTION, examples={"p2": 3.0, "kr": 0.1, "pgv": 0.6})
-class PredictQuery(Parameters):
+class PredictQuery(Answered):
     """Parameters of `GET /v1/predict`."""
 
 
@@ -164,7 +171,7 @@ class TableQuery(Parameters):
 
 
 @asking(*_QUESTION, many=True)
-class PredictRows(Parameters):
+class PredictRows(Answered):
     """Numbers, which stand for every element, and lists of one length."""
 
     model_config = ConfigDict(

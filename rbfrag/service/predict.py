@@ -39,7 +39,7 @@ BYTES_BESIDE = 1 << 20
 def answer_one(query: PredictQuery | PredictRows, db: str | None) -> dict[str, Any]:
     """Return what `rbfrag predict` prints as JSON."""
     inputs, how = query.question()
-    return answer_block(inputs, **how, db=db).as_dict()
+    return answer_block(inputs, **how, db=db).document(text=query.text)
 
 
 def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:

@@ -422,11 +422,12 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             range=NOT_NEGATIVE, input=Input("for the range with {sites}"),
             prompt=_SIGMA),
         Quantity("rjb_km", "Distance from the surface projection of the rupture", "km",
-            range=NOT_NEGATIVE,
+            "R_JB", range=NOT_NEGATIVE,
             input=Input("instead of measures, with {magnitude} and {vs30_m_s}",
             ("rjb", "r_jb", "joyner_boore_distance"))),
         Quantity(
-            "vs30_m_s", "Mean velocity of shear waves in the upper 30 m", "m/s", range=POSITIVE,
+            "vs30_m_s", "Mean velocity of shear waves in the upper 30 m", "m/s", "Vs30",
+            range=POSITIVE,
             input=Input(aliases=("vs30",))),
         Quantity(
             "amplification", "Factor on all measures for the shape of the ground", range=POSITIVE,

@@ -40,9 +40,12 @@ from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 from rbfrag.vocabulary.quantities import (
     BLOCK,
+    FAILURE,
     INTENSITY,
+    NUMBERS,
     QUANTITIES,
     REQUEST,
+    SCATTER,
     SHAKING,
     WHOLE,
     word_of,
@@ -158,7 +161,7 @@ def contents_of(
     document, read = result.as_dict(), result.inputs
     facts = facts_of(document["kind"])
     shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in OF_BLOCK})
-    numbers = {name: value for name, value in read.items() if name not in OF_SHAKING}
+    numbers = {name: read[name] for name in (*NUMBERS, *FAILURE, *SCATTER) if name in read}
     medians = {n: about["median"] for n, about in (document["shaking"] or {}).items()}
     measures = {name: value for name, value in read.items() if name in INTENSITY} | medians
     model = find_model(document["model"], TERMS[document["term"]].inputs, how.get("db"))

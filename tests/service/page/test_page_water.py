@@ -22,13 +22,13 @@ def test_water_is_a_field_of_backed_blocks(open_page):
     answer = rbfrag.predict(**question, db=REFERENCE)
     assert agrees(probability_shown(page), answer.probability)
     assert answer.drained is not None
-    shown = " ".join((page.text_content("#in-words") or "").split())
-    assert shown.startswith(f"Drained: kr = {answer.drained['kr']:.3g}, P = ")
+    assert f"kr = {answer.drained['kr']:.3g}, P = " in opened.text("#lines")
+    expect(page.locator("#lines")).to_contain_text("without water pressure")
     expect(page.locator("#warnings")).to_contain_text("water pressure keeps acting")
     page.check("input[name=kind][value=rocking]", force=True)
     opened.settled()
     expect(page.locator("#water")).to_be_hidden()
-    expect(page.locator("#in-words")).not_to_contain_text("Drained")
+    expect(page.locator("#lines")).not_to_contain_text("Drained")
 
 
 def test_a_pasted_table_has_both_bounds(open_page):

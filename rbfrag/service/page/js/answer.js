@@ -1,10 +1,10 @@
-/** The panel of the answer: number, interval, words, warnings, other models. */
+/** The panel of the answer: headline and lines as the service writes them, warnings, other models. */
 
 import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
-import { quantity, readable } from "./numbers.js";
+import { readable } from "./numbers.js";
 import { byId } from "./page.js";
-import { atSites, drainedBound, inOneSentence, interval, percent, ranges, verbOf } from "./percent.js";
+import { interval, percent } from "./percent.js";
 import { writeText } from "./subscripts.js";
 
 const SPOKEN_AFTER_MS = 700;
@@ -28,82 +28,55 @@ const KNOWS = {
   pgv_pga_ia: "PGV, PGA, Arias intensity",
 };
 
-/** How the sentence of the service begins that the page says in its own place. */
-const SAID = /^no friction angle is given/;
-
-/** How the question about a unit begins, which stands before the answer. */
-const UNIT = "Check the unit";
-
-/** An equals sign that does not part from what stands beside it. */
-const IS = "\u00a0=\u00a0";
-
 const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
   byId("live").textContent = text;
 });
 
 /**
- * Show an answer of /v1/predict.
+ * Show an answer of /v1/predict with its text.
  * @param {any} answer
  */
 export function showAnswer(answer) {
-  const ends = interval(answer.ci_low, answer.ci_high);
-  const range = answer.in_domain
-    ? "within the fitted range"
-    : "outside the fitted range: an extrapolation";
-  byId("probability").textContent = percent(answer.probability);
-  const questions = answer.warnings.filter((/** @type {string} */ text) => text.startsWith(UNIT));
-  byId("sentence").textContent = [...questions, inOneSentence(answer)].join(" ");
-  writeText(byId("in-words"), [ranges(answer), drainedBound(answer)].filter(Boolean).join(" "));
-  const domain = byId("domain");
-  domain.textContent = range;
-  domain.dataset.inside = String(answer.in_domain);
-  writeText(
-    byId("about"),
-    `Model ${answer.model}, ${answer.data}. ` +
-      `Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
-      (answer.y_m_s === null
-        ? ""
-        : `, velocity of the block y${IS}k\u00a0g/p${IS}${quantity(answer.y_m_s, "m/s")}`) +
-      ".",
-  );
+  const { sentences, lines } = answer.text;
+  const [probability, ...rest] = sentences[0].split(/ {2,}/);
+  const isUnitQuestion = (/** @type {any} */ { code }) => code === "check_unit";
+  const questions = answer.diagnostics.filter(isUnitQuestion);
+  const texts = questions.map((/** @type {any} */ { text }) => text);
+  writeText(byId("probability"), unbroken(probability));
+  writeText(byId("sentence"), unbroken([...texts, ...rest].join(" ")));
+  showLines(lines);
+  byId("lines").dataset.inside = String(answer.in_domain);
+  byId("about").textContent = "";
   drawMeter(answer);
-  showWarnings(
-    byId("warnings"),
-    answer.warnings.filter((/** @type {string} */ each) => !SAID.test(each)),
-  );
+  showWarnings(byId("warnings"), answer.warnings);
   showOthers(answer.answers);
-  byId("strip").textContent = `${percent(answer.probability)} ${verbOf(answer)} (${ends})`;
+  const headline = [probability, ...rest].join(" ");
+  byId("strip").textContent = headline;
   mark("known");
-  const event =
-    answer.event_low === null
-      ? ""
-      : ` At ${atSites(answer)} ${interval(answer.event_low, answer.event_high)}.`;
-  const failure = `Probability of ${answer.failure.replace("permanent displacement above", "sliding more than")}`;
-  byId("answer-title").textContent = failure;
-  speak(`${failure} ${percent(answer.probability)}, ${ends}, ${range}.${event}`);
+  speak(`${headline}. ${lines.map((/** @type {any} */ { text }) => text).join(". ")}`);
 }
 
 /**
- * Say what is taken of a block that has an answer.
- * @param {import("./question.js").Question} question
- * @param {any} found answer of /v1/drawing
+ * Show labelled lines.
+ * @param {{label: string, text: string}[]} lines
  */
-export function sayOfBlock({ shape, values }, { numbers }) {
-  const { p2, kr, ky, ks, ps2, kct, pct2 } = numbers;
-  const strength =
-    kr !== undefined
-      ? `p²${IS}${quantity(p2, "1/s²")} and k_r${IS}${quantity(kr, "g")}`
-      : ky !== undefined
-        ? `k_y${IS}${quantity(ky, "g")}`
-        : ks !== undefined
-          ? `p_s²${IS}${quantity(ps2, "1/s²")} and k_s${IS}${quantity(ks, "g")}`
-          : `p_ct²${IS}${quantity(pct2, "1/s²")} and k_ct${IS}${quantity(kct, "g")}`;
-  const verb = ky === undefined ? "follow" : "follows";
-  const rough = shape === "rectangle" && values.phi === "" ? ", and rough enough not to slide" : "";
-  const stands = `The block is taken as ${values.kind ? "free-standing" : "backed by a slope"}${rough}`;
-  const from = shape === "rectangle" ? "height, width and dip" : shape;
-  const words = shape === "numbers" ? `, with ${strength}.` : `; from its ${from} ${verb} ${strength}.`;
-  writeText(byId("taken"), stands + words);
+function showLines(lines) {
+  byId("lines").replaceChildren(
+    ...lines.flatMap(({ label, text }) => {
+      const [term, value] = [document.createElement("dt"), document.createElement("dd")];
+      term.textContent = label;
+      writeText(value, unbroken(text));
+      return [term, value];
+    }),
+  );
+}
+
+/**
+ * A text whose percent signs stay with their numbers.
+ * @param {string} text
+ */
+function unbroken(text) {
+  return text.replaceAll(" %", "\u00a0%");
 }
 
 /**
@@ -132,10 +105,9 @@ export function showByRecord(verdict) {
  */
 export function showNoAnswer(why, warnings = []) {
   byId("probability").textContent = "\u2013";
-  byId("answer-title").textContent = "No probability";
   byId("sentence").textContent = why;
-  for (const id of ["in-words", "taken", "domain", "about"]) byId(id).textContent = "";
-  delete byId("domain").dataset.inside;
+  byId("about").textContent = "";
+  showLines([]);
   d3.select("#meter").selectAll("*").remove();
   showWarnings(byId("warnings"), warnings);
   byId("others").hidden = true;

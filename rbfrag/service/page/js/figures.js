@@ -8,7 +8,7 @@ import { latest } from "./latest.js";
 import { modelNamed } from "./models.js";
 import { fromField, quantity } from "./numbers.js";
 import { byId } from "./page.js";
-import { atSites, percent, verbOf } from "./percent.js";
+import { percent } from "./percent.js";
 import { labelOf, planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
@@ -120,9 +120,8 @@ export function figures(moved, failed) {
       drawCurve(asked);
       if (hasChart) writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Fraction of blocks that ${verbOf(answer)}. Dark band: confidence interval.` +
-        (answer.event_low === null ? "" : ` Light band: at ${atSites(answer)}.`) +
-        ` (${percent(answer.level)}.)`;
+        `Dark band: ${percent(answer.level)} confidence interval.` +
+        (answer.event_low === null ? "" : " Light band: prediction interval at the sites.");
     },
     /**
      * Show the point where the reader has moved it, before there is an answer.

@@ -1,6 +1,6 @@
 /** The page: what the reader asks, what the service answers, and who shows it. */
 
-import { sayOfBlock, showAnswer, showNoAnswer } from "./answer.js";
+import { showAnswer, showNoAnswer } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
 import { blockDrawing, whyNoAnswer } from "./block.js";
 import { formFields, inLabels, nothingWrong, sayWrong } from "./fields.js";
@@ -118,10 +118,8 @@ async function answerQuestion(asked) {
       // unstable at rest: P = 1 for any shaking
       sheets.hide();
       record.placeBlock(null);
-      byId("taken").textContent = "";
       return busy(asked !== question);
     }
-    sayOfBlock(asked, found);
     await sheets.show(asked, answer, found, () => asked === question);
     // X(p) bounds what a block does that a slope backs
     if (found.kind === "toppling") {

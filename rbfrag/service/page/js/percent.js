@@ -1,4 +1,4 @@
-/** Probabilities in numbers and in plain words. */
+/** Probabilities in percent, on axes and in tables of the page. */
 
 const SMALLEST = 1e-4;
 const GAP = "\u00a0";
@@ -18,29 +18,6 @@ export function percent(p) {
   return `${Number((100 * p).toFixed(2))}${GAP}%`;
 }
 
-/** What blocks do, by the kind of an answer. */
-const VERBS = {
-  toppling: "topple",
-  rocking: "overturn",
-  sliding: "slide too far",
-  slumping: "slump",
-  confined_toppling: "topple",
-};
-
-/**
- * What a block does that fails as an answer says.
- * @param {{kind: string}} answer
- */
-export function verbOf({ kind }) {
-  return VERBS[/** @type {keyof typeof VERBS} */ (kind)] ?? "fail";
-}
-
-/**
- * @typedef {{kind: string, probability: number, ci_low: number, ci_high: number,
- *   event_low: number | null, event_high: number | null, level: number, how: string,
- *   sites?: number | null}} Answer
- */
-
 /**
  * An interval in percent: 7.4–26 %.
  * @param {number} low
@@ -49,57 +26,4 @@ export function verbOf({ kind }) {
 export function interval(low, high) {
   const ends = [low, high].map((end) => percent(end).replace(`${GAP}%`, ""));
   return `${[...new Set(ends)].join("\u2013")}${GAP}%`;
-}
-
-/**
- * The confidence interval of an answer, or why there is none.
- * @param {Answer} answer
- * @returns {string}
- */
-export function inOneSentence(answer) {
-  const { probability: p, ci_low: low, ci_high: high, level } = answer;
-  if (p === 1 && answer.how === "by mechanics") {
-    return "The block is unstable without shaking: check dip and friction.";
-  }
-  if (p === 0 && high === 0) return "By mechanics: this shaking cannot make the block fail.";
-  return `${percent(level)} confidence interval ${interval(low, high)}`;
-}
-
-/**
- * The prediction interval at some sites of one earthquake; empty where it is not asked for.
- * @param {Answer} answer
- * @returns {string}
- */
-export function ranges(answer) {
-  const { event_low, event_high, level } = answer;
-  if (event_low === null || event_high === null) return "";
-  return (
-    `At ${atSites(answer)}, ${interval(event_low, event_high)} of the blocks ${verbOf(answer)} ` +
-    `(${percent(level)} prediction interval).`
-  );
-}
-
-/** Yields of a block, by their keys. */
-const YIELDS = { kr: "k_r", ky: "k_y", ks: "k_s", kct: "k_ct" };
-
-/**
- * What the answer is without the pressure of the water behind the block; empty for a dry block.
- * @param {{drained?: Record<string, number | null> | null}} answer
- */
-export function drainedBound({ drained }) {
-  if (!drained) return "";
-  const strength = Object.entries(YIELDS)
-    .filter(([key]) => typeof drained[key] === "number")
-    .map(([key, symbol]) => `${symbol}${GAP}=${GAP}${Number(Number(drained[key]).toPrecision(3))}, `);
-  const ends = interval(Number(drained.ci_low), Number(drained.ci_high));
-  const p = percent(Number(drained.probability));
-  return `Drained: ${strength.join("")}P${GAP}=${GAP}${p} (${ends}), without water pressure.`;
-}
-
-/**
- * Which sites the range of one earthquake is of.
- * @param {{sites?: number | null}} answer
- */
-export function atSites({ sites }) {
-  return `${sites} site${sites === 1 ? "" : "s"} of one earthquake`;
 }

@@ -36,6 +36,7 @@ export function askProbability(question, kind) {
   return get("v1/predict", {
     ...{ ...block, ...free, kind },
     ...only(question.values, [...optionsOf(kind), ...names]),
+    text: "true",
   });
 }
 

@@ -1,0 +1,122 @@
+"""One answer in every interface: the same headline, and each warning in each of them."""
+
+from __future__ import annotations
+
+import html
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+import rbfrag
+from rbfrag.errors import spelled
+from rbfrag.question.document import answer_block
+from rbfrag.results.diagnostic import diagnostics
+from rbfrag.service.app import make_app
+from rbfrag.service.settings import ServiceSettings
+from rbfrag.vocabulary.quantities import INPUTS, option_of, parameter_of
+from tests.cli.conftest import Shell
+from tests.cli.conftest import shell as shell
+from tests.plots.test_report import words_of
+from tests.service.page.conftest import browser as browser
+from tests.service.page.conftest import chromium as chromium
+from tests.service.page.conftest import open_page as open_page
+from tests.service.page.conftest import service as service
+
+SLAB: dict[str, Any] = {"height_m": 2.2, "width_m": 0.55, "beta_deg": 5.0, "phi_deg": 36.0}
+
+QUESTIONS: dict[str, dict[str, Any]] = {
+    "toppling": {"p2": 3.0, "kr": 0.1, "pgv_m_s": 0.6},
+    "shape": {"height_m": 2.0, "width_m": 0.4, "pgv_m_s": 0.9, "pga_g": 0.5},
+    "water": {**SLAB, "water_m": 0.6, "pgv_m_s": 0.5},
+    "rocking": {"p2": 3.0, "kr": 0.2, "kind": "rocking", "pgv_m_s": 0.6, "restitution": 0.9},
+    "sliding": {"ky": 0.12, "displacement_m": 0.1, "pgv_m_s": 0.6, "pga_g": 0.4},
+    "slumping": {
+        "s1_m": 1.0, "s2_m": 0.6, "gamma_deg": 25.0, "beta_deg": 20.0, "phi_deg": 32.0,
+        "pgv_m_s": 0.6, "pga_g": 0.6,
+    },
+    "confined toppling": {
+        "s1_m": 0.5, "s2_m": 0.15, "gamma_deg": 95.0, "beta_deg": 5.0, "phi_deg": 25.0,
+        "pgv_m_s": 0.6, "pga_g": 0.6,
+    },
+    "scenario": {
+        "p2": 3.0, "kr": 0.1, "magnitude": 6.8, "rjb_km": 12.0, "vs30_m_s": 760.0,
+        "mechanism": "reverse",
+    },
+    "unit": {"p2": 3.0, "kr": 0.1, "pgv_m_s": 40.0},
+    "extrapolation": {"p2": 40.0, "kr": 0.1, "pgv_m_s": 2.9},
+    "unstable": {**SLAB, "beta_deg": 40.0, "pgv_m_s": 0.5},
+    "below yield": {"p2": 3.0, "kr": 0.4, "pgv_m_s": 0.6, "pga_g": 0.3},
+}  # fmt: skip
+"""Questions about one block: every kind of failure, and every sort of warning."""
+
+OPTIONS = ("excel_text", *(name for name in INPUTS if "_" in name))
+
+
+def words(question: dict[str, Any]) -> list[str]:
+    return [part for name, value in question.items() for part in (option_of(name), f"{value}")]
+
+
+def plain(text: str) -> str:
+    """A text without the marks of symbols and spaces that interfaces write in their own way."""
+    text = html.unescape(text).replace("\N{LATIN SUBSCRIPT SMALL LETTER R}", "_r")
+    text = text.replace("\N{LATIN SUBSCRIPT SMALL LETTER S}", "_s").replace("\u00a0", " ")
+    return " ".join(text.replace("_", "").split())
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_each_interface_has_the_headline_and_every_warning(name: str, shell: Shell) -> None:
+    question = QUESTIONS[name]
+    kind = question.get("kind")
+    inputs = {field: value for field, value in question.items() if field != "kind"}
+    options = {n: inputs.pop(n) for n in ("mechanism",) if n in inputs}
+    answer = answer_block(inputs, kind=kind, **options)
+    headline, notes = answer.headline(), diagnostics(answer.warnings)
+    assert notes or name == "below yield"
+
+    printed = shell("predict", *words(question)).stdout
+    lines = [line.removeprefix("Note      ") for line in printed.splitlines()]
+    assert headline in lines
+    assert {spelled(note, OPTIONS, option_of) for note in notes} <= {*lines}
+
+    document = json.loads(shell("predict", *words(question), "--json").stdout)
+    assert document["warnings"] == [*notes]
+    assert [(d["code"], d["text"]) for d in document["diagnostics"]] == [
+        (note.code, note) for note in notes
+    ]
+
+    client = TestClient(make_app(ServiceSettings(db=None, early=False)))
+    asked = {parameter_of(field): value for field, value in question.items()}
+    found = client.get("/v1/predict", params={**asked, "text": True}).json()
+    assert found["text"]["sentences"] == [*answer.sentences()]
+    assert found["text"]["lines"] == [line._asdict() for line in answer.lines()]
+    assert found["diagnostics"] == document["diagnostics"]
+    assert client.post("/v1/predict", json={**asked, "text": True}).json() == found
+
+    for suffix in ("pdf", "html"):
+        rbfrag.report(f"answer.{suffix}", **question)
+        shown = plain(words_of(Path(f"answer.{suffix}")))
+        for text in (headline, *answer.sentences(), *(line.text for line in answer.lines())):
+            assert plain(text) in shown
+        for note in notes:
+            assert plain(note)[1:] in shown  # a sentence begins with a capital letter
+
+    html_text = answer._repr_html_()
+    assert all(plain(text) in plain(html_text) for text in (headline, *notes))
+
+
+@pytest.mark.parametrize("name", ["shape", "water", "rocking", "slumping"])
+def test_the_page_shows_the_same_text(name: str, open_page: Any) -> None:
+    question = QUESTIONS[name]
+    inputs = {field: value for field, value in question.items() if field != "kind"}
+    answer = answer_block(inputs, kind=question.get("kind"))
+    query = "&".join(f"{parameter_of(field)}={value}" for field, value in question.items())
+    page = open_page(f"?{query}").page
+    shown = f"{page.text_content('#probability')} {page.text_content('#sentence')}"
+    assert plain(shown) == plain(answer.headline())
+    lines = page.locator("#lines dd").all_text_contents()
+    assert [plain(text) for text in lines] == [plain(line.text) for line in answer.lines()]
+    notes = page.locator("#warnings li").all_text_contents()
+    assert notes == [*diagnostics(answer.warnings)]
