@@ -19,12 +19,12 @@ from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
+from rbfrag.fragility import describe
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
-from rbfrag.question.words import numbers_in_words
 from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
@@ -253,7 +253,7 @@ class _Request(NamedTuple):
         stands = "that stands free" if free else "backed by a slope" if topples else "on a slope"
         rows = zip(*(values.tolist() for values in self.numbers.values()), strict=True)
         return [
-            f"Rock block {stands}, {numbers_in_words(known, 6)}."
+            f"Rock block {stands}, {describe.labelled_values(known, 6)}."
             for row in rows
             for known in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
         ]

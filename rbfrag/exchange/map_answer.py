@@ -23,7 +23,6 @@ from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
 from rbfrag.question.shaking import doubts_about
-from rbfrag.question.words import numbers_in_words
 from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model
@@ -247,5 +246,5 @@ def _what(blocks: Mapping[str, Any], own: bool) -> str:
         return f"{size} blocks at their places"
     if size == 1:
         numbers = {name: values[0] for name, values in numbers_in(blocks).items()}
-        return f"block with {numbers_in_words(numbers, 6)}"
+        return f"block with {describe.labelled_values(numbers, 6)}"
     return f"mean of {size} blocks"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.results.numbers import with_interval
+from rbfrag.results.numbers import equals, with_interval
 from rbfrag.vocabulary.quantities import (
     INTENSITY,
     JOINT,
@@ -20,6 +20,9 @@ from rbfrag.vocabulary.quantities import (
 
 if TYPE_CHECKING:
     from rbfrag.db.model_file import ModelRow
+
+_LONGEST_LABEL = 30
+"""Letters of a label; a longer one gives way to the word of the field."""
 
 
 def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
@@ -45,7 +48,7 @@ def drained_bound(bound: Mapping[str, float | None]) -> str:
         if name in NUMBERS and value is not None
     ]
     p, low, high = (float(bound[name] or 0.0) for name in ("probability", "ci_low", "ci_high"))
-    return f"{''.join(yields)}P = {with_interval(p, low, high)}, without water pressure"
+    return f"{''.join(yields)}{equals('P', with_interval(p, low, high))}, without water pressure"
 
 
 def at_sites(number: float) -> str:
@@ -87,12 +90,25 @@ def _shape(inputs: Mapping[str, Any]) -> str:
     parts = [f"{name} {inputs[name]}" for name in SPACE if inputs.get(name)]
     if values.keys() >= {"height_m", "width_m"}:
         parts.append(f"rectangle {values.pop('height_m'):g} m × {values.pop('width_m'):g} m")
-    for name in (*SHAPE, *PLANES, *JOINT):
-        if name in values:
-            quantity = QUANTITIES[name]
-            label = word_of(name) if name in SHAPE else quantity.noun
-            parts.append(f"{label} {values[name]:g} {quantity.unit}".replace(" deg", "°").rstrip())
+    names = (name for name in (*SHAPE, *PLANES, *JOINT) if name in values)
+    parts += [" ".join(labelled_value(name, values[name])) for name in names]
     return ", ".join(parts)
+
+
+def labelled_value(name: str, value: float, digits: int = 4) -> tuple[str, str]:
+    """Return the label of a field, and its value with the unit: ("dip of the base", "5°")."""
+    quantity = QUANTITIES[name]
+    label = quantity.noun if len(quantity.noun) <= _LONGEST_LABEL else word_of(name)
+    if name in NUMBERS:
+        label = quantity.symbol
+    text = f"{value:.{digits}g} {quantity.unit}".rstrip()
+    return label, text.replace(" deg", "°")
+
+
+def labelled_values(numbers: Mapping[str, float], digits: int) -> str:
+    """Return the numbers of a block with their names and units: "p² = 3 1/s², k_r = 0.1"."""
+    pairs = (labelled_value(name, value, digits) for name, value in numbers.items())
+    return ", ".join(f"{label} = {value}" for label, value in pairs)
 
 
 def model(document: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import confidence, interval, percent
+from rbfrag.results.numbers import confidence, equals, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 
@@ -128,8 +128,7 @@ class Prediction(Result):
             yield f"P({state}) = {p:g}{reason}   (by mechanics)"
             return
         ends = confidence(self.level, interval(self.ci_low, self.ci_high))
-        value = percent(p)
-        yield f"P({state}) {value if value[0] in '<>' else f'= {value}'}   ({ends})"
+        yield f"{equals(f'P({state})', percent(p))}   ({ends})"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield what was asked, the prediction interval, the drained bound and the model."""

@@ -29,7 +29,6 @@ from rbfrag.plots.canvas import (
 )
 from rbfrag.plots.labels import as_written
 from rbfrag.question.keywords import LEVEL
-from rbfrag.question.words import numbers_in_words
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
@@ -115,7 +114,7 @@ def plot_curve(
     axes = figure.add_subplot()
     draw_curve(axes, model, block, varied, held, level=level, beside=beside, sites=sites)
     y_m_s = _velocity_m_s(model, block)
-    about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
+    about_block = _SUBSCRIPT.sub(r"$\1_\2$", describe.labelled_values(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
     conditions = ", ".join(_condition(name, held[name]) for name in others)
     fitted = describe.fitted_data(model.row.diagnostics)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.chart import CONTOURS
 from rbfrag.plots.labels import as_written
-from rbfrag.question.words import number_in_words
 from rbfrag.vocabulary.quantities import QUANTITIES
 
 _NODES = 241
@@ -83,7 +83,7 @@ def plot_kind_chart(
     axes.set_xlabel(f"{about.noun} [{about.unit}]")
     axes.set_ylabel(f"yield acceleration coefficient, $k_{{{strength[1:]}}}$")
     axes.grid(visible=True, which="both", lw=0.4, color="#c0c0c0")
-    at = [" = ".join(number_in_words(name, value, 3)) for name, value in held.items()]
+    at = [" = ".join(describe.labelled_value(name, value, 3)) for name, value in held.items()]
     kind = model.method.block.kind.replace("_", " ")
     title = as_written(f"Probability of failure, {kind}: model {model.name}", 85)
     conditions = as_written(f"at {', '.join([*at, *ratios])}", 85)

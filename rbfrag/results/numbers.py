@@ -43,6 +43,11 @@ def with_interval(p: float, low: float, high: float) -> str:
     return percent(p) if ends == percent(p) else f"{percent(p)} ({ends})"
 
 
+def equals(name: str, value: str) -> str:
+    """Return "P = 15 %", or "P <0.01 %" where the value is a bound."""
+    return f"{name} {value}" if value[0] in "<>" else f"{name} = {value}"
+
+
 def confidence(level: float, ends: str, name: str = "confidence") -> str:
     """Return an interval with its level: "95 % confidence interval 7.4–26 %"."""
     return f"{100.0 * level:g} % {name} interval {ends}"

@@ -58,7 +58,8 @@ NO_UNIT = {"form", "sheet", "ignore_columns", "drainage",
     "component", "convert", "convert_sigma", "imt", "jrc", "kct", "kct_sigma", "kind", "kr",
     "kr_sigma", "ks", "ks_sigma", "ky", "ky_sigma", "level", "magnitude", "map", "model", "n",
     "no_back", "p2_sigma", "pct2_sigma", "polarity", "ps2_sigma", "restitution",
-    "restitution_sigma", "reverse", "seed", "site", "sites", "trace", "units",
+    "restitution_sigma", "reverse", "seed", "site", "sites", "text", "trace",
+    "units",
 }  # fmt: skip
 
 

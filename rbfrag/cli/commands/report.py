@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from rbfrag.cli.output import (
     print_json,
     print_pairs,
+    print_result,
     print_rows,
-    print_sentences,
     print_warnings,
 )
 from rbfrag.cli.parameters import options
@@ -91,15 +91,16 @@ def report(
         report = write_report(out, rows, question, title=title, date=heading.date, warnings=remarks)
     contents = [entry.contents for entry in report.entries if entry.contents is not None]
     if json:
-        documents = [{"block_id": e.name, **e.contents.document} for e in report.entries
+        documents = [{"block_id": e.name, **e.contents.as_dict()} for e in report.entries
                      if e.contents is not None]  # fmt: skip
         rejected = [{"block_id": e.name, "reason": e.reason} for e in report.entries if e.reason]
         several = {"blocks": documents, "rejected": rejected, **report.totals}
         warnings = {"warnings": [*report.warnings]} if blocks else {}
-        print_json({"file": out, **(several if blocks else contents[0].document), **warnings})
+        print_json({"file": out, **(several if blocks else contents[0].as_dict()), **warnings})
         return
     if len(rows) == 1:
-        print_sentences(contents[0].sentences)
+        print_result(contents[0], json=False)
+        print()
     else:
         print_pairs(dict(report.summary))
         print()
@@ -108,4 +109,5 @@ def report(
         )
         print()
     print(out)
-    print_warnings(diagnostics(report.warnings, *(each.remarks for each in contents)))
+    if len(rows) > 1:
+        print_warnings(diagnostics(report.warnings, *(block.warnings for block in contents)))

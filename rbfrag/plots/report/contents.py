@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
@@ -18,10 +17,10 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction import Prediction
 from rbfrag.hazards.annual_rate import probability_in
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.branches import Weights
-from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.plots.canvas import mode_title
@@ -31,21 +30,18 @@ from rbfrag.question.blocks import Shape, shape_of
 from rbfrag.question.document import answer_block
 from rbfrag.question.fields import RangeFields
 from rbfrag.question.question import OF_SHAKING, described, without_water
-from rbfrag.question.words import number_in_words
-from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.results.numbers import interval, percent, return_period
+from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 from rbfrag.vocabulary.quantities import (
     BLOCK,
-    FAILURE,
     INTENSITY,
-    NUMBERS,
     QUANTITIES,
     REQUEST,
-    SCATTER,
     SHAKING,
     WHOLE,
     word_of,
@@ -77,19 +73,6 @@ class RateQuestion:
     weights: Weights | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Rate:
-    """How often a year the block fails."""
-
-    curve: HazardCurve
-    answer: HazardAnswer
-
-    @cached_property
-    def document(self) -> dict[str, Any]:
-        """The answer under the keys of the JSON contract."""
-        return self.answer.as_dict()
-
-
 class Drawing(NamedTuple):
     """A block to draw."""
 
@@ -98,45 +81,55 @@ class Drawing(NamedTuple):
     title: str
 
 
-@dataclass(frozen=True, eq=False)
-class Contents:
-    """All that a report says.
+@dataclass(frozen=True, eq=False, repr=False)
+class Contents(Result):
+    """The report of one block.
 
     Args:
-        sentences: the answer in words, the first one decides.
-        tables: rows of name and value under headings.
+        prediction: the probability of failure.
+        hazard: the annual rate of failure; None without a hazard curve.
+        sections: rows of name and value under headings: the block and its shaking.
         versions: program, model and data.
         drawing: the block that is drawn; None where its shape is not known.
         numbers: numbers of the block that the model reads.
-        held: what its design chart holds; None for a model that has no chart.
-        document: the prediction under the keys of the JSON contract.
-        rate: how often a year it fails; None without a hazard curve.
+        measures: intensity measures, medians where they are uncertain.
+        model: the fragility model.
+        held: the variables that its design chart holds constant; None for a model without a chart.
+        warnings: warnings of both answers, and of the table that the block is a row of.
     """
 
-    sentences: tuple[str, ...]
-    tables: tuple[Table, ...]
-    remarks: tuple[str, ...]
+    prediction: Prediction
+    hazard: HazardAnswer | None
+    sections: tuple[Table, ...]
     versions: tuple[str, ...]
     drawing: Drawing | None
     numbers: dict[str, float]
     measures: dict[str, float]
     model: FragilityModel
     held: HeldMeasures | None
-    document: dict[str, Any]
-    rate: Rate | None
+    warnings: tuple[Diagnostic, ...]
 
     @property
     def is_unstable(self) -> bool:
         """Whether the block fails without an earthquake."""
-        return bool(self.document["probability"] == 1.0 and self.document["how"] == BY_MECHANICS)
+        return self.prediction.probability == 1.0 and self.prediction.how == BY_MECHANICS
 
-    def notes(self) -> tuple[str, ...]:
-        """Return the warnings as sentences."""
-        return sentences_of(self.remarks)
+    def sentences(self) -> Iterator[str]:
+        """Yield the probability and the return period."""
+        yield from self.prediction.sentences()
+        if self.hazard is not None:
+            yield from self.hazard.sentences()
 
-    def columns(self) -> tuple[tuple[Table, ...], tuple[Table, ...]]:
-        """Return the tables in two columns: the question, and the answer."""
-        return self.tables[:2], self.tables[2:]
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the labelled lines of both answers; the versions name the model of the rate."""
+        yield from self.prediction.lines()
+        rate = () if self.hazard is None else self.hazard.lines()
+        yield from (line for line in rate if line.label != "Model")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the prediction under the keys of the JSON contract, with ``hazard``."""
+        rate = None if self.hazard is None else self.hazard.as_dict()
+        return {**self.prediction.as_dict(), "warnings": [*self.warnings], "hazard": rate}
 
 
 def sentences_of(warnings: Sequence[str]) -> tuple[str, ...]:
@@ -157,44 +150,36 @@ def contents_of(
     options = {name: given[name] for name in ("kind", *REQUEST) if name in given}
     inputs = {name: value for name, value in given.items() if name not in options}
     how: dict[str, Any] = {**options, **answering}
-    result = answer_block(inputs, **how)
-    document, read = result.as_dict(), result.inputs
-    facts = facts_of(document["kind"])
+    prediction = answer_block(inputs, **how)
+    read = prediction.inputs
+    facts = facts_of(prediction.kind)
     shape = shape_of({n: v for n, v in inputs.items() if n not in OF_SHAKING and n in OF_BLOCK})
-    numbers = {name: read[name] for name in (*NUMBERS, *FAILURE, *SCATTER) if name in read}
-    medians = {n: about["median"] for n, about in (document["shaking"] or {}).items()}
+    rate = rate or RateQuestion()
+    (group,) = described(inputs, options.get("kind")).groups
+    numbers = dict(group.numbers)
+    medians = {name: about["median"] for name, about in (prediction.shaking or {}).items()}
     measures = {name: value for name, value in read.items() if name in INTENSITY} | medians
-    model = find_model(document["model"], TERMS[document["term"]].inputs, how.get("db"))
-    answered = _rate({**numbers, "kind": facts.kind}, rate or RateQuestion(), how)
-    if answered is not None and document["drained"] is not None:
-        (group,) = described(without_water(inputs), options.get("kind")).groups
-        bound = _rate({**group.numbers, "kind": group.kind}, rate or RateQuestion(), how)
+    model = find_model(prediction.model, TERMS[prediction.term].inputs, how.get("db"))
+    annual = _annual_rate({**numbers, "kind": facts.kind}, rate, how)
+    if annual is not None and prediction.drained is not None:
+        (dry,) = described(without_water(inputs), options.get("kind")).groups
+        bound = _annual_rate({**dry.numbers, "kind": dry.kind}, rate, how)
         if bound is not None:
-            drained = bound.answer.annual_rate
-            answered = replace(answered, answer=replace(answered.answer, drained=drained))
-    about_rate = () if answered is None else answered.answer.sentences()
-    warnings = diagnostics(document["warnings"], answered.document["warnings"] if answered else ())
+            annual = replace(annual, drained=bound.annual_rate)
     return Contents(
-        sentences=(
-            *(text for text in warnings if text.code == "check_unit"),
-            *result.sentences(),
-            *about_rate,
-            *(f"{label}: {text}" if label else text for label, text in result.lines()),
-        ),
-        tables=(
-            ("Block", _block_rows(shape, facts, numbers, model, document["y_m_s"])),
+        prediction=prediction,
+        hazard=annual,
+        sections=(
+            ("Block", _block_rows(shape, facts, numbers, model, prediction.y_m_s)),
             ("Shaking", shaking_rows({n: v for n, v in given.items() if n in OF_REQUEST})),
-            *_answer_tables(document, answered),
         ),
-        remarks=warnings,
-        versions=tuple(_versions(model, answered, document["data"])),
+        versions=tuple(_versions(model, annual, prediction.data)),
         drawing=_drawing(shape, numbers, free=facts.free_standing),
         numbers=numbers,
         measures=measures,
         model=model,
         held=_held(model, numbers, measures),
-        document={**document, "hazard": None if answered is None else answered.document},
-        rate=answered,
+        warnings=diagnostics(prediction.warnings, () if annual is None else annual.warnings),
     )
 
 
@@ -206,7 +191,7 @@ OF_REQUEST = (*SHAKING, "component", "mechanism", "gmm")
 def shaking_rows(given: Mapping[str, Any]) -> Rows:
     """Return the shaking that was asked about, as names and values."""
     return tuple(
-        number_in_words(name, value, 6) if isinstance(value, int | float)
+        describe.labelled_value(name, value, 6) if isinstance(value, int | float)
         else (word_of(name).replace("_", " "), str(value))
         for name, value in given.items()
     )  # fmt: skip
@@ -227,13 +212,15 @@ class ReportedBlock:
         name = self.name if self.count == 1 else f"{self.name} ({self.count} blocks)"
         if self.contents is None:
             return (name,)
-        contents, document = self.contents, self.contents.document
-        answer = [value for _, value in contents.tables[2][1][:2]]
+        contents, prediction = self.contents, self.contents.prediction
+        mode = contents.sections[0][1][0][1]
+        ends = interval(prediction.ci_low, prediction.ci_high)
+        answer = [percent(prediction.probability), ends]
         if contents.is_unstable:
             answer = ["1   unstable without shaking", ""]
-        rate = document["hazard"]
-        period = "" if rate is None else return_period(rate["annual_rate"])
-        return (name, contents.tables[0][1][0][1], *answer, period)
+        rate = contents.hazard
+        period = "" if rate is None else return_period(float(rate.annual_rate[0]))
+        return (name, mode, *answer, period)
 
 
 COLUMNS = ("block", "failure mode", "P", "interval", "return period")
@@ -290,8 +277,11 @@ def report_of(
             entries.append(ReportedBlock(name, None, str(error)))
     if len(errors) == len(rows):
         raise errors[0]
-    if len(entries) == 1 and entries[0].count == 1:
-        return Report(entries, (), tuple(warnings))
+    if len(entries) == entries[0].count == 1:
+        alone = entries[0].contents
+        assert alone is not None
+        with_notes = replace(alone, warnings=diagnostics(warnings, alone.warnings))
+        return Report([replace(entries[0], contents=with_notes)])
     entries.sort(key=lambda entry: entry.contents is None or not entry.contents.is_unstable)
     summary, totals, notes = _totals(entries, rows, rate or RateQuestion(), answering)
     return Report(entries, summary, diagnostics(warnings, notes), totals)
@@ -307,7 +297,7 @@ def _totals(
     answered = [(e.contents, e.count) for e in entries if e.contents is not None]
     unstable = sum(count for contents, count in answered if contents.is_unstable)
     standing = [pair for pair in answered if not pair[0].is_unstable]
-    expected = sum(count * contents.document["probability"] for contents, count in answered)
+    expected = sum(count * contents.prediction.probability for contents, count in answered)
     totals: dict[str, Any] = {
         "rows": len(entries), "blocks_answered": sum(count for _, count in answered),
         "blocks_unstable": unstable, "rows_rejected": len(entries) - len(answered),
@@ -332,7 +322,7 @@ def _totals(
         name: np.array([contents.numbers.get(name, np.nan) for contents, _ in standing])
         for name in names
     }
-    kinds = [contents.document["kind"] for contents, _ in standing]
+    kinds = [contents.prediction.kind for contents, _ in standing]
     count = np.array([number for _, number in standing], dtype=np.float64)
     how: dict[str, Any] = {n: v for n, v in answering.items() if n in ("level", "db")}
     how |= {**columns, **rate.meaning, "kind": kinds}
@@ -373,18 +363,17 @@ def _totals(
     return tuple(summary), totals, answer.warnings
 
 
-def _rate(
+def _annual_rate(
     block: Mapping[str, Any], question: RateQuestion, answering: Mapping[str, Any]
-) -> Rate | None:
+) -> HazardAnswer | None:
     if question.curve is None or block.keys() <= {"kind"}:  # unstable without shaking
         return None
     curves = as_curves(question.curve, **question.meaning)
     # another model reads the curve's measure alone
     how: dict[str, Any] = {name: v for name, v in answering.items() if name in ("level", "db")}
-    answer = hazard(
+    return hazard(
         curves, weights=question.weights, years=question.years, **block, **question.meaning, **how
     )
-    return Rate(curves[0], answer)
 
 
 def _held(
@@ -439,7 +428,7 @@ def _block_rows(
             ("dip of the base", f"{planes['beta_deg']:g}°"),
             ("friction angle", f"{planes['phi_deg']:g}°" if "phi_deg" in planes else "not given"),
         ]
-    rows += [number_in_words(n, value) for n, value in numbers.items() if n not in planes]
+    rows += [describe.labelled_value(n, value) for n, value in numbers.items() if n not in planes]
     of = model.method.block
     if y_m_s is not None and of.size is not None:
         first = "toppling velocity" if facts.mode == "topple" else "velocity"
@@ -451,36 +440,7 @@ def _block_rows(
     return tuple(rows)
 
 
-def _answer_tables(document: Mapping[str, Any], rate: Rate | None) -> Sequence[Table]:
-    level = f"{100.0 * document['level']:g} %"
-    answer = [
-        ("probability of failure", percent(document["probability"])),
-        (f"interval ({level})", interval(document["ci_low"], document["ci_high"])),
-    ]
-    if document["event_low"] is not None:
-        ends = document["event_low"], document["event_high"]
-        answer.append(
-            (f"share at {describe.at_sites(document['sites'])} ({level})", interval(*ends))
-        )
-    inside = "inside" if document["in_domain"] else "outside"
-    answer.append(("block and shaking", f"{inside} the fitted range"))
-    hazards = [] if rate is None else [("Hazard", _hazard_rows(rate, level))]
-    return [("Answer", tuple(answer)), *hazards]
-
-
-def _hazard_rows(rate: Rate, level: str) -> Rows:
-    document, curve = rate.document, rate.curve
-    place = f", {curve.place}" if curve.place else ""
-    return (
-        ("hazard curve", f"{curve.imt}{place}"),
-        ("annual rate of failure", f"{document['annual_rate']:.3g} 1/a"),
-        (f"interval ({level})", f"{document['ci_low']:.2g} to {document['ci_high']:.2g} 1/a"),
-        ("return period", return_period(document["annual_rate"])),
-        (f"probability in {document['years']:g} years", percent(document["probability"])),
-    )
-
-
-def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[str]:
+def _versions(model: FragilityModel, rate: HazardAnswer | None, data: str | None) -> Sequence[str]:
     row = model.row
     fitted = describe.fitted_data(row.diagnostics) or "fitted"
     lines = [
@@ -490,6 +450,6 @@ def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[s
         f"Database: {data}."
     ]
     if rate is not None:
-        source = Path(rate.curve.source).name
-        lines.append(f"Rate by model {rate.document['model']} from {source}.")
+        source = Path(rate.curves[0].source).name
+        lines.append(f"Rate by model {rate.model} from {source}.")
     return lines

@@ -36,9 +36,9 @@ def panels_of(contents: Contents) -> list[Panel]:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))
     if contents.held is not None:
-        title = f"Design chart, model {describe.model(contents.document)}"
+        title = f"Design chart, model {describe.model(vars(contents.prediction))}"
         panels.append(Panel("chart", title, lambda part: _chart(part, contents)))
-    if contents.rate is not None:
+    if contents.hazard is not None:
         title = "Hazard, and the shaking that the rate comes from"
         panels.append(Panel("rate", title, lambda part: _rate(part, contents)))
     return panels
@@ -54,9 +54,10 @@ def _block(part: FigureBase, drawing: Drawing) -> None:
 def _chart(part: FigureBase, contents: Contents) -> None:
     assert contents.held is not None
     by_pgv = contents.model.term.name in MORE_TERMS
-    x = contents.measures["pgv_m_s"] if by_pgv else contents.document["intensity_m_s"]
+    x = contents.measures["pgv_m_s"] if by_pgv else contents.prediction.intensity_m_s
+    y_m_s = contents.prediction.y_m_s
     axes = part.subplots()
-    draw_chart(axes, contents.model, contents.held, point=(x, contents.document["y_m_s"]))
+    draw_chart(axes, contents.model, contents.held, point=None if y_m_s is None else (x, y_m_s))
     axes.set_ylabel("toppling velocity, $y = k_r\\,g/p$ [m/s]")
     if contents.model.term.inputs == ("pgv_m_s",):
         axes.set_xlabel(AXIS["pgv_m_s"])
@@ -69,15 +70,15 @@ def _curve(part: FigureBase, contents: Contents) -> None:
     axes = part.subplots()
     draw_curve(
         axes, contents.model, contents.numbers, first,
-        {name: contents.measures[name] for name in others}, level=contents.document["level"],
-        at=contents.measures[first], sites=contents.document.get("sites"),
+        {name: contents.measures[name] for name in others}, level=contents.prediction.level,
+        at=contents.measures[first], sites=contents.prediction.sites,
     )  # fmt: skip
     part.legend(loc="outside lower center", fontsize=7, frameon=False)
 
 
 def _rate(part: FigureBase, contents: Contents) -> None:
-    assert contents.rate is not None
+    assert contents.hazard is not None
     top, bottom = part.subplots(2, 1, sharex=True)
-    draw_contribution(top, bottom, contents.rate.curve, contents.rate.answer)
+    draw_contribution(top, bottom, contents.hazard.curves[0], contents.hazard)
     top.set_ylabel("exceedances [1/a]")
     bottom.set_ylabel("share of the rate\n[% of each step]")

@@ -138,13 +138,16 @@ def _list(
 def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> None:
     halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
     for half, (name, contents) in zip(halves, entries, strict=False):
-        notes, head_in = _note_lines(contents.notes()), 0.85 + 0.17 * len(_head_lines(contents))
+        notes, head_in = (
+            _note_lines(sentences_of(contents.warnings)),
+            0.85 + 0.17 * len(_head_lines(contents)),
+        )
         foot_in = 0.35 + _NOTE_STEP_IN * (len(notes) + 1)
         heights = [head_in, 0.5 * _HEIGHT_IN - head_in - foot_in, foot_in]
         head, body, foot = half.subfigures(3, 1, height_ratios=heights)
         _write_head(head, contents, [_cut(name, _TITLE)], "", head_in)
         left, *cells, _ = body.subfigures(1, 4, width_ratios=[3.9, 2.1, 2.1, 0.17])
-        _write_table(left, 0.18, 0.46, contents.tables[:3], heights[1])
+        _write_table(left, 0.18, 0.46, contents.sections, heights[1])
         for cell, panel in zip(cells, panels_of(contents), strict=False):
             panel.draw(cell)
             for axes in cell.axes:
@@ -157,9 +160,8 @@ def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> Non
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
-    lines = (sum(1.5 + len(rows) for _, rows in tables) for tables in contents.columns())
-    tables_in = 0.1 + _STEP_IN * max(lines)
-    notes, versions = _note_lines(contents.notes()), _wrapped_all(contents.versions)
+    tables_in = 0.1 + _STEP_IN * max(1.5 + len(rows) for _, rows in contents.sections)
+    notes, versions = _note_lines(sentences_of(contents.warnings)), _wrapped_all(contents.versions)
     versions_in = 0.35 + 0.13 * len(versions)
     foot_in = versions_in + _NOTE_STEP_IN * (len(notes) + 1)
     panels = panels_of(contents)
@@ -170,8 +172,8 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _write_head(parts[0], contents, titles, date, head_in)
-    for x, wide, tables in zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True):
-        _write_table(parts[1], x, wide, tables, tables_in)
+    for x, wide, table in zip((_LEFT, 0.54), (0.235, 0.235), contents.sections, strict=True):
+        _write_table(parts[1], x, wide, [table], tables_in)
     for part, row in zip(parts[2:-1], rows, strict=True):
         # one picture alone is as wide as two
         widths = [2.0 / len(row)] * len(row)
@@ -185,10 +187,11 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
 
 
 def _head_lines(contents: Contents) -> list[tuple[str, bool]]:
-    first, *others = contents.sentences
+    first, *further = contents.sentences()
+    labelled = (f"{label}: {text}" if label else text for label, text in contents.lines())
     return [
         *((line, True) for line in _wrapped(first, _NARROW)),
-        *((line, False) for line in _wrapped(" ".join(others), _WIDE)),
+        *((line, False) for text in (*further, *labelled) for line in _wrapped(text, _WIDE)),
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import islice
 from pathlib import Path
@@ -18,7 +18,6 @@ from rbfrag.plots.report.contents import (
     Contents,
     Report,
     ReportedBlock,
-    Rows,
     Table,
     sentences_of,
 )
@@ -91,14 +90,15 @@ def _summary(entries: Sequence[ReportedBlock]) -> str:
 
 def _block(contents: Contents, name: str, prefix: str) -> str:
     """Return what is said of a block; of several each has two pictures, and names of its own."""
-    first, *others = contents.sentences
+    first, *further = contents.sentences()
     figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels_of(contents))
     return "\n".join([
         f"<section>{f'<h1>{escape(name)}</h1>' if prefix else ''}",
-        f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
-        '<div class="parts">', *map(_column, contents.columns()), "</div>",
+        f'<p class="first">{_written(first)}</p>',
+        *(f"<p>{_written(text)}</p>" for text in further),
+        _rows(contents.lines()), '<div class="parts">', *map(_table, contents.sections), "</div>",
         '<div class="parts">', *islice(figures, 2 if prefix else None), "</div>",
-        _notes(contents.notes()), "</section>",
+        _notes(sentences_of(contents.warnings)), "</section>",
     ])  # fmt: skip
 
 
@@ -113,16 +113,12 @@ def _written(text: str) -> str:
     return SYMBOL.sub(r"\1<sub>\2</sub>", escape(text)).replace(" %", "&nbsp;%")
 
 
-def _column(tables: Sequence[Table]) -> str:
-    return f"<div>{''.join(map(_table, tables))}</div>"
-
-
 def _table(table: Table) -> str:
     heading, rows = table
-    return f"<h2>{escape(heading)}</h2>{_rows(rows)}"
+    return f"<div><h2>{escape(heading)}</h2>{_rows(rows)}</div>"
 
 
-def _rows(rows: Rows) -> str:
+def _rows(rows: Iterable[tuple[str, str]]) -> str:
     cells = "".join(
         f'<tr><th scope="row">{_written(name)}</th><td>{_written(value)}</td></tr>'
         for name, value in rows
