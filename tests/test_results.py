@@ -112,9 +112,9 @@ def test_the_page_shows_the_same_text(name: str, open_page: Any) -> None:
     question = QUESTIONS[name]
     inputs = {field: value for field, value in question.items() if field != "kind"}
     answer = answer_block(inputs, kind=question.get("kind"))
-    names = {"beta_deg": "dip"} | {
-        name: parameter_of(name) for name in question if name != "beta_deg"
-    }
+    names = {name: parameter_of(name) for name in question}
+    if "height_m" in question:
+        names["beta_deg"] = "dip"
     query = "&".join(f"{names[field]}={value}" for field, value in question.items())
     page = open_page(f"?{query}").page
     shown = f"{page.text_content('#probability')} {page.text_content('#sentence')}"
