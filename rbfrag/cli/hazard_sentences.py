@@ -6,16 +6,11 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.hazards import between_measures
-from rbfrag.results.numbers import confidence, interval, percent, return_period, rounded
+from rbfrag.results.numbers import confidence, count_of, interval, percent, return_period, rounded
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
     from rbfrag.hazards.survival import SurvivalAnswer
-
-
-def several(number: int, what: str) -> str:
-    """Return a number of things, in the plural where it is not one."""
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -24,35 +19,6 @@ def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
         name: float(f"{value:.3g}") if isinstance(value, float) else value
         for name, value in values.items()
     }
-
-
-def place_in_words(lon: float, lat: float) -> str:
-    """Return a place of a longitude and latitude [deg] with letters in the place of signs."""
-    return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
-
-
-def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:
-    """Yield where blocks topple most, and how many are expected to.
-
-    Args:
-        document: an answer of `rbfrag shakemap` under the keys of the JSON contract.
-        own: blocks at places of their own, and not one at every node.
-    """
-    place = place_in_words(document["largest_at_lon"], document["largest_at_lat"])
-    likely, places = document["places_above_1_percent"], document["places"]
-    yield (
-        f"{'A block' if own else 'Such a block'} topples with a probability of up to "
-        f"{percent(document['largest_probability'])}, at {place}; it is above 1 % at {likely:,} "
-        f"of {several(places, 'place')}."
-    )
-    if own:
-        some = document["probability_any"]
-        yield (
-            f"{rounded(document['expected_failures'])} of {several(places, 'block')} are expected "
-            "to topple"
-            + ("" if some is None else f", at least one with a probability of {percent(some)}")
-            + "."
-        )
 
 
 def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
@@ -101,7 +67,7 @@ def _curve_of(answer: SurvivalAnswer) -> str:
 def losses_in_words(answer: LossAnswer) -> Iterator[str]:
     """Yield the loss, the failures, how often one fails, and what is not known of them."""
     failures, rate = answer.average_annual_failures, answer.annual_rate_any
-    blocks = several(int(answer.portfolio.count.sum()), "block")
+    blocks = count_of(int(answer.portfolio.count.sum()), "block")
     if answer.events.is_scenario:
         yield f"{'Expected failures':<28}{rounded(failures)} of {blocks}"
         if rate is not None:
@@ -155,6 +121,6 @@ def campaign_in_words(report: Mapping[str, Any]) -> str:
     ]
     stored = f", {before:,} of them before" if before else ""
     return (
-        f"{several(total, 'combination')} of kind {report['kind']} "
+        f"{count_of(total, 'combination')} of kind {report['kind']} "
         f"{'is' if total == 1 else 'are'} stored{stored}: {', '.join(parts) or 'none'}."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Unpack
@@ -24,7 +24,8 @@ from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.results.diagnostic import codes_by_row
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import confidence, count_of, interval, percent, place, rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
@@ -33,7 +34,7 @@ NOTABLE = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShakeMapAnswer(Tabular):
+class ShakeMapAnswer(Result):
     """Probabilities of failure across a ShakeMap.
 
     Args:
@@ -47,6 +48,7 @@ class ShakeMapAnswer(Tabular):
         title: what the map is of, in lines.
         epicentre: longitude and latitude [deg]; None where the map does not state it.
         shape: rows and columns of the nodes; None where they are no whole grid.
+        file: file that the map is written to; None where it is not written.
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -56,6 +58,7 @@ class ShakeMapAnswer(Tabular):
     title: str
     epicentre: tuple[float, float] | None
     shape: tuple[int, int] | None
+    file: str | None = None
 
     def table_columns(self) -> Mapping[str, NDArray[Any]]:
         """Return the columns of the map."""
@@ -63,17 +66,64 @@ class ShakeMapAnswer(Tabular):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
+        file = {} if self.file is None else {"file": self.file}
+        return {**self.about, **self._extremes(), "warnings": list(self.warnings), **file}
+
+    def _largest(self) -> int:
+        """Return the row of the largest probability."""
+        return int(np.nanargmax(self.columns["probability"]))
+
+    def _extremes(self) -> dict[str, Any]:
+        """Return the largest probability, its place, and the number of places above 1 %."""
         probability, lon, lat = (self.columns[name] for name in ("probability", "lon", "lat"))
-        best = int(np.nanargmax(probability))
+        best = self._largest()
         return {
-            **self.about,
             "places": int(np.isfinite(probability).sum()),
             "places_above_1_percent": int(np.nansum(probability > 0.01)),
             "largest_probability": float(probability[best]),
             "largest_at_lon": float(lon[best]),
             "largest_at_lat": float(lat[best]),
-            "warnings": list(self.warnings),
         }
+
+    @property
+    def has_block_places(self) -> bool:
+        """Whether blocks have places of their own, and do not stand at every node."""
+        return "block_id" in self.columns
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the largest probability and its place, and the number of failures."""
+        extremes, row = self._extremes(), self._largest()
+        largest, places = extremes["largest_probability"], extremes["places"]
+        where = place(extremes["largest_at_lon"], extremes["largest_at_lat"])
+        ends = interval(self.columns["ci_low"][row], self.columns["ci_high"][row])
+        with_level = confidence(self.about["level"], ends)
+        yield f"Maximum P(failure) = {percent(largest)} at {where}   ({with_level})"
+        yield (
+            f"P exceeds 1 % at {extremes['places_above_1_percent']:,} of "
+            f"{count_of(places, 'block' if self.has_block_places else 'node')}"
+        )
+        if self.has_block_places:
+            p_any = self.about["probability_any"]
+            p_any = "" if p_any is None else f"; P(at least one failure) = {percent(p_any)}"
+            yield f"Expected failures {rounded(self.failures.expected)}{p_any}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the earthquake, the model and the file."""
+        event, magnitude = self.about["event"], self.about["magnitude"]
+        named = (event, None if magnitude is None else f"M {magnitude:g}", self.about["time"][:10])
+        yield TextLine("Event", ", ".join(filter(None, named)) or self.about["event_id"])
+        integrated = "integrated" if self.about["uncertainty_integrated"] else "not included"
+        yield TextLine(
+            "Model", f"{describe.model(self.about)}; uncertainty of the map's values {integrated}"
+        )
+        if self.file is not None:
+            yield TextLine("File", self.file)
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield every value if verbose."""
+        if verbose:
+            values = self.as_dict()
+            yield TextTable((), [(name, values[name]) for name in values if name != "warnings"])
 
 
 class MapKeywords(BlockKeywords[V], AnsweringFields, total=False):

@@ -74,6 +74,11 @@ def count_of(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
+def place(lon: float, lat: float) -> str:
+    """Return a place of a longitude and latitude [deg]: "37.180 N, 121.930 W"."""
+    return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
+
+
 def rounded(value: float) -> str:
     """Return a number with three digits and without an exponent where people write none."""
     if value != 0.0 and not 1e-4 <= abs(value) < 1e7:

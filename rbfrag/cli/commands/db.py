@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import (
     print_json,
     print_pairs,
@@ -20,6 +19,7 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 from rbfrag.errors import InputError
+from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:
     from rbfrag.db.merge.databases import MergeReport
@@ -72,10 +72,10 @@ def _print_info(content: DatabaseInfo, *, json: bool) -> None:
         return
     rows = content.rows
     print(
-        f"{several(rows.get('motion', 0), 'motion')} of "
-        f"{several(rows.get('earthquake', 0), 'earthquake')}, "
-        f"{several(rows.get('combination', 0), 'combination')} and "
-        f"{several(rows.get('fragility_model', 0), 'fitted model')}."
+        f"{count_of(rows.get('motion', 0), 'motion')} of "
+        f"{count_of(rows.get('earthquake', 0), 'earthquake')}, "
+        f"{count_of(rows.get('combination', 0), 'combination')} and "
+        f"{count_of(rows.get('fragility_model', 0), 'fitted model')}."
     )
     print()
     print_pairs(

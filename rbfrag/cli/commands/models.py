@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import print_json, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.stack import argument, command_group, stacked
+from rbfrag.results.numbers import count_of
 
 app = command_group(
     "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
@@ -42,7 +42,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
         return
     default = ", ".join(f"{each['name']} ({each['kind']})" for each in listed if each["is_default"])
     print(
-        f"{several(len(listed), 'fitted model')}; where none is named, the default of a kind goes "
+        f"{count_of(len(listed), 'fitted model')}; where none is named, the default of a kind goes "
         f"first: {default or 'none'}."
     )
     print()

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import ProgressBar, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, stored_row
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 from rbfrag.cli.sentences import motion_in_words
+from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
@@ -139,8 +139,8 @@ def list_motions(
     processed = sum(row.processing_applied is not None for row in rows)
     flagged = sum(bool(row.flags) for row in rows)
     print(
-        f"{several(len(rows), 'motion')} of "
-        f"{several(len({row.event_id for row in rows}), 'earthquake')}; {processed} processed "
+        f"{count_of(len(rows), 'motion')} of "
+        f"{count_of(len({row.event_id for row in rows}), 'earthquake')}; {processed} processed "
         f"here, {flagged} with a quality flag."
     )
     print()

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
-from rbfrag.cli.output import (
-    ProgressBar,
-    check_files,
-    print_json,
-    print_pairs,
-    print_sentences,
-    print_warnings,
-    write_table,
-)
+from rbfrag.cli.output import ProgressBar, check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.fragility import describe
 from rbfrag.results.diagnostic import as_documents
 
 EXAMPLE = (
@@ -29,11 +19,6 @@ EXAMPLE = (
 TABLES = (".csv", ".xlsx", ".parquet")
 RASTERS = (".tif", ".tiff")
 SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg", *RASTERS)
-
-SHORT = (
-    "event", "magnitude", "expected_failures", "probability_any", "places", "model", "file",
-)  # fmt: skip
-"""Values that are shown without --verbose."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,23 +91,15 @@ def shakemap(
             component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
             seed=drawing.seed, **answering, on_progress=bar.show,
         )  # fmt: skip
-    warnings = [*several.remarks, *answer.warnings]
-    about = {**answer.about, "warnings": warnings, "notes": as_documents(warnings)}
+    warnings = (*several.remarks, *answer.warnings)
+    answer = replace(answer, warnings=warnings, file=str(target))
+    about = {**answer.about, "warnings": [*warnings], "notes": as_documents(warnings)}
     _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.plot import shakemap as draw
 
         draw(answer, plot)
-    document = {**answer.as_dict(), "file": str(target), "warnings": warnings}
-    if printing.json:
-        print_json(document)
-        return
-    print_sentences(map_in_words(document, own="lon" in several.columns))
-    del document["warnings"]
-    named = {**document, "model": describe.model(document)}
-    short = rounded_values({name: named[name] for name in SHORT})
-    print_pairs(document if printing.verbose else short)
-    print_warnings(warnings)
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
 
 
 def _write(
