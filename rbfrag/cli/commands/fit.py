@@ -2,25 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import (
-    cell,
-    print_json,
-    print_pairs,
-    print_sentences,
-    print_table,
-    print_warnings,
-)
+from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.fragility import describe
-from rbfrag.results.numbers import rounded
-
-if TYPE_CHECKING:
-    from rbfrag.fragility.fit.report import FitReport
 
 EXAMPLE = "Example:  rbfrag fit --term pgv"
 
@@ -108,111 +94,4 @@ def fit(
         rotation_deg=rotation,
         replace=stored.replace,
     )
-    print_report(report, printing)
-
-
-def print_report(report: FitReport, printing: options.Printing) -> None:
-    """Print the report of a fitted model."""
-    if printing.json:
-        print_json(report.as_dict())
-        return
-    print_sentences(fit_in_words(report))
-    if printing.verbose:
-        _print_all(report)
-    else:
-        errors = {name: rounded(value) for name, value in report.standard_errors.items()}
-        rows = [
-            (name, rounded(value), errors.get(name)) for name, value in report.coefficients.items()
-        ]
-        print_table(("parameter", "value", "standard error"), rows)
-    print_warnings(report.warnings)
-
-
-def fit_in_words(report: FitReport) -> Iterator[str]:
-    """Yield what a model says, and how it does on earthquakes that it has not seen."""
-    default = f", the default of {report.kind}" if report.model.row.is_default else ""
-    yield (
-        f"Model {report.name} ({report.method} on {report.term}{default}) says the "
-        f"{report.model.meaning}."
-    )
-    if why := report.details.get("why_method"):
-        yield f"No method was named: {why}."
-    data = f"It is {describe.fitted_data(report.model.row.diagnostics)}"
-    score = report.scores.get("log_loss_held_out")
-    around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
-    if score is None:
-        yield f"{data}."
-        return
-    ends = f" ({rounded(around[0])} to {rounded(around[1])} by earthquakes)" if around else ""
-    real = report.scores.get("log_loss_held_out_kr05")
-    of_real = "" if real is None else f", {rounded(real)} of blocks of k_r >= 0.05"
-    yield (
-        f"{data}; on those left out its log loss is {rounded(score)}{ends}{of_real}, the less the "
-        "better."
-    )
-
-
-def _print_all(report: FitReport) -> None:
-    details: dict[str, Any] = dict(report.details)
-    kinds = details.get("standard_error_kinds") or {}
-    bootstrap = (details.get("bootstrap") or {}).get("standard_errors", {})
-    naive = details.get("naive_standard_errors") or {}
-    print_table(
-        ("parameter", "value", "standard error", "by bootstrap", "taken as independent"),
-        [
-            (name, value, report.standard_errors.get(name), bootstrap.get(name), naive.get(name))
-            for name, value in report.coefficients.items()
-        ],
-    )
-    for kind in dict.fromkeys(kinds.values()):
-        print(f"standard error: {kind}")
-    print()
-    counts: dict[str, object] = {
-        "combinations": details.get("n_total"),
-        "critical value found": report.n,
-        "below the search limit": report.n_censored,
-        "outside the model": details.get("n_outside_model"),
-        "earthquakes": report.events,
-    }
-    if details.get("rotation_deg") is not None:
-        counts["rotation that counts as failure [deg]"] = details["rotation_deg"]
-    if "n_outcomes" in details:
-        counts["outcomes fitted (toppled)"] = f"{details['n_outcomes']} ({details['n_toppled']})"
-        counts["outcomes certain by mechanics"] = details["n_bounded"]
-    if "sensitive_share" in details:
-        counts["sensitive outcomes, share"] = details["sensitive_share"]
-    print_pairs(counts)
-    law = details.get("power_law")
-    if law:
-        print_pairs({f"power law {name}": value for name, value in law.items()})
-    correlations = details.get("log_correlations") or {}
-    if correlations:
-        ranked = ", ".join(f"{name} {cell(value)}" for name, value in correlations.items())
-        print(f"correlation of ln y with ln x: {ranked}")
-    scatter = details.get("scatter_ln_y")
-    if scatter:
-        parts = ", ".join(
-            f"{name.replace('_', ' ')} {value:.3f}" for name, value in scatter.items()
-        )
-        print(f"scatter of ln y about the median: {parts}")
-    print_dependence(report.model.row.dependence)
-    intervals = details.get("score_intervals") or {}
-    print(f"scores, judged on {details.get('judged_on', 'critical values')}:")
-    for name, value in report.scores.items():
-        if not name.endswith(("_in_sample", "_held_out")):
-            continue  # another name of one that is printed
-        around = intervals.get(name)
-        ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
-        print(f"  {name}: {cell(value)}{ends}")
-
-
-def print_dependence(dependence: Mapping[str, Any] | None) -> None:
-    """Print what the blocks of one earthquake share."""
-    if dependence is None:
-        return
-    errors = dependence["errors"]
-    print_table(
-        ("shared by the blocks of one earthquake", "value", "standard error"),
-        [(name, dependence[name], error) for name, error in errors.items()],
-    )
-    print()
+    print_result(report, json=printing.json, verbose=printing.verbose, fields=())

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rbfrag.cli.output import print_json, print_table
+from rbfrag.cli.output import print_json, print_result, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.stack import argument, command_group, stacked
@@ -73,13 +73,13 @@ def show_model(
     if name is None:
         list_models(db, json=printing.json)
         return
-    from rbfrag.cli.commands.fit import print_report
     from rbfrag.fragility.fit.report import FitReport
     from rbfrag.fragility.lookup import stored_row
     from rbfrag.fragility.model import FragilityModel
 
     row = stored_row(name, db)
-    print_report(FitReport.from_model(FragilityModel.from_row(row)), printing)
+    report = FitReport.from_model(FragilityModel.from_row(row))
+    print_result(report, json=printing.json, verbose=printing.verbose, fields=())
 
 
 @app.command("default", epilog="Example:  rbfrag models default logistic-pgv")

@@ -1,27 +1,29 @@
-"""What a fit reports."""
+"""The report of a fitted model: parameters, scores on earthquakes held out, settings."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 
 from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility import describe
 from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_list import fitted_number
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 
 _FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
 
 
 @dataclass(frozen=True, repr=False)
-class FitReport(Tabular):
-    """A fitted model with all that is said about it.
+class FitReport(Result):
+    """A fitted model with its parameters, scores and settings.
 
     Args:
         name: unique name of the model.
@@ -35,7 +37,7 @@ class FitReport(Tabular):
         events: number of earthquakes.
         scores: how well the model predicts; ``held_out`` leaves whole earthquakes out, ``kr05``
             reads blocks of k_r >= 0.05 alone.
-        warnings: sentences for people.
+        warnings: warnings about the data and the fit.
         details: everything else: counts, M, the rank of the terms, settings.
         model: the model itself, ready to be stored or used.
     """
@@ -51,7 +53,7 @@ class FitReport(Tabular):
     events: int
     scores: Mapping[str, float]
     warnings: tuple[str, ...]
-    details: Mapping[str, object]
+    details: Mapping[str, Any]
     model: FragilityModel
 
     @classmethod
@@ -88,7 +90,91 @@ class FitReport(Tabular):
             "standard_error": np.array(errors, dtype=np.float64),
         }
 
-    def as_dict(self) -> dict[str, object]:
+    def sentences(self) -> Iterator[str]:
+        """Yield the log loss on earthquakes held out, with its interval."""
+        score = self.scores.get("log_loss_held_out")
+        if score is None:
+            yield f"Model {self.name}: no score on earthquakes held out"
+            return
+        ends = self._score_interval("log_loss_held_out")
+        around = "" if ends is None else f" ({rounded(ends[0])}–{rounded(ends[1])} by earthquakes)"
+        yield f"Log loss on earthquakes held out {rounded(score)}{around}; lower is better"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the model, why its method was chosen, and the data."""
+        default = f", default of {self.kind}" if self.model.row.is_default else ""
+        about = f"{self.method} on {self.term}{default}"
+        yield TextLine("Model", f"{self.name} ({about}): {self.model.meaning}")
+        if reason := self.details.get("why_method"):
+            yield TextLine("Method", reason)
+        if data := describe.fitted_data(self.model.row.diagnostics):
+            yield TextLine("Data", data)
+        strong = self.scores.get("log_loss_held_out_kr05")
+        if strong is not None:
+            yield TextLine("Score", f"log loss {rounded(strong)} for blocks with k_r ≥ 0.05")
+
+    def _score_interval(self, name: str) -> tuple[float, float] | None:
+        """Return the interval of a score, clustered by earthquake; None where it is unknown."""
+        ends: tuple[float, float] | None = (self.details.get("score_intervals") or {}).get(name)
+        return ends
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the parameters; if verbose also counts, what blocks share, and all scores."""
+        if not verbose:
+            errors = {name: rounded(value) for name, value in self.standard_errors.items()}
+            yield TextTable(
+                ("parameter", "value", "standard error"),
+                [(name, rounded(value), errors.get(name))
+                 for name, value in self.coefficients.items()],
+            )  # fmt: skip
+            return
+        bootstrap = (self.details.get("bootstrap") or {}).get("standard_errors", {})
+        independent = self.details.get("naive_standard_errors") or {}
+        yield TextTable(
+            ("parameter", "value", "standard error", "by bootstrap", "assumed independent"),
+            [(name, value, self.standard_errors.get(name), bootstrap.get(name),
+              independent.get(name)) for name, value in self.coefficients.items()],
+        )  # fmt: skip
+        yield TextTable((), [*self._counts()])
+        dependence: Mapping[str, Any] | None = self.model.row.dependence
+        if dependence is not None:
+            yield TextTable(
+                ("shared by the blocks of one earthquake", "value", "standard error"),
+                [(name, dependence[name], error) for name, error in dependence["errors"].items()],
+            )
+        yield TextTable(
+            ("score", "value", "low", "high"),
+            [(name, value, *(self._score_interval(name) or (None, None)))
+             for name, value in self.scores.items()
+             if name.endswith(("_in_sample", "_held_out"))],
+        )  # fmt: skip
+
+    def _counts(self) -> Iterator[tuple[str, object]]:
+        """Yield numbers of the data and of the fit with their names."""
+        details = self.details
+        for kind in dict.fromkeys((details.get("standard_error_kinds") or {}).values()):
+            yield "standard error", kind
+        yield "combinations", details.get("n_total")
+        yield "critical value found", self.n
+        yield "below the search limit", self.n_censored
+        yield "outside the model", details.get("n_outside_model")
+        yield "earthquakes", self.events
+        if details.get("rotation_deg") is not None:
+            yield "rotation that counts as failure [deg]", details["rotation_deg"]
+        if "n_outcomes" in details:
+            yield "outcomes fitted (toppled)", f"{details['n_outcomes']} ({details['n_toppled']})"
+            yield "outcomes certain by mechanics", details["n_bounded"]
+        if "sensitive_share" in details:
+            yield "fraction of sensitive outcomes", details["sensitive_share"]
+        for name, value in (details.get("power_law") or {}).items():
+            yield f"power law {name}", value
+        for name, value in (details.get("log_correlations") or {}).items():
+            yield f"correlation of ln y with ln {name}", value
+        for name, value in (details.get("scatter_ln_y") or {}).items():
+            yield f"dispersion of ln y, {name.replace('_', ' ')}", value
+        yield "scores computed from", details.get("judged_on", "critical values")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the JSON contract, and more."""
         row = self.model.row
         fields = {name: value for name, value in vars(self).items() if name != "model"}

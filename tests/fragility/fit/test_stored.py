@@ -66,7 +66,7 @@ def test_the_built_in_data_are_fitted_where_there_is_no_database(
     assert NOT_STORED not in stored.warnings
     (tmp_path / "built-in.db").write_bytes(before)
     said = shell("fit", "--term", "pgv", "--method", "wls")
-    assert said.stdout.startswith("Model wls-pgv ")
+    assert "Model     wls-pgv (" in said.stdout
     assert "the model is not stored" in said.stdout
     assert not Path("rbfrag.db").exists()
     assert (tmp_path / "built-in.db").read_bytes() == before
