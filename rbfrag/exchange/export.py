@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, NamedTuple, TypedDict, Unpack
@@ -25,7 +25,8 @@ from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import count_of, percent
+from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.kinds import KindFacts, facts_of
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
@@ -34,7 +35,7 @@ EACH_NEEDED = "an exposure model needs a function of each"
 
 
 @dataclass(frozen=True, repr=False)
-class ExportAnswer(Tabular):
+class ExportAnswer(Result):
     """Fragility functions that were written.
 
     Args:
@@ -61,6 +62,21 @@ class ExportAnswer(Tabular):
     term: str
     method: str
     warnings: tuple[str, ...]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of functions and their form."""
+        count = count_of(self.functions, "fragility function")
+        yield f"{count}, {self.lognormal:,} lognormal: {self.file}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the measure's component, the model, and the accuracy of the levels."""
+        if self.description is not None:
+            yield TextLine("Metadata", self.description)
+        yield TextLine("Shaking", f"component {self.component}")
+        yield TextLine("Model", describe.model(vars(self)))
+        if self.largest_relative_error > 0.0:
+            error = percent(self.largest_relative_error)
+            yield TextLine("Accuracy", f"linear interpolation between levels within {error} of P")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
@@ -96,10 +96,5 @@ def pelicun(
 
 
 def _print(answer: ExportAnswer, remarks: tuple[str, ...], *, json: bool) -> None:
-    document = answer.as_dict()
-    warnings = [*remarks, *document.pop("warnings")]
-    if json:
-        print_json({**document, "warnings": warnings})
-        return
-    print_pairs(document)
-    print_warnings(warnings)
+    answer = replace(answer, warnings=(*remarks, *answer.warnings))
+    print_result(answer, json=json, fields=())
