@@ -23,7 +23,7 @@ from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
 from rbfrag.question.shaking import doubts_about
-from rbfrag.results.diagnostic import codes_by_row
+from rbfrag.results.diagnostic import Diagnostic, codes_by_row
 from rbfrag.results.numbers import confidence, count_of, interval, percent, place, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model
@@ -210,16 +210,18 @@ def shakemap(
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     if chosen.form.advice:
-        warnings.append(chosen.form.advice)
+        warnings.append(Diagnostic(chosen.form.advice, "model_choice"))
     if "pgv_m_s" not in measures:
         names = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
-        warnings.append(f"the map has no PGV, which tells most: a model of {names} answers")
+        text = f"the map has no PGV, the best predictor: a model of {names} is used"
+        warnings.append(Diagnostic(text, "model_choice"))
     certain = [name for name in shaking.names if name not in shaking.integrated]
     if certain:
-        warnings.append(
-            f"the map's uncertainty of {' and '.join(certain)} is not given: its values "
-            "are taken as certain; uncertainty.xml has it"
+        text = (
+            f"the map's uncertainty of {' and '.join(certain)} is not given: its values are "
+            "assumed to be certain; uncertainty.xml has it"
         )
+        warnings.append(Diagnostic(text, "shaking_certain"))
     places = Places.of(lon, lat, table.get("site_id") if own else None)
     if count is not None and own:  # identical blocks of a row have azimuths of their own
         pairs = np.repeat(np.arange(answer.block.size), count[answer.block].astype(np.intp))
@@ -232,10 +234,11 @@ def shakemap(
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
     if outside:
-        warnings.append(
-            f"at {outside} places with P > {NOTABLE:g} shaking or block lie outside the ranges "
-            "that the model was fitted on (in_domain)"
+        text = (
+            f"at {outside} places with P > {NOTABLE:g} shaking or block lie outside the fitted "
+            "ranges (in_domain)"
         )
+        warnings.append(Diagnostic(text, "extrapolation"))
 
     columns: dict[str, NDArray[Any]] = {"block_id": table["block_id"]} if own else {}
     columns |= {

@@ -12,6 +12,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.xml_source import parse_xml
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import MEASURES
 
 FloatArray = NDArray[np.float64]
@@ -177,7 +178,7 @@ class GridReading:
             if not allow_partial:
                 text = f"{message}: with allow_partial it is read as it is"
                 raise InputError(text, fields=("allow_partial",))
-            warnings.append(f"{message}: read as it is")
+            warnings.append(Diagnostic(f"{message}: read as it is", "incomplete_map"))
         fields = {
             "lon": self._degrees(table, "LON", 180.0),
             "lat": self._degrees(table, "LAT", 90.0),
@@ -187,10 +188,11 @@ class GridReading:
                 fields[_FIELDS[title][0]] = self._field(table, title, warnings)
         unknown = int(np.isnan(np.sum([*fields.values()], axis=0)).sum())
         if unknown:
-            warnings.append(
+            text = (
                 f"{self.source}: {unknown:,} of {table.shape[0]:,} nodes of grid_data have no "
                 "number (NaN) in a field that is read: they are left out"
             )
+            warnings.append(Diagnostic(text, "incomplete_map"))
         return self._event(), fields, columns, rows, warnings
 
     def _count(self, name: str) -> int:
@@ -215,7 +217,8 @@ class GridReading:
         name, units = _FIELDS[title]
         if not unit:
             usual = next(iter(units))
-            warnings.append(f"{self.source}, line {line}: {title} has no unit: taken as {usual}")
+            text = f"{self.source}, line {line}: {title} has no unit: assumed to be {usual}"
+            warnings.append(Diagnostic(text, "unit_assumed"))
             unit = usual
         if unit not in units:
             raise InputError(
@@ -232,10 +235,8 @@ class GridReading:
             )
         largest = MEASURES[name].largest if name in MEASURES else None
         if (values > (largest or _MOST_STD)).any():
-            warnings.append(
-                f"{self.source}: {title} reaches {np.nanmax(table[:, place]):g} {unit}: is that "
-                "its unit?"
-            )
+            text = f"{self.source}: {title} reaches {np.nanmax(table[:, place]):g} {unit}"
+            warnings.append(Diagnostic(f"{text}: is that its unit?", "suspicious_value"))
         return values
 
     def _event(self) -> ShakeMapEvent:

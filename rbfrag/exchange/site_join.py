@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.maps.spatial_field import EARTH_RADIUS_KM, on_sphere
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 WITHIN_KM = 5.0
@@ -69,7 +70,8 @@ def join_sites(
     by_name = stated if all(names) else np.zeros(n, dtype=np.bool_)
     site, reasons, remarks = np.zeros(n, dtype=np.intp), {}, []
     if stated.any() and not all(names):
-        remarks.append(f"the {of}s do not name their sites: site_id of the blocks is not used")
+        text = f"the {of}s do not name their sites: site_id of the blocks is not used"
+        remarks.append(Diagnostic(text, "site_join"))
     if by_name.any():
         index = {name: i for i, name in enumerate(names)}
         site[by_name] = [index.get(str(one), -1) for one in ids[by_name].tolist()]
@@ -79,7 +81,8 @@ def join_sites(
                 f"the block stands at site {str(ids[i])!r}, of which there is no {of}; there are "
                 f"{shown} (names are texts: '0012' is not 12)"
             )
-        remarks.append(f"blocks stand at the sites of the {of}s by their site_id")
+        text = f"blocks stand at the sites of the {of}s by their site_id"
+        remarks.append(Diagnostic(text, "site_join"))
     rest = np.flatnonzero(~by_name)
     known = None if places is None else np.asarray(places, dtype=np.float64).reshape(count, 2)
     if not rest.size:
@@ -124,7 +127,7 @@ def _in_words(name: str, place: FloatArray) -> str:
     return f"{name!r} ({where})" if name else where
 
 
-def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) -> list[str]:
+def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) -> list[Diagnostic]:
     """Return how far blocks stand from their sites, and of which another is nearly as near."""
     if not used.size:
         return []
@@ -140,4 +143,4 @@ def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) 
             f"{doubtful.size:,} of {used.size:,} blocks are nearly as near (10 %) to a second "
             f"site, such as block {block_ids[used[i]]}: {first:.3g} and {second:.3g} km"
         )
-    return texts
+    return [Diagnostic(text, "site_join") for text in texts]

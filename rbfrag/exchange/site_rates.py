@@ -17,7 +17,7 @@ from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.question.blocks import numbers_in
-from rbfrag.results.diagnostic import codes_by_row
+from rbfrag.results.diagnostic import Diagnostic, codes_by_row
 from rbfrag.solver.kinds import KINDS
 from rbfrag.vocabulary.quantities import column_of
 
@@ -105,7 +105,8 @@ def blocks_at_sites(
         raise InputError(f"no block can be used: {next(iter(missing.values()))}")
     remarks = [*join.remarks]
     if missing and site_chosen:
-        remarks.append(f"{len(missing)} blocks of other sites are left out")
+        text = f"{len(missing)} blocks of other sites are left out"
+        remarks.append(Diagnostic(text, "site_join"))
     used, site = np.unique(join.site[own], return_inverse=True)
     here = {name: np.asarray(values)[own] for name, values in columns.items()}
     return SitedBlocks(

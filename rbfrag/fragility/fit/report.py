@@ -15,6 +15,7 @@ from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_list import fitted_number
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 
@@ -72,7 +73,7 @@ class FitReport(Result):
             n_censored=int(diagnostics.get("n_censored", 0)),
             events=int(diagnostics.get("events", 0)),
             scores=dict(diagnostics.get("scores", {})),
-            warnings=tuple(diagnostics.get("warnings", ())),
+            warnings=tuple(Diagnostic(text, "fit") for text in diagnostics.get("warnings", ())),
             details={key: value for key, value in diagnostics.items() if key not in _FIELDS},
             model=model,
         )

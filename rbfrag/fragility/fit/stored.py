@@ -15,10 +15,12 @@ from rbfrag.fragility.fit.fitting import fit as fit_model
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.results.diagnostic import Diagnostic
 
-NOT_STORED = (
+NOT_STORED = Diagnostic(
     "the fit is of the built-in data set, which is read only: the model is not stored; name a "
-    "database of your own (db) to store one"
+    "database of your own (db) to store one",
+    "model_not_stored",
 )
 
 
