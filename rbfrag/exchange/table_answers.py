@@ -30,8 +30,8 @@ from rbfrag.question.keywords import LEVEL
 from rbfrag.question.question import OF_BOUND, ask, with_drained_bound
 from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, codes_by_row, diagnostics
-from rbfrag.results.numbers import interval, percent
-from rbfrag.results.result import Result, TextTable
+from rbfrag.results.numbers import count_of, interval, percent, rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import BLOCK, BY_ROW, ROW, SCATTER, SHAKING, column_of
 
@@ -108,15 +108,28 @@ class TableAnswer(Result):
                 else (f"All {self.rows:,} blocks are answered.")
             )
 
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the number of failures, and the models with the rows in their fitted ranges."""
+        failures = f"expected {rounded(self.expected_failures)}"
+        if self.failures_low is not None and self.failures_high is not None:
+            ends = "–".join(
+                dict.fromkeys(f"{n:,g}" for n in (self.failures_low, self.failures_high))
+            )
+            failures += f"; {ends} if one earthquake shakes all blocks (prediction interval)"
+        yield TextLine("Failures", failures)
+        inside = f"{self.in_domain:,} of {count_of(self.rows, 'row')} within the fitted range"
+        yield TextLine("Model", f"{self.model}; {inside}")
+
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield the answers of the first rows, all that are listed if verbose, and the totals."""
+        """Yield the answers of the first rows; if verbose all that are listed, and the totals."""
         if self.blocks is not None:
             shown = self.blocks if verbose else self.blocks[:SHOWN]
             yield TextTable.of_rows([_row_in_short(answer) for answer in shown])
-        totals = self.as_dict()
-        yield TextTable(
-            (), [(name, totals[name]) for name in totals if name not in ("blocks", "warnings")]
-        )
+        if verbose:
+            totals = self.as_dict()
+            yield TextTable(
+                (), [(name, totals[name]) for name in totals if name not in ("blocks", "warnings")]
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

@@ -93,7 +93,7 @@ def predict(
             sheet=table.sheet, ignore_columns=options.column_names(table.ignore_columns),
             excel_text=table.excel_text, remarks=(*given.notes, *measures.notes), **request,
         )  # fmt: skip
-        print_result(answer, json=printing.json, verbose=printing.verbose)
+        print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
         if answer.blocks is not None and answer.rows > SHOWN and not printing.json:
             print(f"... {SHOWN} of {answer.rows:,} rows: --out FILE writes them all")
         return
