@@ -17,33 +17,26 @@ from rbfrag.db import schema
 from rbfrag.db.insert import delete_rows, insert_if_new, storable, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
-from rbfrag.db.schema import earthquake, suite, suite_motion
+from rbfrag.db.schema import MEASURES, earthquake, suite, suite_motion
 from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.response_spectrum import PERIODS_S
 
-LATER_MEASURES = (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")
-"""Measures of the tables since schema 0005; missing where it found no samples."""
-
-MEASURES = (
-    "pga_g", "pgv_m_s", "pgd_m", "tm_s", "final_velocity_m_s", "final_displacement_m",
-    *LATER_MEASURES,
-)  # fmt: skip
+COMPUTED = (*MEASURES, "final_velocity_m_s", "final_displacement_m")
 """Columns of a motion that are calculated from its samples."""
 
 UNKNOWN_EVENT = "unknown event of "
 """How the id of an event begins of which nothing at all is known."""
 
 _OF_ROWS = (
-    "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *MEASURES, "source_file",
+    "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *COMPUTED, "source_file",
     "trace_index", "file_format", "processing", "source_sha256", "start_time",
 )  # fmt: skip
 _LABELS = (
     "station", "component", "orientation_deg", "is_vertical", "recording", "source_file",
     "trace_index", "file_format",
 )  # fmt: skip
-_NUMBERS = ("orientation_deg", "dt_s", "npts", *MEASURES, "trace_index")
+_NUMBERS = ("orientation_deg", "dt_s", "npts", *COMPUTED, "trace_index")
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
 _ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
@@ -219,9 +212,9 @@ def same_source(connection: Connection, motion_id: int) -> list[int]:
 
 
 def measures_of(motion: GroundMotion) -> dict[str, float | None]:
-    """Return the :data:`MEASURES` of a motion, by column."""
+    """Return the :data:`COMPUTED` of a motion, by column."""
     values = {**asdict(motion.measures), **motion.spectral_accelerations}
-    return {name: values[name] for name in MEASURES}
+    return {name: values[name] for name in COMPUTED}
 
 
 def same_measure(
@@ -230,7 +223,7 @@ def same_measure(
     """Return whether a measure is the same but for sums in another order on another processor.
 
     Args:
-        name: one of :data:`MEASURES`.
+        name: one of :data:`COMPUTED`.
         pgv_m_s: PGV of the motion [m/s], which a final velocity is what is left of.
         pgd_m: PGD of the motion [m].
     """

@@ -42,6 +42,12 @@ metadata = MetaData(
     }
 )
 
+LATER_MEASURES = (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")
+"""Intensity measures since schema 0005; missing where a database was upgraded without samples."""
+
+MEASURES = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *LATER_MEASURES)
+"""Intensity measures of a motion, in the order of their columns."""
+
 POLARITY = "polarity IN ('forward', 'reverse')"
 KIND = "kind <> ''"
 FOUND_HAS_VALUE = (
@@ -57,7 +63,6 @@ _POLARITY = "forward: positive samples drive toppling out of the slope; reverse:
 _KIND = "response kind: the model that answers, such as toppling or sliding"
 _LINEAR = "true for the linear verification model, in which k_r is the critical angle in rad"
 _NUMERICS = "version of the solver, or imported out of a table; different ones are never mixed"
-_P2 = "frequency parameter p² of the block, m g r3 over the inertia about the toe"
 _KEY = (
     "SHA-256 over everything that decides the row: motions, polarity, kind, block, settings, "
     "numerics; the same in every database"
@@ -83,10 +88,11 @@ def _optional(name: str, type_: Any, meaning: str, unit: str = "") -> Column[Any
     return _column(name, type_, meaning, unit, nullable=True)
 
 
-def _measure(name: str) -> Column[Any]:
-    """Return the column of an intensity measure, as the vocabulary declares it."""
+def _quantity(name: str, *, nullable: bool | None = None) -> Column[Any]:
+    """Return the column of a quantity, as the vocabulary declares it."""
     about = QUANTITIES[name]
-    return _column(name, Double, about.stored, about.unit, nullable="missing" in about.stored)
+    missing = "missing" in about.stored if nullable is None else nullable
+    return _column(name, Double, about.stored, about.unit, nullable=missing)
 
 
 def _reference(
@@ -125,7 +131,7 @@ earthquake = _table(
     _column("event_id", Text, "the id that earthquakes are told apart by"),
     _column("guessed", Boolean, "true: read off a file header; false: stated by metadata"),
     _column("name", Text, "name for people; may be empty"),
-    _optional("magnitude", Double, QUANTITIES["magnitude"].stored),
+    _quantity("magnitude", nullable=True),
     _optional("time", Text, "origin time, or the year, as text"),
     UniqueConstraint("event_id", "guessed"),
     CheckConstraint("event_id <> ''", name="event_id"),
@@ -156,8 +162,7 @@ motion = _table(
     _column("is_vertical", Boolean, "true for a vertical component, upward positive"),
     _column("dt_s", Double, "sampling interval", "s"),
     _column("npts", Integer, "number of samples"),
-    *map(_measure, ("pga_g", "pgv_m_s", "pgd_m", "tm_s")),
-    *map(_measure, (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")),
+    *map(_quantity, MEASURES),
     _column("final_velocity_m_s", Double, "velocity at the last sample; a sign of quality", "m/s"),
     _column(
         "final_displacement_m", Double, "displacement at the last sample; a sign of quality", "m"
@@ -224,7 +229,7 @@ toppling_spectrum = _table(
     "The toppling spectrum X(p) of motions.",
     _reference("motion_id", "motion.id", "CASCADE", "the motion"),
     _column("polarity", Text, _POLARITY),
-    _column("p2", Double, _P2, "1/s²"),
+    _quantity("p2"),
     _column("numerics_version", Text, _NUMERICS),
     _column(
         "x_m_s",
@@ -258,7 +263,12 @@ combination = _table(
     _column("natural_key", Text, _KEY),
     _reference("campaign_id", "campaign.id", "RESTRICT", "the campaign that made it"),
     *_shaken(),
-    _optional("p2", Double, f"{_P2}; p_s² at rest of other kinds; missing for sliding", "1/s²"),
+    _optional(
+        "p2",
+        Double,
+        f"{QUANTITIES['p2'].stored}; p_s² at rest of other kinds; missing for sliding",
+        QUANTITIES["p2"].unit,
+    ),
     _optional(
         "block",
         Text,
@@ -293,7 +303,7 @@ combination = _table(
     _optional(
         "kr", Double, "the critical k_r itself, kr_over_pga times PGA in g; missing unless found"
     ),
-    _optional("y_m_s", Double, "critical toppling velocity k_r g/p; missing unless found", "m/s"),
+    _quantity("y_m_s"),
     _column("certified", Boolean, "true: everything above the bracket is proven safe"),
     _optional(
         "k_up_over_pga",
@@ -394,8 +404,8 @@ response = _table(
     _row_number(),
     _column("natural_key", Text, _KEY),
     *_shaken(),
-    _column("p2", Double, _P2, "1/s²"),
-    _column("kr", Double, "rocking acceleration coefficient k_r = tan(critical angle)"),
+    _quantity("p2"),
+    _quantity("kr"),
     _column("numerics_version", Text, _NUMERICS),
     _column("outcome", Text, _OUTCOME),
     _optional(

@@ -250,14 +250,16 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "numbers": (
         Quantity("p2", "Frequency parameter p² of the block", "1/s²", "p²", POSITIVE,
             Input(aliases=("p²", "p^2"), column="p2_1_s2"),
-            prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"),
+            prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m",
+            stored="frequency parameter p² of the block, m g r3 over the inertia about the toe"),
         Quantity("kr", "Rocking acceleration coefficient k_r = tan(critical angle)", "", "k_r",
             input=Input("with {p2}", ("k_r",)),
             credible=(
                 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees",
             ),
             prompt="the block's yield acceleration coefficient at rest, tan(critical angle) (a "
-            "block with k_r <= 0 falls without an earthquake)"),
+            "block with k_r <= 0 falls without an earthquake)",
+            stored="rocking acceleration coefficient k_r = tan(critical angle)"),
         Quantity("ky", "Sliding: yield acceleration coefficient tan(phi - beta)", "", "k_y",
             input=Input("with {beta_deg}", ("k_y",)), credible=(0.0, 5.0, _STEEP),
             prompt="the block's yield acceleration coefficient of sliding, tan(phi - beta) (a "
@@ -524,7 +526,8 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             prompt="the toppling spectrum X(p) in m/s, 0 or more",
             measure=Measure("toppling spectrum", "toppling spectrum at the block's size, $X(p)$")),
         Quantity("intensity_m_s", "Intensity of the shaking", "m/s"),
-        Quantity("y_m_s", "Toppling velocity k_r g/p", "m/s", "y"),
+        Quantity("y_m_s", "Toppling velocity k_r g/p", "m/s", "y",
+            stored="critical toppling velocity k_r g/p; missing unless found"),
         Quantity("k_over_pga", "Strength over peak ground acceleration"),
         Quantity("pgv_over_pga_s", "Peak ground velocity over peak ground acceleration", "s",
             credible=(

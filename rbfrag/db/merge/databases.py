@@ -21,13 +21,13 @@ from rbfrag.db.merge.rows import Merge, Row, Rule, stored_rows
 from rbfrag.db.model_file import ModelRow, encode_model
 from rbfrag.db.models import model_rows
 from rbfrag.db.motions import (
-    LATER_MEASURES,
-    MEASURES,
+    COMPUTED,
     UNKNOWN_EVENT,
     delete_orphans,
     same_measure,
 )
 from rbfrag.db.schema import (
+    LATER_MEASURES,
     campaign,
     earthquake,
     fragility_model,
@@ -46,7 +46,7 @@ _CONFLICTS_SHOWN = 5
 
 # What is said of a motion, besides its samples and what follows from them.
 _OWN = (*NOT_DIGESTED, "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added")
-_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *MEASURES))
+_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *COMPUTED))
 
 _EARTHQUAKE = Rule(
     earthquake,
@@ -198,7 +198,7 @@ def _merge_motions(merge: Merge) -> None:
             theirs["samples"] = None
         merge.bring(_MOTION, theirs)
         peaks = ours["pgv_m_s"], ours["pgd_m"]
-        for column in MEASURES:
+        for column in COMPUTED:
             here, there = ours[column], row[column]
             unknown = column in LATER_MEASURES and None in (here, there)
             if not (unknown or same_measure(column, here, there, *peaks)):

@@ -22,27 +22,26 @@ from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.merge.databases import MergeReport, merge_databases
 from rbfrag.db.motions import recording_id_for
 from rbfrag.db.rows import IMPORTED, EarthquakeInfo
-from rbfrag.db.schema import campaign, motion
+from rbfrag.db.schema import MEASURES, campaign, motion
 from rbfrag.errors import LONGEST_NAME, InputError
 from rbfrag.files import is_number, source_text, toml_document
 from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.motions.quality import LARGEST_PGA_G
-from rbfrag.motions.response_spectrum import PERIODS_S
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.table import FACTORS, unit_factor
 from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, SearchPoints
 from rbfrag.version import __version__
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import pandas as pd
 
 NEEDED = ("motion", "event", "p2", "pga_g", "pgv_m_s", "pgd_m")
 CRITICAL = ("kr", "kr_over_pga")
-MEASURES = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")
 WORDS = {"status": ("found", "below_limit", "no_motion"), "polarity": ("forward", "reverse")}
 """What a column's words may mean; where the table has no such column, all rows are the first."""
 
-UNITS = {"p2": "1/s²", **{name: motion.c[name].info["unit"] for name in MEASURES}}
+UNITS = {name: QUANTITIES[name].unit for name in ("p2", *MEASURES)}
 FIELDS = tuple(dict.fromkeys((*NEEDED, *CRITICAL, *MEASURES, "magnitude", *WORDS)))
 KEY = ("event", "motion", "polarity", "p2")
 ABOVE_ZERO = ("p2", "pga_g", "pgv_m_s", "tm_s")
