@@ -61,9 +61,7 @@ def fields() -> str:
         if name not in ROW or name == "kind":
             doors = [f"`{option_of(name)}`", f"`{parameter_of(name)}`"]
         cells = [f"`{name}`", *doors, ", ".join(others), about.unit, about.range.words]
-        rows.append(
-            f"| {' | '.join(cells)} | {about.help('`{}`'.format).split(' [')[0].rstrip('.')} |"
-        )
+        rows.append(f"| {' | '.join(cells)} | {about.description('`{}`'.format)} |")
     return FIELDS + "\n".join(rows) + "\n\n"
 
 

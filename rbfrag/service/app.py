@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 from rbfrag.errors import RbfragError
 from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.model_list import model_list
-from rbfrag.service import block, predict, uploads, work
+from rbfrag.service import block, predict, uploads, vocabulary, work
 from rbfrag.service.documents import Health, ModelListed
 from rbfrag.service.guard import Guard
 from rbfrag.service.problem import answer_error, documented
@@ -103,6 +103,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
     predict.add_routes(app.router, settings, pool)
     block.add_routes(app.router)
     uploads.add_routes(app.router, settings, pool)
+    vocabulary.add_routes(app.router)
 
     @app.get(
         "/v1/models",

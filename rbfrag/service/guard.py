@@ -17,7 +17,8 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
-OPEN_TO_ALL = "/v1/healthz"
+OPEN_TO_ALL = ("/v1/healthz", "/v1/vocabulary")
+"""Operations without a token; the page, which is open to all, needs the names of its fields."""
 
 _HEADERS = [
     (b"cache-control", b"no-store"),
@@ -94,7 +95,7 @@ class Guard:
             )
         if self._token is None or not scope["path"].startswith("/v1/"):
             return None
-        if scope["path"] == OPEN_TO_ALL:
+        if scope["path"] in OPEN_TO_ALL:
             return None
         scheme, _, token = given.get(b"authorization", b"").partition(b" ")
         if hmac.compare_digest(token.strip(), self._token) and scheme.lower() == b"bearer":

@@ -185,11 +185,15 @@ class Quantity:
         limit = "0 or more" if self.range.above is None else f"above {self.range.above:g}"
         return self._prompt or f"the {self.noun} in {self.unit}, {limit}"
 
-    def help(self, spell: Callable[[str], str]) -> str:
-        """Return what it is, with its unit and the names of others as an interface spells them."""
+    def description(self, spell: Callable[[str], str]) -> str:
+        """Return label and details, with the names of inputs as an interface spells them."""
         detail = "" if self.input is None else self.input.detail
-        text = f"{self.label}{', ' if detail and detail[0] not in ';( ' else ''}{detail}"
-        text = text.format_map(_Spelling(spell))
+        text = f"{self.label}{', ' if detail and detail[0] not in ';:( ' else ''}{detail}"
+        return text.format_map(_Spelling(spell))
+
+    def help(self, spell: Callable[[str], str]) -> str:
+        """Return the description with the unit: a sentence."""
+        text = self.description(spell)
         return f"{text} [{self.unit}]." if self.unit else f"{text}."
 
 
@@ -248,12 +252,12 @@ def _spectral(name: str, period_s: float, credible: float, rank: int = 0) -> Qua
 # fmt: off
 GROUPS: dict[str, tuple[Quantity, ...]] = {
     "numbers": (
-        Quantity("p2", "Frequency parameter p² of the block", "1/s²", "p²", POSITIVE,
-            Input(aliases=("p²", "p^2"), column="p2_1_s2"),
+        Quantity("p2", "Frequency parameter p²", "1/s²", "p²", POSITIVE,
+            Input(" of the block", ("p²", "p^2"), column="p2_1_s2"),
             prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m",
             stored="frequency parameter p² of the block, m g r3 over the inertia about the toe"),
-        Quantity("kr", "Rocking acceleration coefficient k_r = tan(critical angle)", "", "k_r",
-            input=Input("with {p2}", ("k_r",)),
+        Quantity("kr", "Rocking acceleration coefficient k_r", "", "k_r",
+            input=Input(" = tan(critical angle), with {p2}", ("k_r",)),
             credible=(
                 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees",
             ),
@@ -280,46 +284,51 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             "of confined toppling at rest"),
     ),
     "failure": (
-        Quantity("displacement_m", "Sliding: the displacement that is too far", "m", range=POSITIVE,
-            input=Input(aliases=("displacement",)),
-            prompt="the displacement that is too far in m, above 0"),
-        Quantity("restitution", "Rocking: speed after an impact over that before it",
-            range=Limits(above=0.0, most=1.0),
-            input=Input("above 0 and up to 1; default: what angular momentum leaves"),
-            prompt="the speed after an impact over that before it, above 0 and up to 1"),
+        Quantity("displacement_m", "Displacement limit", "m", range=POSITIVE,
+            input=Input(" of a sliding block", ("displacement",)),
+            prompt="the displacement limit in m, above 0"),
+        Quantity("restitution", "Coefficient of restitution", "", "e",
+            Limits(above=0.0, most=1.0),
+            Input(" of a rocking block, above 0 and up to 1; default: from conservation of "
+            "angular momentum"),
+            prompt="the coefficient of restitution, above 0 and up to 1"),
     ),
     "shape": (
-        Quantity("height_m", "Height of a rectangle", "m", range=POSITIVE,
-            input=Input("perpendicular to its base, with {width_m}", ("height", "h"))),
-        Quantity("width_m", "Width of a rectangle along its base", "m", range=POSITIVE,
-            input=Input("with {height_m}", ("width", "w", "b"))),
-        Quantity("alpha1_deg", "Angle from the normal of the base to the line centroid-heel", "deg",
-            range=_SLOPE, input=Input("with {alpha3_deg} and {r3_m}", ("alpha1", "α1"))),
-        Quantity("alpha3_deg", "The same angle of the toe", "deg", range=_SLOPE,
-            input=Input(aliases=("alpha3", "α3"))),
-        Quantity("r3_m", "Distance from centroid to toe", "m", range=POSITIVE,
-            input=Input(aliases=("r3",))),
-        Quantity("s1_m", "Spacing of the base fractures", "m", range=POSITIVE,
-            input=Input("with {s2_m} and {gamma_deg}", ("s1",))),
-        Quantity("s2_m", "Spacing of the back fractures", "m", range=POSITIVE,
-            input=Input(aliases=("s2",))),
-        Quantity("gamma_deg", "Dip of the back plane less dip of the base", "deg",
-            range=Limits(above=0.0, below=180.0), input=Input(aliases=("gamma",))),
+        Quantity("height_m", "Height", "m", range=POSITIVE,
+            input=Input(" of a rectangle, perpendicular to its base, with {width_m}",
+            ("height", "h"))),
+        Quantity("width_m", "Width", "m", range=POSITIVE,
+            input=Input(" of a rectangle along its base, with {height_m}", ("width", "w", "b"))),
+        Quantity("alpha1_deg", "Angle of the heel", "deg", "α₁", _SLOPE,
+            Input("from the normal of the base to the line centroid-heel, with {alpha3_deg} and "
+            "{r3_m}", ("alpha1", "α1"))),
+        Quantity("alpha3_deg", "Angle of the toe", "deg", "α₃", _SLOPE,
+            Input("from the normal of the base to the line centroid-toe", ("alpha3", "α3"))),
+        Quantity("r3_m", "Distance from centroid to toe", "m", "r₃", POSITIVE,
+            Input(aliases=("r3",))),
+        Quantity("s1_m", "Spacing of the base fractures", "m", "S₁", POSITIVE,
+            Input("with {s2_m} and {gamma_deg}", ("s1",))),
+        Quantity("s2_m", "Spacing of the back fractures", "m", "S₂", POSITIVE,
+            Input(aliases=("s2",))),
+        Quantity("gamma_deg", "Angle between base and back plane", "deg", "γ",
+            Limits(above=0.0, below=180.0),
+            Input(": dip of the back plane less dip of the base", ("gamma",))),
     ),
     "planes": (
-        Quantity("beta_deg", "Dip of the base", "deg", range=_SLOPE,
-            input=Input("out of the slope positive; a rectangle's is 0 if not given",
+        Quantity("beta_deg", "Dip of the base", "deg", "β", _SLOPE,
+            Input("out of the slope positive; a rectangle's is 0 if not given",
             ("beta", "dip", "dip_deg", "dip_angle", "β", "base_dip"), column="dip_deg"),
             prompt="the dip of the base in degrees, out of the slope positive"),
-        Quantity("phi_deg", "Friction angle of the base", "deg", range=_FRICTION,
-            input=Input("; only a rectangle is assumed to topple without",
+        Quantity("phi_deg", "Friction angle of the base", "deg", "φ", _FRICTION,
+            Input("; only a rectangle is assumed to topple without",
             ("phi", "φ", "friction", "friction_angle"))),
         Quantity("phi_back_deg", "Friction angle of the back plane", "deg", range=_FRICTION,
             input=Input("; default: that of the base", ("phi_back",))),
     ),
     "joint": (
-        Quantity("water_m", "Height of the water in the back fracture above the heel", "m",
-            range=NOT_NEGATIVE, input=Input("with {density_kg_m3}", ("water", "water_level"))),
+        Quantity("water_m", "Height of the water", "m", range=NOT_NEGATIVE,
+            input=Input(" in the back fracture above the heel, with {density_kg_m3}",
+            ("water", "water_level"))),
         Quantity(
             "jrc", "Joint roughness coefficient of the base", range=Limits(least=0.0, most=20.0),
             input=Input("of samples of 10 cm, with {jcs_mpa} and {density_kg_m3}; {phi_deg} is "
@@ -450,19 +459,18 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     ),
     "answering": (
         Quantity(
-            "model", "Name of a stored model", input=Input("; default: the database's default if "
+            "model", "Fitted model", input=Input("by its name; default: the database's default if "
             "the given measures suffice for it, else the best that they suffice for", type=str)),
-        Quantity("level", "Level of the interval of P", range=Limits(above=0.0, below=1.0),
-            input=Input("and of the range of one earthquake; default: 0.95")),
+        Quantity("level", "Confidence level", range=Limits(above=0.0, below=1.0),
+            input=Input("and level of the prediction interval of one earthquake; default: 0.95")),
         Quantity("db", "Database: a path or an SQLAlchemy URL",
             input=Input("; default: RBFRAG_DB, else rbfrag.db in the current folder, else the "
             "built-in data set", type=str)),
     ),
     "sites": (
-        Quantity("sites", "Number of sites shaken so in one earthquake: adds what share of such "
-            "blocks", range=Limits(least=1.0, most=10_000.0),
-            input=Input("facing all sides, fails there; default: one block, which falls or "
-            "stands")),
+        Quantity("sites", "Number of sites", range=Limits(least=1.0, most=10_000.0),
+            input=Input(" with such shaking in one earthquake: adds the prediction interval of "
+            "the fraction of blocks that fail, facing all sides; default: one block")),
     ),
     "source": (
         Quantity(

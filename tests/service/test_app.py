@@ -4,7 +4,9 @@ import json
 
 import pytest
 
+from rbfrag.fragility.measures import TERMS
 from rbfrag.version import __version__
+from rbfrag.vocabulary.quantities import QUANTITIES
 from tests.cli.conftest import Shell
 
 
@@ -32,6 +34,23 @@ def test_models_are_listed_as_by_the_command_line(client, database, shell: Shell
 
 def test_health(client):
     assert client.get("/v1/healthz").json() == {"status": "ok", "version": __version__}
+
+
+def test_the_vocabulary_is_served(client):
+    document = client.get("/v1/vocabulary").json()
+    quantities = {each["name"]: each for each in document["quantities"]}
+    assert {*quantities} == {*QUANTITIES}
+    pgv = quantities["pgv_m_s"]
+    about = QUANTITIES["pgv_m_s"]
+    for key in ("label", "unit", "symbol"):
+        assert pgv[key] == getattr(about, key)
+    assert (pgv["parameters"], pgv["imt"], pgv["group"]) == (["pgv"], "PGV", "measures")
+    assert pgv["range"] == {"above": None, "least": 0.0, "below": None, "most": None}
+    assert quantities["beta_deg"]["parameters"] == ["beta", "dip"]
+    assert quantities["intensity_m_s"]["parameters"] == []
+    labels = {term["name"]: term["label"] for term in document["terms"]}
+    assert {*labels} == {*TERMS}
+    assert labels["pgv_pga_tm"] == "PGV, PGA and Tm"
 
 
 def test_the_page_is_there(client):

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 import pytest
 
 from rbfrag.service.app import FOLDER
+from rbfrag.vocabulary.quantities import INPUTS, OTHER_WORDS, parameter_of
 
 SOURCES = sorted(
     path for path in FOLDER.rglob("*.*") if path.suffix in (".html", ".js", ".css", ".svg")
@@ -48,6 +49,17 @@ class Document(HTMLParser):
 
 
 PAGE = Document((FOLDER / "index.html").read_text(encoding="utf-8"))
+
+
+def test_labels_units_and_hints_of_inputs_come_from_the_vocabulary():
+    text = (FOLDER / "index.html").read_text(encoding="utf-8")
+    labels = dict(re.findall(r'<label for="(\w+)">(.*?)</label>', text))
+    words = {*map(parameter_of, INPUTS), *OTHER_WORDS} & {*labels}
+    assert len(words) > 25
+    for word in words:
+        assert labels[word] == ""
+        assert f'id="{word}-help"></p>' in text
+        assert f'id="{word}-unit">' not in text or f'id="{word}-unit"></span>' in text
 
 
 def test_what_the_document_loads_is_served_with_its_type(client):

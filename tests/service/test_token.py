@@ -49,6 +49,7 @@ def test_with_the_token_everything_is(guarded):
 def test_the_page_and_the_health_check_need_none(guarded):
     assert guarded.get("/").status_code == 200
     assert guarded.get("/v1/healthz").status_code == 200
+    assert guarded.get("/v1/vocabulary").status_code == 200
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "example.org"])

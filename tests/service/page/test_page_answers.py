@@ -69,11 +69,11 @@ def test_an_extrapolation_is_said_and_its_reasons_are_the_services(open_page, as
 @pytest.mark.parametrize(
     ("field", "text", "words"),
     [
-        ("pgv", "abc", "Peak velocity PGV = 'abc' is not a number"),
-        ("kr", "-0.1", "Strength kr = -0.1 is not above zero"),
-        ("p2", "", "Frequency p² is missing"),
+        ("pgv", "abc", "Peak ground velocity PGV = 'abc' is not a number"),
+        ("kr", "-0.1", "Rocking acceleration coefficient kr = -0.1 is not above zero"),
+        ("p2", "", "Frequency parameter p² is missing"),
         ("level", "2", "level"),
-        ("pgv", "-1", "Peak velocity PGV = -1 m/s is negative"),
+        ("pgv", "-1", "Peak ground velocity PGV = -1 m/s is negative"),
     ],
 )
 def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
@@ -398,7 +398,9 @@ def test_a_free_standing_block_is_answered_by_its_own_models(open_page, ask):
 def test_a_wrong_restitution_is_said_beside_its_field(open_page):
     opened = open_page("?p2=3&kr=0.2&pgv=0.6&kind=rocking")
     opened.page.fill("#restitution", "1.5")
-    expect(opened.page.locator("#restitution-error")).to_contain_text("Restitution e = 1.5")
+    expect(opened.page.locator("#restitution-error")).to_contain_text(
+        "Coefficient of restitution e = 1.5"
+    )
     forgive(opened, REFUSED)
 
 

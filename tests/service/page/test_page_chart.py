@@ -154,7 +154,7 @@ def test_another_measure_runs_across_where_pgv_is_not_known(open_page, ask):
     opened = open_page("?p2=3&kr=0.05&pga=0.4&tm=0.5")
     page = opened.page
     expect(page.locator("#chart .axis .title").first).to_have_text(
-        "peak ground acceleration PGA [g]"
+        "peak ground acceleration, PGA [g]"
     )
     page.focus(".point")
     page.keyboard.press("Shift+ArrowRight")

@@ -6,27 +6,9 @@ import { readable } from "./numbers.js";
 import { byId } from "./page.js";
 import { interval, percent } from "./percent.js";
 import { writeText } from "./subscripts.js";
+import { labelOfTerm } from "./vocabulary.js";
 
 const SPOKEN_AFTER_MS = 700;
-
-/** What is known of the motion, by the term of a model. */
-const KNOWS = {
-  pgv: "PGV",
-  pga_tm: "PGA, T_m",
-  pgd_tm: "PGD, T_m",
-  pgv_pga: "PGV, PGA",
-  pgv_pga_tm: "PGV, PGA, T_m",
-  pgv_kr: "PGV",
-  pga: "PGA",
-  pgv_pga_sa10_sa30: "PGV, PGA, SA(1, 3 s)",
-  sa10: "SA(1 s)",
-  pga_sa10: "PGA, SA(1 s)",
-  pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
-  pga_sa10_sa30: "PGA, SA(1, 3 s)",
-  pga_m: "PGA, M",
-  pgv_pga_m: "PGV, PGA, M",
-  pgv_pga_ia: "PGV, PGA, Arias intensity",
-};
 
 const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
   byId("live").textContent = text;
@@ -186,7 +168,7 @@ function showOthers(answers) {
     .selectAll("td")
     .data((/** @type {any} */ each) => [
       each.recommended ? `${each.model} (shown)` : each.model,
-      KNOWS[/** @type {keyof typeof KNOWS} */ (each.term)] ?? each.term,
+      labelOfTerm(each.term),
       percent(each.probability),
       `${percent(each.ci_low)} – ${percent(each.ci_high)}`,
       each.event_low === null ? "–" : `${percent(each.event_low)} – ${percent(each.event_high)}`,

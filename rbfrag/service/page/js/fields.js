@@ -3,6 +3,7 @@
 import { plain } from "./numbers.js";
 import { byId } from "./page.js";
 import { BLOCK_FIELDS, DEFAULTS, FURTHER, MEASURES, MODEL_FIELDS } from "./question.js";
+import { quantityNamed } from "./vocabulary.js";
 
 /**
  * @typedef {import("./question.js").Question} Question
@@ -13,11 +14,6 @@ const NAMES = [
   ...[...Object.values(BLOCK_FIELDS).flat(), "restitution", "displacement"],
   ...[...MEASURES, ...MODEL_FIELDS, "units", "dt", "trace"],
 ];
-
-/** Fields of which no 0 is answered. */
-const ABOVE_ZERO = new Set(
-  "height width p2 kr restitution displacement r3 s1 s2 tm magnitude level sites dt".split(" "),
-);
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
 const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?(?!\\w)`, "g");
@@ -91,8 +87,17 @@ export function formFields(form, changed) {
 export function isHalfTyped(input) {
   if (document.activeElement !== input || input.inputMode === "") return false;
   const text = input.value.trim();
-  const nothing = ABOVE_ZERO.has(input.id) && /^\+?(0+[.,]?0*|[.,]0*)$/.test(text);
+  const nothing = isAboveZero(input.id) && /^\+?(0+[.,]?0*|[.,]0*)$/.test(text);
   return nothing || /(^|[+-])\.$|[e+,-]$/i.test(text);
+}
+
+/**
+ * Whether no 0 is answered of a field.
+ * @param {string} id
+ */
+function isAboveZero(id) {
+  const { above, least } = quantityNamed(id).range;
+  return ["kr", "dt"].includes(id) || above === 0 || (least ?? 0) > 0;
 }
 
 /**
@@ -125,7 +130,7 @@ export function fieldNamedIn(sentence) {
 export function inLabels(sentence) {
   const named = new RegExp(`${NAMED.source}(?=[ ,]*(?:=|is|and|needs|goes|does|has))`, "g");
   const label = (/** @type {string} */ id) => document.querySelector(`label[for="${id}"]`);
-  return sentence.replace(named, (word, name) => label(name)?.textContent ?? word);
+  return sentence.replace(named, (word, name) => label(name)?.textContent || word);
 }
 
 /**

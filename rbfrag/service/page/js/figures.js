@@ -13,6 +13,7 @@ import { labelOf, planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
 import { writeText } from "./subscripts.js";
+import { quantityNamed } from "./vocabulary.js";
 
 /**
  * @typedef {import("./question.js").Question} Question
@@ -22,17 +23,6 @@ import { writeText } from "./subscripts.js";
  * @typedef {{question: Question, answer: any, plane: Plane, failing: Failing,
  *   present: () => boolean}} Answered
  */
-
-const NAMES = {
-  ...{ pgv: "PGV", pga: "PGA", tm: "T_m", pgd: "PGD", sa03_g: "SA(0.3 s)" },
-  ...{ sa10_g: "SA(1 s)", sa30_g: "SA(3 s)" },
-  ...{ arias: "Arias intensity", magnitude: "M" },
-};
-const UNITS = {
-  ...{ pgv: "m/s", pga: "g", tm: "s", pgd: "m" },
-  ...{ sa03_g: "g", sa10_g: "g", sa30_g: "g" },
-  ...{ arias: "m/s", magnitude: "" },
-};
 
 /**
  * Both figures.
@@ -167,9 +157,12 @@ function sensitivity(share) {
 
 /** @type {(question: Question, answer: any, plane: Plane) => string} */
 function chartCaption(question, answer, plane) {
-  const held = /** @type {(keyof typeof NAMES)[]} */ (MEASURES)
-    .filter((name) => name !== plane.across && question.values[name] !== "")
-    .map((name) => `${NAMES[name]} = ${quantity(fromField(question.values[name]), UNITS[name])}`);
+  const held = MEASURES.filter((name) => name !== plane.across && question.values[name] !== "").map(
+    (name) => {
+      const { symbol, unit } = quantityNamed(name);
+      return `${symbol} = ${quantity(fromField(question.values[name]), unit)}`;
+    },
+  );
   const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
   return (
     `Lines of equal probability of ${answer.failure} at ${all}. ` +

@@ -16,6 +16,7 @@ import * as service from "./service.js";
 import { blockTable } from "./table.js";
 import { tools } from "./tools.js";
 import { reached, tokenMissing, unreachable, whenTokenGiven } from "./trouble.js";
+import { loadVocabulary } from "./vocabulary.js";
 
 /** @typedef {import("./question.js").Question} Question */
 
@@ -100,6 +101,7 @@ function busy(is) {
 async function answerQuestion(asked) {
   showAddress(addressOf(asked, record.shown()));
   try {
+    await loadVocabulary(); // labels, units and names of what is shown below
     const found = await service.askDrawing(asked);
     numbers = found.numbers ?? {};
     drawing.show(found, asked);

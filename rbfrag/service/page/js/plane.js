@@ -1,6 +1,7 @@
 /** The plane of the design chart: which measure runs across, which values are shown and asked. */
 
 import { fromField, ratios } from "./numbers.js";
+import { quantityNamed } from "./vocabulary.js";
 
 /**
  * @typedef {"pgv" | "pga" | "pgd" | "sa03_g" | "sa10_g" | "sa30_g"} Across the measure that runs across
@@ -25,22 +26,13 @@ const BESIDE = 1e-6;
 /** Ratio within which a value counts as within a range: fields hold three digits. */
 const ROUNDING = 1.01;
 
-const LABELS = {
-  pgv: ["peak ground velocity PGV", "m/s"],
-  pga: ["peak ground acceleration PGA", "g"],
-  pgd: ["peak ground displacement PGD", "m"],
-  sa03_g: ["spectral acceleration SA(0.3 s)", "g"],
-  sa10_g: ["spectral acceleration SA(1 s)", "g"],
-  sa30_g: ["spectral acceleration SA(3 s)", "g"],
-};
-
 /**
  * Name and unit of a measure.
  * @param {Across} across
  */
 export function labelOf(across) {
-  const [name, unit] = LABELS[across];
-  return { name, unit, title: `${name} [${unit}]` };
+  const { axis, unit } = quantityNamed(across);
+  return { name: axis, unit, title: `${axis} [${unit}]` };
 }
 
 /**

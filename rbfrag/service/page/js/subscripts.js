@@ -3,7 +3,7 @@
 import { d3 } from "./d3.js";
 
 /** Splits after a symbol that has an index; names such as pga_tm are left whole. */
-const PARTS = /(?<=(?<!\w)[kprT])_(\w|ct)(?!\w)/;
+const PARTS = /(?<=(?<!\w)[kprTI])_(\w|ct)(?!\w)/;
 
 /**
  * Write text into an element of the page, indices as `<sub>`.
