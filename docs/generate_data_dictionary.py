@@ -1,4 +1,4 @@
-"""Write the data dictionary page from the fields of a question and the schema; --check compares."""
+"""Write the data dictionary page from the vocabulary and the schema; --check compares."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from rbfrag.vocabulary.quantities import (
     option_of,
     parameter_of,
 )
+from rbfrag.vocabulary.results import RESULT_GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "reference" / "data-dictionary.md"
@@ -32,6 +33,14 @@ brackets (`H (m)`). Written tables use the name in bold.
 
 | keyword | shell | request | columns | unit | range | what it is |
 | --- | --- | --- | --- | --- | --- | --- |
+"""
+
+KEYS = """\
+## Keys of answers
+
+The keys of JSON documents (`--json`, HTTP) in addition to the fields of a question. A value that
+does not apply is null.
+
 """
 
 HEAD = """\
@@ -65,13 +74,26 @@ def fields() -> str:
     return FIELDS + "\n".join(rows) + "\n\n"
 
 
+def keys() -> str:
+    """Return the tables of the keys of answers, a table for each subject."""
+    parts = [KEYS]
+    for title, quantities in RESULT_GROUPS.items():
+        rows = [
+            f"| `{about.name}` | {about.symbol} | {about.unit} | {about.label} |"
+            for about in quantities
+        ]
+        head = "| key | symbol | unit | meaning |\n| --- | --- | --- | --- |"
+        parts.append(f"### {title}\n\n" + "\n".join([head, *rows]) + "\n\n")
+    return "".join(parts)
+
+
 def page() -> str:
     """Return the page: what tables have alike, and then each with its own columns."""
     tables = data_dictionary()
     times = Counter(column for table in tables for column in table.columns)
     usual = {column.name: column for column, count in reversed(times.most_common()) if count > 1}
     common = [column for column in times if column in usual.values()]
-    parts = [fields() + HEAD + columns_as_markdown(common)]
+    parts = [fields() + keys() + HEAD + columns_as_markdown(common)]
     for table in tables:
         own = [column for column in table.columns if column not in common]
         also = ", ".join(f"`{column.name}`" for column in table.columns if column in common)

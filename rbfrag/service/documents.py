@@ -22,6 +22,7 @@ from rbfrag.solver.reports import STRENGTH_VALUES
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.stability.joint import JointStrength
 from rbfrag.solver.stability.single import KEYS, Cohesion, Stability
+from rbfrag.vocabulary.results import RESULTS
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -78,8 +79,18 @@ def _in_json(of: Any) -> Any:
     return _LISTS[get_args(get_args(of)[1])[0]] if get_origin(of) is np.ndarray else of
 
 
+def _describe(schema: dict[str, Any]) -> None:
+    """Give the keys of a document the labels and units of the vocabulary."""
+    for name, of in schema.get("properties", {}).items():
+        if about := RESULTS.get(name):
+            unit = f" [{about.unit}]" if about.unit else ""
+            of.setdefault("description", f"{about.label}{unit}")
+
+
 class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, protected_namespaces=())
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, protected_namespaces=(), json_schema_extra=_describe
+    )
 
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -91,7 +102,7 @@ class Problem(_Document):
 
     type: str
     title: str
-    status: int
+    status: int = Field(description="HTTP status")
     detail: str
     traces: list[str] | None = None
 
