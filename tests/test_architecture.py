@@ -365,3 +365,31 @@ def test_facts_of_measures_stand_in_the_vocabulary_only() -> None:
         and facts_of_measures(path.read_text(encoding="utf-8"))
     }
     assert users == {*OTHER_FACTS}
+
+
+def percentages(source: str) -> list[int]:
+    """Return the lines of f-strings that format a percentage: "{…} %" or "{…:.0%}"."""
+    lines = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.JoinedStr):
+            continue
+        for part, after in zip(node.values, [*node.values[1:], None], strict=True):
+            if not isinstance(part, ast.FormattedValue):
+                continue
+            format_ = "" if part.format_spec is None else ast.unparse(part.format_spec)
+            text = after.value if isinstance(after, ast.Constant) else ""
+            if "%" in format_ or text.lstrip().startswith("%"):
+                lines.append(part.lineno)
+    return lines
+
+
+def test_percentages_are_formatted_in_results_only() -> None:
+    assert percentages('f"{100.0 * p:g} %"\nf"{p:.0%} of it"\nf"{100 * p}%"') == [1, 2, 3]
+    assert percentages('f"{percent(p)} of {n}"\n"90 %" % p') == []
+    users = {
+        name
+        for path in SOURCES
+        if not (name := path.relative_to(PACKAGE).as_posix()).startswith("results/")
+        and percentages(path.read_text(encoding="utf-8"))
+    }
+    assert users == set()

@@ -42,9 +42,10 @@ def test_types_are_declared_for_the_same_inputs(types: type, names: Collection[s
     assert {*types.__annotations__} == {*names}
 
 
-def test_the_vocabulary_loads_no_library() -> None:
+@pytest.mark.parametrize("module", ["quantities", "results", "headers"])
+def test_the_vocabulary_loads_no_library(module: str) -> None:
     program = (
-        "import sys; before = set(sys.modules); import rbfrag.vocabulary.quantities; "
+        f"import sys; before = set(sys.modules); import rbfrag.vocabulary.{module}; "
         "print(*set(sys.modules) - before)"
     )
     done = subprocess.run(

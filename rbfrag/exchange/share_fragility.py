@@ -24,6 +24,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
+from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 
 DRAWS = 20_000
@@ -124,7 +125,7 @@ def share_functions(
     few = [share for share in shares if share / 100.0 * p2.size < 1.0]
     if few:
         warnings.append(
-            f"{few[0]:g} % of {p2.size} blocks is less than one: that limit state is one block; "
-            "give the rock mass more realisations"
+            f"{exact_percent(few[0] / 100.0)} of {p2.size} blocks is less than one: that limit "
+            "state is one block; give the rock mass more realisations"
         )
     return BlockFunctions(functions, about_model(chosen), tuple(warnings))

@@ -16,6 +16,7 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
+from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
 from rbfrag.vocabulary.quantities import INTENSITY, NUMBERS, QUANTITIES, SPECTRAL
 
@@ -96,7 +97,7 @@ NOTABLE_SHARE = 0.05
 """From this share of an uncertain block, or of P, outside the fitted ranges on it is told."""
 
 PARTLY_OUTSIDE = (
-    f"{100.0 * NOTABLE_SHARE:g} % or more of what the uncertain block may be lies outside the "
+    f"{exact_percent(NOTABLE_SHARE)} or more of what the uncertain block may be lies outside the "
     "fitted ranges, or of P where the shaking is uncertain: the answer is an extrapolation there"
 )
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from rbfrag.errors import ModelError
 from rbfrag.fragility.method import Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.numbers import exact_percent
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
 
 INSIDE = 0.995
@@ -224,7 +225,7 @@ class Spread(NamedTuple):
         *others, last = self.names
         return (
             f"{', '.join(others)} and {last} together lie further from the fitted ones than "
-            f"{100.0 * INSIDE:g} % of those do: the answer is an extrapolation"
+            f"{exact_percent(INSIDE)} of those do: the answer is an extrapolation"
         )
 
 

@@ -18,7 +18,7 @@ from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import confidence, equals, interval, percent
+from rbfrag.results.numbers import confidence, equals, exact_percent, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 
@@ -153,7 +153,8 @@ class Prediction(Result):
         if self.event_low is None or self.event_high is None:
             return f"{where}: unknown which fraction of the blocks fails"
         ends = interval(self.event_low, self.event_high)
-        return f"{where}, {ends} of the blocks fail ({100.0 * self.level:g} % prediction interval)"
+        level = exact_percent(self.level)
+        return f"{where}, {ends} of the blocks fail ({level} prediction interval)"
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the values and the answers of all suited models, if verbose."""

@@ -38,6 +38,7 @@ from rbfrag.hazards.uncertainty import (
     rate_interval,
     share_interval,
 )
+from rbfrag.results.numbers import percent
 from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.quantity import finite_or_none
@@ -649,7 +650,7 @@ def _warnings(
     rate, outside = float(blocks[0].sum()), float(blocks[2].sum())
     if rate > 0.0 and outside > NOTABLE * rate:
         warnings.append(
-            f"{100.0 * outside / rate:.3g} % of the failures come from blocks and shaking outside "
+            f"{percent(outside / rate)} of the failures come from blocks and shaking outside "
             "the ranges that the model was fitted on"
         )
     effective = events.effective_years

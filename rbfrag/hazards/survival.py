@@ -26,6 +26,7 @@ from rbfrag.hazards.standing_blocks import (
     StandingBlocks,
 )
 from rbfrag.question.keywords import LEVEL, parts_of
+from rbfrag.results.numbers import percent
 from rbfrag.results.result import Tabular
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
@@ -326,7 +327,7 @@ def _warnings(
     outside = max(rate.outside for rate in rates)
     if outside > NOTABLE:
         yield (
-            f"up to {100.0 * outside:.3g} % of the rate comes from blocks and shaking outside the "
+            f"up to {percent(outside)} of the rate comes from blocks and shaking outside the "
             "ranges that the model was fitted on"
         )
     if blocks.laws[0] == DEPENDENT:

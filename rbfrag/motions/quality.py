@@ -9,6 +9,7 @@ import numpy as np
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.intensity import TM_BAND_HZ
+from rbfrag.results.numbers import exact_percent
 
 LONGEST_DT_S = 0.1
 """Strong-motion instruments sample at 0.001 to 0.02 s; above 0.1 s the dt is likely wrong."""
@@ -116,8 +117,8 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
         doubt(
             "final_velocity",
             f"the record ends at {measures.final_velocity_m_s:.3g} m/s, more than "
-            f"{END_VELOCITY_RATIO:.0%} of its PGV: its baseline is not corrected, and PGD means "
-            "little",
+            f"{exact_percent(END_VELOCITY_RATIO)} of its PGV: its baseline is not corrected, "
+            "and PGD means little",
         )
     if abs(measures.final_displacement_m) > END_DISPLACEMENT_M:
         doubt(
@@ -135,7 +136,7 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
         if edge > EDGE_RATIO * measures.pga_g:
             doubt(
                 code,
-                f"the record {where} at {edge:.3g} g, more than {EDGE_RATIO:.0%} of its PGA: it "
-                "was cut out of a longer one; the ground is taken to be at rest outside it",
+                f"the record {where} at {edge:.3g} g, more than {exact_percent(EDGE_RATIO)} of its "
+                "PGA: it was cut out of a longer one; the ground is taken to be at rest outside it",
             )
     return tuple(flags)

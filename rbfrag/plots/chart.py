@@ -21,6 +21,7 @@ from rbfrag.plots.model_lines import (
     failure_line,
     held_measures,
 )
+from rbfrag.results.numbers import exact_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,7 +192,7 @@ def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> 
     beside = 1.0 + _LABEL_OFF_PT / width_pt
     places = canvas.spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
     for place, (up, across, probability) in zip(places, ends, strict=True):
-        text = f"{100.0 * probability:g} %"
+        text = exact_percent(probability)
         axes.plot(
             [across, beside - 0.005], [up, place], color=canvas.BLUE, lw=0.5,
             transform=axes.transAxes, clip_on=False, label=f"_{text}",

@@ -20,6 +20,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written
+from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
 
 
@@ -116,7 +117,7 @@ def plot_sensitivity(
     for name in LOBES:
         style, colour = STYLES[name]
         above = int(np.sum(y > lobe_line(name, x)))
-        label = f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)"
+        label = f"{name} lobe: {above} above ({percent(above / x.size)})"
         axes.plot(line_x, lobe_line(name, line_x), style, color=colour, lw=1.8, label=label)
     if below:
         axes.axhline(limit, color="black", lw=1.0, ls=":", label=f"search limit: {below} below it")

@@ -29,6 +29,7 @@ from rbfrag.plots.canvas import (
 )
 from rbfrag.plots.labels import as_written
 from rbfrag.question.keywords import LEVEL
+from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
@@ -162,7 +163,7 @@ def draw_curve(
     x[0] = _START * end
     answer = array_answer(model, {**block, varied: x, **held}, level, sites=sites)
     known = answer.in_domain
-    percent = f"{100.0 * level:g} %"
+    percent = exact_percent(level)
     if sites is not None and not np.isnan(answer.event_low).all():
         axes.fill_between(
             x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,

@@ -13,6 +13,7 @@ from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.plots import canvas
 from rbfrag.plots.curve import AXIS
 from rbfrag.plots.labels import as_written
+from rbfrag.results.numbers import exact_percent, percent, relative
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,9 +53,9 @@ def plot_contribution(
     place = f" at {curve.place}" if curve.place else ""
     figure.suptitle(
         as_written(f"hazard of {curve.imt}{place}, model {describe.model(vars(answer))}", 75)
-        + f"\nthe block fails {rate:.3g} times a year ({100 * answer.level:g} % interval "
+        + f"\nthe block fails {rate:.3g} times a year ({exact_percent(answer.level)} interval "
         f"{answer.ci_low[0]:.3g} to {answer.ci_high[0]:.3g}),\n"
-        f"{100 * answer.probability[0]:.3g} % in {answer.years:g} years",
+        f"{percent(answer.probability[0])} in {answer.years:g} years",
         fontsize=10,
     )
     return canvas.save_figure(figure, out)
@@ -66,15 +67,15 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
     top.set_ylabel("exceedances a year, λ [1/a]")
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
     edges = curve.levels
-    percent = 100.0 * answer.fractions_between(edges)
+    fractions = 100.0 * answer.fractions_between(edges)
     bottom.bar(
-        edges[:-1], percent, width=np.diff(edges), align="edge",
+        edges[:-1], fractions, width=np.diff(edges), align="edge",
         color="#2b6cac", edgecolor="white", linewidth=0.3,
     )  # fmt: skip
     bottom.set_ylabel("share of the rate [%]\nbetween levels of the curve")
-    bottom.set_ylim(0.0, None if percent.any() else 1.0)
+    bottom.set_ylim(0.0, None if fractions.any() else 1.0)
     bottom.set_xlabel(measure_title(curve))
-    seen = percent > _SHOWN * max(float(percent.max()), np.finfo(float).tiny)
+    seen = fractions > _SHOWN * max(float(fractions.max()), np.finfo(float).tiny)
     if seen.any():
         left, right = edges[:-1][seen][0], edges[1:][seen][-1]
         bottom.set_xlim(left, right)
@@ -82,9 +83,9 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
         if inside.sum() > 1:
             rates = curve.annual_rate[inside]
             top.set_ylim(0.5 * rates.min(), 2.0 * rates.max())
-    beyond = 100.0 * answer.above[0] / rate
-    if beyond >= 0.05:
-        text = f"{beyond:.2g} % more from beyond the end of the curve"
+    beyond = answer.above[0] / rate
+    if beyond >= 0.0005:
+        text = f"{relative(beyond)} more from beyond the end of the curve"
         bottom.set_title(text, fontsize=9, loc="right")
     canvas.written_numbers(bottom.xaxis, 1.0, 2.0, 5.0)
     for axes in (top, bottom):

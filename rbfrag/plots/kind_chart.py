@@ -16,6 +16,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas
 from rbfrag.plots.chart import CONTOURS
 from rbfrag.plots.labels import as_written
+from rbfrag.results.numbers import exact_percent
 from rbfrag.vocabulary.quantities import QUANTITIES
 
 _NODES = 241
@@ -77,7 +78,7 @@ def plot_kind_chart(
     axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25)
     lines = axes.contour(x, y, answers.probability, CONTOURS, colors=canvas.BLUE, linewidths=1.1)
     places = list(_label_places(x, y, answers.probability))
-    axes.clabel(lines, fmt=lambda p: f"{100.0 * p:g} %", fontsize=8, manual=places)
+    axes.clabel(lines, fmt=exact_percent, fontsize=8, manual=places)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     about = QUANTITIES[first]
     axes.set_xlabel(f"{about.noun} [{about.unit}]")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.errors import InputError
 from rbfrag.hazards.losses import Exceedance, LossAnswer
 from rbfrag.plots import canvas
+from rbfrag.results.numbers import exact_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,10 +81,10 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
             ends = [getattr(one, what) or (math.nan, math.nan) for one in curve]
             low, high = zip(*ends, strict=True)
             if not all(map(math.isnan, low)):
-                percent = 90.0 if what == "branches" else 100.0 * answer.level
+                level = exact_percent(0.9 if what == "branches" else answer.level)
                 axes.fill_between(
                     x, low, high, lw=0.9, **style,
-                    label=f"{percent:g} % {words}" if first and law == next(iter(curves)) else None,
+                    label=f"{level} {words}" if first and law == next(iter(curves)) else None,
                 )  # fmt: skip
         axes.plot(
             x, [one.annual_rate for one in curve], "o-", color=colour, ms=3.0, lw=1.5,

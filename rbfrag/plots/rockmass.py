@@ -10,6 +10,7 @@ import numpy as np
 
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
+from rbfrag.results.numbers import exact_percent, percent
 from rbfrag.rockmasses.counts import (
     crossings,
     cumulative_counts,
@@ -82,7 +83,9 @@ def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Pictur
         range(len(shares)), shares, width=0.7, color=[canvas.MODE_COLOURS[mode] for mode in present]
     )
     for place, share in enumerate(shares):
-        write_near(bars, f"{share:.1f} %", (place, share), (0, 2), movable=False, fontsize=8.5)
+        write_near(
+            bars, percent(share / 100.0), (place, share), (0, 2), movable=False, fontsize=8.5
+        )
     _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
@@ -162,7 +165,7 @@ def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) ->
     axes.set_xlim(0.0, 1.02 * scales[-1])
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("factor on the motion")
-    axes.set_ylabel(f"share of all blocks that fail [%], {100.0 * level:g} % interval")
+    axes.set_ylabel(f"share of all blocks that fail [%], {exact_percent(level)} interval")
     canvas.light_grid(axes)
     axes.legend(loc="upper left", fontsize=9, frameon=False)
     above = axes.twiny()
@@ -197,7 +200,7 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
         bottom += heights
     for place, (_, each) in zip(at, rows, strict=True):
         assert each.of_mode is not None
-        text = f"{100.0 * each.of_mode.value:.3g} %\nof {each.count}"
+        text = f"{percent(each.of_mode.value)}\nof {each.count}"
         write_near(axes, text, (float(place), 100.0), (0, 3), movable=False, fontsize=8.5)
     _name_bars(axes, [mode for mode, _ in rows])
     axes.set_ylim(0.0, 113.0)

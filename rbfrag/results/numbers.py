@@ -48,9 +48,19 @@ def equals(name: str, value: str) -> str:
     return f"{name} {value}" if value[0] in "<>" else f"{name} = {value}"
 
 
+def exact_percent(fraction: float) -> str:
+    """Return a level or a threshold in percent with all its digits: "97.5 %"."""
+    return f"{100.0 * fraction:g} %"
+
+
+def relative(change: float) -> str:
+    """Return a relative change or error in percent, with two significant digits: "130 %"."""
+    return f"{float(f'{100.0 * change:.2g}'):g} %"
+
+
 def confidence(level: float, ends: str, name: str = "confidence") -> str:
     """Return an interval with its level: "95 % confidence interval 7.4–26 %"."""
-    return f"{100.0 * level:g} % {name} interval {ends}"
+    return f"{exact_percent(level)} {name} interval {ends}"
 
 
 def years(rate: float, digits: int = 2) -> str:

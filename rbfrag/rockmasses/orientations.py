@@ -15,6 +15,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text
+from rbfrag.results.numbers import percent
 from rbfrag.solver.block.planes import STRIKE_DEG, Plane, plane_of, section_of
 from rbfrag.solver.results import FloatArray
 
@@ -158,7 +159,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
         own[f"{name}.dip_deg"] = {"distribution": "von_mises", "mean": dip, "kappa": kappa}
         notes.append(
             f"{name}: {joints.size} planes, mean {joints.mean}, Fisher K {joints.fisher_k:.4g}, "
-            f"alpha95 {joints.alpha95_deg:.3g} deg; {100.0 * joints.share_off(face):.0f} % of such "
+            f"alpha95 {joints.alpha95_deg:.3g} deg; {percent(joints.share_off(face))} of such "
             f"planes strike more than {STRIKE_DEG:g} deg off the face, which the section leaves out"
         )
         if joints.fisher_k < _WIDE_K:

@@ -21,6 +21,7 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.many import push_of_blocks
 from rbfrag.question.question import predict
 from rbfrag.question.shapes import ModeShapes, dip_of_factor, p2_at_rest
+from rbfrag.results.numbers import percent
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.kinds import BY_MECHANICS, kind_of_mode
@@ -421,7 +422,7 @@ def _warnings(
     why: Mapping[ModeName, str],
 ) -> list[str]:
     warnings = [
-        f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
+        f"{mode.replace('_', ' ')}: {percent(share)} of the blocks have no answer"
         + ("" if mode in modelled else why[mode])
         for mode, share in missing.items()
     ]

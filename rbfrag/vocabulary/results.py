@@ -274,9 +274,12 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
 }
 
-RESULT_GROUPS = {
-    title: tuple(Quantity(*about) for about in rows) for title, rows in _GROUPS.items()
-}
+
+def _key(name: str, label: str, unit: str = "", symbol: str = "") -> Quantity:
+    return Quantity(name, label, unit, symbol)
+
+
+RESULT_GROUPS = {title: tuple(_key(*about) for about in rows) for title, rows in _GROUPS.items()}
 """Keys of the documents by subject."""
 
 RESULTS = QUANTITIES | {about.name: about for keys in RESULT_GROUPS.values() for about in keys}

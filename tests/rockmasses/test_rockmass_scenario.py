@@ -12,6 +12,7 @@ import pytest
 from rbfrag.errors import DatabaseNotFoundError, InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.question.question import predict
+from rbfrag.results.numbers import percent
 from rbfrag.rockmasses.counts import EqualCounts, crossings, mode_counts
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns
@@ -83,7 +84,7 @@ def test_shares_of_covered_and_uncovered_add_up(made: Realisations, model: Fragi
     assert [mode.mode for mode in answer.modes if mode.has_model] == ["topple"]
     for mode, share in answer.uncovered_share.items():
         (text,) = [t for t in answer.warnings if t.startswith(f"{mode.replace('_', ' ')}:")]
-        assert f"{100 * share:.3g} % of the blocks have no answer" in text
+        assert f"{percent(share)} of the blocks have no answer" in text
         assert "displacement_m" in text
 
 

@@ -19,6 +19,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.results.numbers import exact_percent
 
 if TYPE_CHECKING:
     from rbfrag.campaign.summary import CampaignProgress
@@ -243,7 +244,7 @@ def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
         limit = f"{row.rotation_deg:g} deg"
     state, most = "none", row.pga_over_yield_to
     if row.state_to > 0.0:
-        state = f"{100.0 * row.state_from:g} to {100.0 * row.state_to:g} %"
+        state = f"{exact_percent(row.state_from)} to {exact_percent(row.state_to)}"
     return (
         limit,
         state,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rbfrag.cli.parameters.options import CRS, EXCEL_TEXT, IGNORE_COLUMNS, SHEET, column_names
 from rbfrag.cli.parameters.stack import Given, option
 from rbfrag.errors import InputError
+from rbfrag.results.numbers import percent
 from rbfrag.vocabulary.quantities import column_of
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
         raise InputError(f"{path}: no block of it topples: there is no model for them")
     remark = (
         f"the answer is the mean over {krs.size} stable toppling blocks, "
-        f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
+        f"{percent(share)} of the rock mass; the others have no part in it"
     )
     kinds = [TOPPLING_BLOCK.kind] * krs.size
     columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs, "kind": kinds}

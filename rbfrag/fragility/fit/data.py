@@ -24,6 +24,7 @@ from rbfrag.fragility.fit.scores import ScoredBlocks, critical_outcomes
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
 
@@ -267,7 +268,7 @@ class FitData:
             return []
         return [
             f"{n} critical values are not certified and are intervals wider than "
-            f"{100 * NARROW:g} % of their lower end; they {treated}"
+            f"{exact_percent(NARROW)} of their lower end; they {treated}"
         ]
 
     @property

@@ -30,6 +30,7 @@ from rbfrag.fragility.straight_line import (
     negative_probability,
     variance_m2_s2,
 )
+from rbfrag.results.numbers import exact_percent, percent
 from rbfrag.solver.results import FloatArray
 
 REPLICATES = 400
@@ -404,9 +405,9 @@ def _warnings(data: FitData, fit: LineFit, x: FloatArray, unstable: int) -> list
     if doubtful_part > 0.0:
         low, high = x[doubtful][[0, -1]]
         result.append(
-            f"for intensities of {low:.3g} to {high:.3g} m/s ({100 * doubtful_part:.0f} % of the "
+            f"for intensities of {low:.3g} to {high:.3g} m/s ({percent(doubtful_part)} of the "
             "points) "
-            f"the straight-line normal model gives more than {100 * NEGATIVE_LIMIT:g} % "
+            f"the straight-line normal model gives more than {exact_percent(NEGATIVE_LIMIT)} "
             "probability to negative critical velocities: it does not make sense there"
         )
     if fit.parameters[0] > 0.0:

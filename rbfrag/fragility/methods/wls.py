@@ -20,6 +20,7 @@ from rbfrag.fragility.straight_line import (
     rise,
     variance_m2_s2,
 )
+from rbfrag.results.numbers import exact_percent
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -39,7 +40,7 @@ def _doubts(
     yield (
         negative_probability(b, v["intensity_m_s"], ns) > NEGATIVE_LIMIT,
         "intensity_m_s",
-        f"{outside}: there it gives more than {100 * NEGATIVE_LIMIT:g} % probability "
+        f"{outside}: there it gives more than {exact_percent(NEGATIVE_LIMIT)} probability "
         "to negative critical velocities",
     )
     yield (

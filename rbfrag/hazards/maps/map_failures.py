@@ -30,6 +30,7 @@ from rbfrag.hazards.maps.site_probability import SiteProbability
 from rbfrag.hazards.maps.site_shaking import SiteShaking
 from rbfrag.hazards.maps.spatial_field import SpatialField, correlation_range_km
 from rbfrag.hazards.standing_blocks import COPULA, normals_by_law
+from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 
 Indices = NDArray[np.intp]
@@ -127,8 +128,8 @@ class MapFailures:
         texts = []
         if self.range_km is not None:
             texts.append(
-                f"failures and probability_any take {100 * BETWEEN:.0f} % of the variance of the "
-                "map's values as common to the earthquake, and the rest as correlated over "
+                f"failures and probability_any take {exact_percent(BETWEEN)} of the variance of "
+                "the map's values as common to the earthquake, and the rest as correlated over "
                 f"{self.range_km:g} km (Jayaram and Baker 2009)"
             )
         if COPULA not in self.by_law:

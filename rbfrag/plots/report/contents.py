@@ -31,7 +31,7 @@ from rbfrag.question.document import answer_block
 from rbfrag.question.fields import RangeFields
 from rbfrag.question.question import OF_SHAKING, described, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.results.numbers import interval, percent, return_period
+from rbfrag.results.numbers import exact_percent, interval, percent, return_period
 from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
@@ -338,7 +338,7 @@ def _totals(
     summary += [
         ("Hazard curve", f"{curve.imt}{place}; {Path(curve.source).name}"),
         (f"Expected failures per year{not_in}",
-         f"{expected_rate:.2g} ({low:.2g}–{high:.2g}, {100 * answer.level:g} % confidence)"),
+         f"{expected_rate:.2g} ({low:.2g}–{high:.2g}, {exact_percent(answer.level)} confidence)"),
     ]  # fmt: skip
     totals |= {"years": rate.years, "expected_failures_per_year": expected_rate}
     joint = answer.joint

@@ -17,6 +17,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.numbers import relative
 from rbfrag.solver.block.formulas import moments_about_corners
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
@@ -272,7 +273,7 @@ def _warnings(
         )
     elif outcome is Outcome.STABLE and spread is not None and spread > NOT_REPEATED:
         warnings.append(
-            f"the peak rotation cannot be repeated: it changes by {100.0 * spread:.2g} % where the "
+            f"the peak rotation cannot be repeated: it changes by {relative(spread)} where the "
             "motion is scaled by 1 + 1e-6 or 1 - 1e-6"
         )
     elif error_of(run, outcome) > CHAOTIC * min(block.toe.theta_c, block.heel.theta_c):
