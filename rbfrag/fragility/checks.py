@@ -46,7 +46,8 @@ class Remark:
         name: the value concerned.
         text: what is wrong and what to do.
         how: what answers there, in place of the model; empty where the model does.
-        code: of the warning, one of :data:`rbfrag.results.diagnostic.CODES`.
+        code: of the warning, one of :data:`rbfrag.results.diagnostic.CODES`; that of a reason
+            against any answer is that of rejected rows.
     """
 
     holds: Any
@@ -54,7 +55,7 @@ class Remark:
     value: Any
     text: str
     how: str = ""
-    code: str = "note"
+    code: str = "rows_rejected"
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""

@@ -181,8 +181,8 @@ def suited_models(
     return [*store.suited[key]]
 
 
-def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[str, ...]:
-    """Return what is to be said of measures that are given and that a model does not read."""
+def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[Diagnostic, ...]:
+    """Return warnings about measures that are given and that a model does not use."""
     read = model.term.inputs
     return tuple(
         Diagnostic(

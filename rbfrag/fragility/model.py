@@ -24,9 +24,13 @@ LEAST = 1e-290
 
 _SHIPPED = {ratio.name: ratio for ratio in RATIOS if ratio.shipped is not None}
 
-NO_EVENT_RANGE = (
-    "no estimate of what the blocks of one earthquake share is stored with this model (too few "
-    "earthquakes, sites or components were fitted): the range of one future earthquake is not known"
+AT_REST = "unstable without shaking: check dip and friction"
+"""Warning of a block that fails without an earthquake."""
+
+NO_EVENT_RANGE = Diagnostic(
+    "no prediction interval for a single earthquake: no dependence model is stored with this "
+    "model (too few earthquakes, sites or components were fitted)",
+    "no_prediction_interval",
 )
 
 
@@ -89,7 +93,7 @@ class FragilityModel:
     parameters: tuple[float, ...]
     errors: ParameterErrors
     vertical: bool
-    notes: tuple[str, ...] = ()
+    notes: tuple[Diagnostic, ...] = ()
     spread: Spread | None = None
     data: str | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
@@ -154,7 +158,7 @@ class FragilityModel:
                 "of another size: fit it again"
             )
         term = TERMS[row.term]
-        notes = (form.advice,) if form.advice else ()
+        notes = (Diagnostic(form.advice, "weak_predictors"),) if form.advice else ()
         if row.diagnostics.get("recorded_events") == 0:
             notes = (*notes, SYNTHETIC)
         return cls(

@@ -16,7 +16,7 @@ from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
-from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
+from rbfrag.fragility.model import AT_REST, NO_EVENT_RANGE, FragilityModel
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import confidence, equals, exact_percent, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
@@ -233,8 +233,10 @@ class MotionPrediction(Prediction):
 A = TypeVar("A", bound="Prediction | PredictionArray")
 
 
-def with_remarks(answer: A, remarks: tuple[str, ...], last: tuple[str, ...] = ()) -> A:
-    """Return an answer with what is to be said of its blocks, first, and of its shaking, last."""
+def with_remarks(
+    answer: A, remarks: tuple[Diagnostic, ...], last: tuple[Diagnostic, ...] = ()
+) -> A:
+    """Return an answer with warnings about its blocks, first, and about its shaking, last."""
     if not remarks and not last:
         return answer
     return with_values(answer, warnings=(*remarks, *answer.warnings, *last))
@@ -333,9 +335,11 @@ def _at_sites(
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 
-NOT_SHARED = (
-    "what the sites of one earthquake share of the shaking (pgv_tau) is not known here: the range "
-    "of one future earthquake is left out"
+NOT_SHARED = Diagnostic(
+    "no prediction interval for a single earthquake: the between-event dispersion of the shaking "
+    "(pgv_tau) is required and applies to single predictions from PGV alone",
+    "no_prediction_interval",
+    fields=("pgv_tau",),
 )
 
 
@@ -498,7 +502,3 @@ def _answer_with_diagnostics(
         certain = judgement.answer._replace(probability=1.0, low=1.0, high=1.0)
         judgement = judgement._replace(answer=certain)
     return judgement, sentences, "".join(ruled)
-
-
-AT_REST = "unstable without shaking: check dip and friction"
-"""What is said of a block that fails without an earthquake."""

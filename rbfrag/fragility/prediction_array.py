@@ -17,8 +17,9 @@ from rbfrag.fragility.checks import NOTABLE_SHARE, Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import Numbers, arrays
-from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.fragility.model import AT_REST, Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
+from rbfrag.results.diagnostic import Diagnostic, diagnostics, texts_by_row
 from rbfrag.results.numbers import count_of, interval
 from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.kinds import BY_MECHANICS, KINDS, mode_of_kind
@@ -257,7 +258,7 @@ def predict_many(
     # gathered: the words cost as much for a few elements as for thousands
     flagged = np.concatenate([np.empty(0, dtype=np.intp), *_in_chunks(answer, size)])
 
-    def explain(start: int) -> tuple[NDArray[np.intp], Texts, Texts]:
+    def explain(start: int) -> tuple[NDArray[np.intp], Texts, Texts, list[Diagnostic]]:
         places = flagged[start : start + CHUNK]
         own = {n: v.repeat(places.size) if v.size == 1 else v[places] for n, v in values.items()}
         with np.errstate(all="ignore"):
@@ -274,18 +275,18 @@ def predict_many(
         event_low=np.full(shape, np.nan),
         event_high=np.full(shape, np.nan),
         in_domain=out.in_domain.reshape(shape),
-        reasons=Reasons(shape, [(places, texts) for places, texts, _ in explained]),
+        reasons=Reasons(shape, [(places, texts) for places, texts, *_ in explained]),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
         level=quantiles.level,
         model=model.name,
         term=model.term.name,
         method=model.method.name,
-        warnings=model.notes,
+        warnings=diagnostics(model.notes, *(warnings for *_, warnings in explained)),
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
-        ruled=Reasons(shape, [(places, how) for places, _, how in explained]),
+        ruled=Reasons(shape, [(places, how) for places, _, how, _ in explained]),
     )
 
 
@@ -361,15 +362,21 @@ def _answer_with_diagnostics(
     out: _Columns,
     *,
     refuse_nan: bool,
-) -> tuple[Texts, Texts]:
-    """Answer elements of which there may be something to say; return that, and what ruled."""
-    sentences, ruled = _Sentences(places.size), _Sentences(places.size)
+) -> tuple[Texts, Texts, list[Diagnostic]]:
+    """Answer elements that need explanation; return their reasons, what ruled, and warnings."""
+    reasons: list[tuple[str, NDArray[np.bool_]]] = []
+    ruled: list[tuple[str, NDArray[np.bool_]]] = []
+    warnings: list[Diagnostic] = []
     at_rest = np.zeros(places.size, dtype=np.bool_)
 
     def say(holds: NDArray[np.bool_], finding: Remark) -> None:
-        sentences.add(holds, finding.in_general())
+        if not holds.any():
+            return
+        text = finding.in_general()
+        reasons.append((text, holds))
+        warnings.append(Diagnostic(text, finding.code, rows=places[holds]))
         if finding.how:
-            ruled.add(holds, finding.how)
+            ruled.append((finding.how, holds))
 
     def refuse(holds: NDArray[np.bool_], finding: Remark) -> None:
         if refuse_nan and holds.any():
@@ -377,12 +384,15 @@ def _answer_with_diagnostics(
             where = tuple(int(i) for i in np.unravel_index(places[first], shape))
             text = f"element {where}: {finding.about(float(finding.value[first]))}"
             raise InputError(text, fields=(finding.name,))
-        say(holds, finding)
+        if holds.any():
+            reasons.append((finding.in_general(), holds))
 
     def unstable(holds: NDArray[np.bool_], _: Remark) -> None:
         at_rest[:] = holds
-        sentences.add(holds, "unstable")
-        ruled.add(holds, BY_MECHANICS)
+        if holds.any():
+            reasons.append(("unstable", holds))
+            ruled.append((BY_MECHANICS, holds))
+            warnings.append(Diagnostic(AT_REST, "unstable_at_rest", rows=places[holds]))
 
     block = model.method.block
     stated = [name for name in (*block.options, *block.sigmas, *ABOUT_SCATTER) if name in given]
@@ -401,7 +411,8 @@ def _answer_with_diagnostics(
     for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
         column[places] = np.where(judgement.missing, np.nan, value)
     out.in_domain[places] = judgement.in_domain
-    return sentences.texts(), ruled.texts()
+    size = places.size
+    return texts_by_row(reasons, size, "; "), texts_by_row(ruled, size, "; "), warnings
 
 
 def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
@@ -411,26 +422,6 @@ def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
         (out.block_sd, answer.block_sd),
     )  # fmt: skip
     return [(column, value) for column, value in pairs if column is not None and value is not None]
-
-
-class _Sentences:
-    """Sentences by element: one bit per sentence, so that a million elements cost little."""
-
-    def __init__(self, n: int) -> None:
-        self._bits = np.zeros(n, dtype=np.uint64)
-        self._sentences: list[str] = []
-
-    def add(self, where: NDArray[np.bool_], sentence: str) -> None:
-        if where.any():
-            self._bits[where] |= np.uint64(1 << len(self._sentences))
-            self._sentences.append(sentence)
-
-    def texts(self) -> NDArray[np.object_]:
-        kinds, which = np.unique(self._bits, return_inverse=True)
-        lines = np.empty(kinds.shape, dtype=object)
-        for i, bits in enumerate(kinds.tolist()):
-            lines[i] = "; ".join(s for k, s in enumerate(self._sentences) if bits >> k & 1)
-        return np.asarray(lines[which], dtype=object)
 
 
 def flat(given: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:

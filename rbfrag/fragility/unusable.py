@@ -69,7 +69,7 @@ def block_reasons(
 
 def unusable_in_words(
     count: int, total: int, places: Sequence[str], reasons: Sequence[str], effect: str = ""
-) -> tuple[str, ...]:
+) -> tuple[Diagnostic, ...]:
     """Return what is said of blocks that could not be used; nothing where there are none.
 
     Args:

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.lookup import block_of, unused_measures
 from rbfrag.fragility.measures import MEASURES
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model import AT_REST, FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, one_block
 from rbfrag.question.many import many_blocks
 from rbfrag.question.shapes import PLANE_TEXTS
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.kinds import BY_MECHANICS
 
 _COLUMNS = (
@@ -225,7 +226,9 @@ def _together(
     ruled: list[ReasonPart] = [(at, partial(getattr, part, "how")) for at, part in parts]
     nothing = np.empty(0, dtype=np.intp)
     unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
+    at_rest: tuple[Diagnostic, ...] = ()
     if unstable.size:
+        at_rest = (Diagnostic(AT_REST, "unstable_at_rest", rows=unstable),)
         for name in ("probability", "ci_low", "ci_high"):
             columns[name][unstable] = 1.0
         if "block_sd" in columns:
@@ -238,7 +241,12 @@ def _together(
     def named(name: str) -> str:
         return ", ".join(dict.fromkeys(getattr(part, name) for part in answers))
 
-    warnings = dict.fromkeys(text for part in answers for text in part.warnings)
+    def in_order(warning: Diagnostic, at: NDArray[np.intp]) -> Diagnostic:
+        if len(warning.rows):
+            return warning.replaced(rows=at[np.asarray(warning.rows)])
+        return warning.replaced(rows=at) if at.size < size else warning
+
+    warnings = (in_order(w, at) for at, part in parts for w in diagnostics(part.warnings))
     codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes}
     grid: dict[str, Any] = {n: each.reshape(shape) for n, each in codes.items() if each is not None}
     return PredictionArray(
@@ -249,7 +257,7 @@ def _together(
         model=named("model"),
         term=named("term"),
         method=named("method"),
-        warnings=(*blocks.remarks, *warnings),
+        warnings=diagnostics(blocks.remarks, at_rest, warnings),
         data=next((part.data for part in answers if part.data), None),
         index=index if index is not None and shape == (len(index),) else None,
         **{name: column.reshape(shape) for name, column in columns.items()},

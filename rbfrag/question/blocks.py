@@ -25,6 +25,7 @@ from rbfrag.question.shapes import (
     OF_A_SHAPE,
     SHAPES,
     SIDES_AND_PLANES,
+    SMALL_BLOCK,
     WAYS,
     ModeShapes,
     check_lengths,
@@ -118,7 +119,7 @@ class Blocks(NamedTuple):
     """
 
     groups: tuple[Group, ...]
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
     refused: tuple[Refused, ...] = ()
     unstable: tuple[Refused, ...] = ()
     kinds: NDArray[np.int8] | None = None
@@ -150,8 +151,8 @@ def numbers_in(columns: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def taken_as_medians(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return fields without standard deviations, and what is said where there are any.
+def taken_as_medians(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
+    """Return fields without standard deviations, and a warning where there are any.
 
     Args:
         given: fields of blocks, numbers or arrays.
@@ -161,10 +162,11 @@ def taken_as_medians(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[st
     others = {name: value for name, value in given.items() if name not in sigmas}
     if not stated:
         return others, ()
-    return others, (
-        f"{' and '.join(stated)} of the blocks are not integrated here: each block is taken as its "
-        "median (predict, survival and losses integrate)",
+    text = (
+        f"{' and '.join(stated)} of the blocks are not integrated here: each block is assumed to "
+        "be its median (predict, survival and losses integrate)"
     )
+    return others, (Diagnostic(text, "medians_assumed", fields=tuple(stated)),)
 
 
 def _listed_numbers(value: Any) -> list[float]:
@@ -192,7 +194,7 @@ class Shape(NamedTuple):
     block: Block
     planes: dict[str, Any]
     is_rectangle: bool
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
 
     def known(self) -> Shape:
         """Return the shape, or refuse one of which the friction is not known."""
@@ -250,8 +252,8 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     return Shape(block, {**planes, **stated, **bond}, is_rectangle, remarks)
 
 
-def sectioned(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return fields with planes in space as those of the section, and what is said of it."""
+def sectioned(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
+    """Return fields with planes in space as those of the section, and warnings about it."""
     if given.keys().isdisjoint(SPACE):
         return given, ()
     from rbfrag.question.sections import in_section
@@ -302,7 +304,7 @@ class _One:
     """Raises the first reason against a single block, with what is suspicious about its angles."""
 
     def __init__(self, suspicious: Collection[str] = ()) -> None:
-        self.remarks: list[str] = []
+        self.remarks: list[Diagnostic] = []
         self._suspicious = suspicious
 
     def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
@@ -314,12 +316,9 @@ class _One:
         if holds:
             raise _FailsAtRest(text.format(**values))
 
-    def remark(self, holds: Any, text: str, **values: Any) -> None:
-        if holds and values:
-            assert isinstance(text, Diagnostic)
-            text = text.replaced(text=text.format(**values))
+    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
         if holds:
-            self.remarks.append(text)
+            self.remarks.append(text.replaced(text=text.format(**values)) if values else text)
 
 
 _READ = frozenset((
@@ -328,15 +327,19 @@ _READ = frozenset((
 """Fields that shapes, models or the choice of one read."""
 
 
-def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """Return the fields that anything reads, and what is said of others."""
+def read_by_some(given: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
+    """Return the fields that a model or a shape uses, and warnings about others."""
     if given.keys() <= _READ:
         return given, ()
     from rbfrag.fragility.methods import methods
 
     blocks = [method.block for method in methods()]
     known = {*_READ, *(n for b in blocks for n in (*b.names, *b.options, *b.sigmas))}
-    remarks = (f"{name} is not read: no model asks for it" for name in given if name not in known)
+    remarks = (
+        Diagnostic(f"{name} is ignored: no model uses it", "unused_input", fields=(name,))
+        for name in given
+        if name not in known
+    )
     return {name: value for name, value in given.items() if name in known}, tuple(remarks)
 
 
@@ -368,7 +371,6 @@ def one_block(
             check_numbers(block.kind, block, given)
         return Blocks((Group(kind, given),), (*unread, *size_questions(given.get("p2"))))
     from rbfrag.solver.stability.first_slip import after_first_slip
-    from rbfrag.solver.stability.margins import warnings_about
     from rbfrag.solver.stability.single import judged, push_of
 
     if numbers := [name for name in NUMBERS if name in given]:
@@ -389,13 +391,13 @@ def one_block(
         planes["back_fracture"] = False
     before_slip = {name: planes[name] for name in planes if name != "phi_residual_deg"}
     finding, on, _ = judged(shape.block, **before_slip)
-    after: tuple[str, ...] = ()
+    listener = _One(shape.remarks)
     if finding.k > 0.0:
         planes, after = after_first_slip(shape.block, planes)
         if after:
+            listener.remarks += after
             finding, on, _ = judged(shape.block, **planes)
     push = push_of(shape.block, on)
-    listener = _One(shape.remarks)
     if planes.get("water_m") and push is None:
         listener.remarks.append(DRAINED_NOTE)
     facts = requested or kind_of_mode(finding.mode, back_fracture=backed)
@@ -405,29 +407,19 @@ def one_block(
         bool(planes.get("jrc")), push, pga_g,
     )  # fmt: skip
     limit_m = math.nan if displacement_m is None else displacement_m
+    across_m = 2.0 * shape.block.r3_m
+    if all(remark.code != "check_unit" for remark in shape.remarks):
+        listener.remark(across_m < LEAST_M, SMALL_BLOCK, value=across_m)
+        check_size(shape.block.p2, listener)
+    at_rest_reason = ""
     try:
         numbers_read = numbers_of_shape(facts, judged_shape, limit_m, others, listener)
     except _FailsAtRest as reason:
         if not at_rest:
             raise InputError("; ".join((str(reason), *shape.remarks)), fields=PLANES) from None
-        return Blocks(
-            (Group(facts.kind, {}),), (*off_section, *shape.remarks, *unread),
-            at_rest=str(reason),
-        )  # fmt: skip
-    remarks = [*off_section, *(() if taken else warnings_about(shape.block, finding))]
-    remarks += [*after, *listener.remarks]
-    remarks += [*shape.remarks, *unread]
-    across_m, size = 2.0 * shape.block.r3_m, _One()
-    check_size(shape.block.p2, size)
-    if across_m < LEAST_M:
-        size.remarks.append(
-            Diagnostic(f"Check the unit: the block measures {across_m:.2g} m", "check_unit")
-        )
-    if not any(isinstance(r, Diagnostic) and r.code == "check_unit" for r in shape.remarks):
-        remarks += size.remarks
-    if displacement_m is not None and "ky" not in numbers_read:
-        remarks.append(f"displacement_m is not read: the block is of kind {facts.kind}")
-    return Blocks((Group(facts.kind, numbers_read),), tuple(remarks))
+        numbers_read, at_rest_reason = {}, str(reason)
+    remarks = (*off_section, *listener.remarks, *shape.remarks, *unread)
+    return Blocks((Group(facts.kind, numbers_read),), remarks, at_rest=at_rest_reason)
 
 
 def requested_kind(kind: str | None, given: Collection[str]) -> KindFacts | None:

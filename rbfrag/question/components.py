@@ -75,10 +75,10 @@ class Component:
         # PGA is SA(0.01 s); Arias intensity grows with the square of the acceleration
         return float(self.spectral_ratio(0.01) ** AMPLIFIED.get(measure, 0))
 
-    def in_words(self, subject: str) -> str:
-        """Return what values are of, after "the curve is", for example."""
+    def in_words(self, subject: str) -> Diagnostic:
+        """Return the component of values, after "the curve is", for example."""
         if self.name == SINGLE_COMPONENT:
-            return f"{subject} of {self.title}, as the models are"
+            return Diagnostic(f"{subject} of {self.title}, as the models are", "single_component")
         return Diagnostic(
             f"{subject} of {self.title}, converted to a single component ({self.source})",
             "component_converted",

@@ -34,6 +34,7 @@ from rbfrag.question.shapes import (
     NO_MODEL,
     RECTANGLE,
     SHAPES,
+    SMALL_BLOCK,
     UNSTABLE_AT_REST,
     ModeShapes,
     check_lengths,
@@ -96,7 +97,7 @@ def many_blocks(
     """
     planes = given.keys() & set(SPACE)
     wrong: Mapping[int, str] = {}
-    notes: tuple[str, ...] = ()
+    notes: tuple[Diagnostic, ...] = ()
     if planes:
         from rbfrag.question.sections import in_sections
 
@@ -127,19 +128,13 @@ class _Some:
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         self._keep(self.whole.unstable, holds, text, values)
 
-    def remark(self, holds: Any, text: str, **values: Any) -> None:
+    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
         rows = np.flatnonzero(np.broadcast_to(holds, self.places.shape) & self._free())
         if not rows.size:
             return
-        # of several values the first is the example
         first = {n: np.broadcast_to(v, self.places.shape)[rows[0]] for n, v in values.items()}
-        about = text if isinstance(text, Diagnostic) else Diagnostic(text)
-        shown = about.format(**first) if values else str(about)
-        more = f" (and {rows.size - 1:,} more rows)" if values and rows.size > 1 else ""
-        places = self.places[rows]
-        if (before := self.whole.remarks.get(str(about))) is not None:
-            shown, more, places = str(before), "", np.concatenate([before.rows, places])
-        self.whole.remarks[str(about)] = about.replaced(text=shown + more, rows=places)
+        example = text.format(**first) if values else str(text)
+        self.whole.remarks.setdefault(text, (example, []))[1].append(self.places[rows])
 
     def _free(self) -> NDArray[np.bool_]:
         return self.whole.free[self.places]
@@ -175,7 +170,8 @@ class _Sorted:
         """Which blocks are sorted."""
         self.kinds = np.full(size, -1, dtype=np.int8)
         self.modes = np.full(size, -1, dtype=np.int8)
-        self.remarks: dict[str, Diagnostic] = {}
+        self.remarks: dict[Diagnostic, tuple[str, list[Places]]] = {}
+        """Warnings, each with its text for the first row of it and its rows."""
         self.read: set[str] = set()
 
     def blocks(
@@ -199,7 +195,9 @@ class _Sorted:
         if not self.done.all():
             self._sort_numbers(np.flatnonzero(~self.done))
         return Blocks(
-            tuple(self.groups), tuple(self.remarks.values()), tuple(self.refused),
+            tuple(self.groups),
+            tuple(_about_rows(warning, *rows) for warning, rows in self.remarks.items()),
+            tuple(self.refused),
             tuple(self.unstable), self.kinds, self.modes,
             frozenset(self.read),
         )  # fmt: skip
@@ -432,6 +430,8 @@ class _Sorted:
             fails = left & (judged_all.yield_acceleration <= 0.0)
             listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
             listener.remark(left, AFTER_SLIP)
+        if "jrc" in strength:
+            phi = judged_all.phi_deg
         codes = np.broadcast_to(judged_all.mode_code, (n,))
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
         k = np.broadcast_to(judged_all.yield_acceleration, (n,))
@@ -439,10 +439,11 @@ class _Sorted:
             listener.refuse(reasons == code, REASONS[code])
         self.modes[places] = codes
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
-        text = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
-        listener.remark(across_m < LEAST_M, text, value=across_m)
-        if not any(np.any(stated[name] > MOST_M) for name in LENGTHS if name in stated):
-            check_size(np.broadcast_to(blocks.p2, (n,)), listener)
+        listener.remark(across_m < LEAST_M, SMALL_BLOCK, value=across_m)
+        is_long = np.zeros(1, dtype=np.bool_)
+        for name in shape:
+            is_long = is_long | ((stated[name] > MOST_M) if name in LENGTHS else False)
+        check_size(np.where(is_long, np.nan, np.broadcast_to(blocks.p2, (n,))), listener)
         displacement = np.full(1, np.nan)
         if "displacement_m" in self.given:
             self.read.add("displacement_m")
@@ -507,6 +508,13 @@ def push_of_blocks(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m
         np.where(water > 0.0, each, 0.0) for each in (wet.along, wet.normal, wet.moment)
     )
     return along, normal, moment * h
+
+
+def _about_rows(warning: Diagnostic, example: str, parts: Sequence[Places]) -> Diagnostic:
+    """Return a warning about rows, with the values of the first."""
+    rows = np.concatenate(parts)
+    more = f" (and {rows.size - 1:,} more rows)" if example != warning and rows.size > 1 else ""
+    return warning.replaced(text=example + more, rows=rows)
 
 
 def _at(values: Any, places: Places) -> Any:

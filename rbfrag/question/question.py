@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 from rbfrag.errors import InputError, UnknownFieldError
 from rbfrag.fragility.lookup import find_model, unused_measures
 from rbfrag.fragility.measures import MEASURES, spectral
+from rbfrag.fragility.model import AT_REST
 from rbfrag.fragility.prediction import (
-    AT_REST,
     A,
     Prediction,
     answer_given,
@@ -423,7 +423,8 @@ def ask(
             given, unread = read_by_some(given)
             chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
             answer = answer_given(chosen, given, level, **how)
-            remarks = (*unread, *size_questions(given.get("p2")), *unused_measures(chosen, given))
+            size = size_questions(given.get("p2"), getattr(answer.probability, "shape", ()))
+            remarks = (*unread, *size, *unused_measures(chosen, given))
             return with_remarks(answer, remarks, _assumed(component, answer))
         if all(name in _SINGLE or is_single(value) for name, value in given.items()):
             blocks = described(given, kind)
@@ -451,7 +452,7 @@ def ask(
     return with_remarks(answer, (), _assumed(component, answer))
 
 
-def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[str, ...]:
+def _assumed(component: Any, answer: Prediction | PredictionArray) -> tuple[Diagnostic, ...]:
     """Return the note that a single component is assumed, where P depends on the shaking."""
     if component is not None:
         return ()

@@ -19,6 +19,7 @@ from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import INTENSITY
 
 SITE = ("rjb_km", "vs30_m_s")
@@ -31,9 +32,11 @@ _SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
 _RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 1500.0)}
 _MOST_OF_NORMAL = 7.0
 
-ANOTHER_MODEL = (
-    "the choice of ground-motion model moves P by a factor of up to 3: ask with the medians and "
-    "sigmas of another one, too (gmm), and average the probabilities, not the medians"
+ANOTHER_MODEL = Diagnostic(
+    "the choice of ground-motion model changes P by a factor of up to 3: predict with the medians "
+    "and sigmas of another one, too (gmm), and average the probabilities, not the medians",
+    "single_gmm",
+    fields=("gmm",),
 )
 
 
@@ -55,8 +58,8 @@ def shaken(
     model: Model | None = None,
     db: str | PathLike[str] | None = None,
     component: Any = None,
-) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a question that states measures and their scatter, and what is to be said of it.
+) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
+    """Return a question that gives measures and their dispersion, and warnings about it.
 
     Args:
         given: the question, in which magnitude, distance and ground may stand for measures.
@@ -69,7 +72,7 @@ def shaken(
         InputError: a scenario that is stated in part or beside measures, or out of range, or
             with a component, which is RotD50.
     """
-    question, remarks = dict(given), tuple[str, ...]()
+    question, remarks = dict(given), tuple[Diagnostic, ...]()
     if source != Source() or not question.keys().isdisjoint(SITE):
         if component is not None:
             raise InputError(

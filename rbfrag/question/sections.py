@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.question.shapes import SHAPES, WAYS
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.solver.block.planes import plane_of, section_of
 from rbfrag.vocabulary.quantities import SPACE
 
@@ -20,14 +21,14 @@ ANGLES = {"base": "beta_deg", "back": "gamma_deg"}
 _SPACINGS = ("s1_m", "s2_m")
 
 
-def in_section(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def in_section(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
     """Return the fields of one block with dip, gamma and spacings of the section.
 
     Args:
         given: fields, of which base, back and face are texts.
 
     Returns:
-        The fields without base, back and face, and what is to be said of the section.
+        The fields without base, back and face, and warnings about the section.
 
     Raises:
         InputError: a plane is missing, stated twice or cannot be read, or no section does.
@@ -63,7 +64,7 @@ def in_section(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...
 
 def in_sections(
     given: Mapping[str, Any], size: int
-) -> tuple[dict[str, NDArray[np.float64]], dict[int, str], tuple[str, ...]]:
+) -> tuple[dict[str, NDArray[np.float64]], dict[int, str], tuple[Diagnostic, ...]]:
     """Return the fields of many blocks likewise, and why blocks have no section, by their place.
 
     Args:
@@ -80,7 +81,7 @@ def in_sections(
         for name in touched
     }
     wrong: dict[int, str] = {}
-    notes: dict[str, int] = {}
+    notes: list[Diagnostic] = []
     shapes = [name for names in SHAPES for name in names if name in own]
     for i in range(size):
         planes = {name: text[i] for name, text in texts.items() if text[i]}
@@ -97,7 +98,5 @@ def in_sections(
             continue
         for name in touched:
             columns[name][i] = section.get(name, np.nan)
-        for text in remarks:
-            notes[text] = notes.get(text, 0) + 1
-    counted = (f"{text} ({count:,} of {size:,} blocks)" for text, count in notes.items())
-    return {**own, **columns}, wrong, tuple(counted)
+        notes += [warning.replaced(rows=(i,)) for warning in remarks]
+    return {**own, **columns}, wrong, diagnostics(notes)

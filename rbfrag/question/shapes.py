@@ -23,6 +23,7 @@ from rbfrag.solver.stability.joint import (
     NO_EFFECT_OF_COHESION,
     STAYS_UNDRAINED,
 )
+from rbfrag.solver.stability.margins import idealisations
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
@@ -121,10 +122,14 @@ TAKEN_NOT_TO_SLIP = Diagnostic(
     "friction_not_given",
 )
 
+_STANDS_FREE = Diagnostic(NOT_BACKED, "not_backed")
+
 _WEAKER = (
-    "the block does not stand alike on both corners: the answer is that of the symmetric block of "
-    "its weaker sense, {sense}; respond runs it as it stands"
+    "the block is not symmetric about the vertical: the answer is that of the symmetric block of "
+    "its weaker sense, {sense} (conservative); respond simulates the block itself"
 )
+
+_NOT_SLIDING = "displacement_m is ignored: the block is of kind {kind}"
 
 _INSTEAD = {
     "slide": "; with displacement_m, kind sliding tells how likely it slides so many metres",
@@ -151,8 +156,8 @@ class Listener(Protocol):
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
         """Say where blocks fail at rest; arguments as for `refuse`."""
 
-    def remark(self, holds: Any, text: str, **values: Any) -> None:
-        """Say what is to be known of the answer where it holds; the text may have values too."""
+    def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
+        """Warn of the answer where it holds; the text may have values too."""
 
 
 class ModeShapes(NamedTuple):
@@ -300,26 +305,31 @@ def check_size(p2: Any, listener: Listener) -> None:
     listener.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
 
 
-def size_questions(p2: Any) -> tuple[Diagnostic, ...]:
+def size_questions(p2: Any, shape: tuple[int, ...] = ()) -> tuple[Diagnostic, ...]:
     """Return the question about p² [1/s²] of blocks that are given by their numbers.
 
     Args:
         p2: a number, an array, or None.
+        shape: of the answer.
     """
+    rows: Any = ()
     if p2 is None or (isinstance(p2, int | float) and not 0.0 < p2 < LEAST_P2):
         return ()
     if not isinstance(p2, int | float):
         import numpy as np
 
-        values = np.asarray(p2, dtype=np.float64)
-        small = values[(values > 0.0) & (values < LEAST_P2)]
-        if not small.size:
+        values = np.broadcast_to(np.asarray(p2, dtype=np.float64), shape)
+        rows = np.flatnonzero((values > 0.0) & (values < LEAST_P2))
+        if not rows.size:
             return ()
-        p2 = float(small.flat[0])
-    return (Diagnostic(SMALL_P2.format(value=p2, size=15.0 / p2), "check_unit"),)
+        p2 = float(values.flat[rows[0]])
+    text = SMALL_P2.format(value=p2, size=15.0 / p2)
+    return (Diagnostic(text, "check_unit", rows=rows),)
 
 
 SMALL_P2 = "Check the unit: p² = {value:.3g} s⁻² is a block of {size:.0f} m"
+
+SMALL_BLOCK = Diagnostic("Check the unit: the block measures {value:.2g} m", "check_unit")
 
 
 def numbers_of_shape(
@@ -355,6 +365,13 @@ def numbers_of_shape(
         return {}
     listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
     listener.remark(judged.wet, UNDRAINED_NOTE)
+    single = isinstance(judged.body, Block)
+    functions: Elementwise[Any] = SCALAR if single else array_elementwise()
+    for holds, warning, values in idealisations(
+        judged.body, mode, k, judged.beta_deg, judged.phi_deg, judged.phi_back_deg,
+        False if facts.free_standing else judged.backed, functions,
+    ):  # fmt: skip
+        listener.remark(holds & (judged.taken ^ True), warning, **values)
     if mode == "topple" and not facts.free_standing:
         listener.remark(judged.bonded, COHESION_NOTE)
     if slips_on_base(facts):
@@ -366,14 +383,16 @@ def numbers_of_shape(
         listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
         dip_deg = dip_of_factor(judged)
         return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **stated}
-    single = isinstance(judged.body, Block)
-    functions: Elementwise[Any] = SCALAR if single else array_elementwise()
+    ignored = Diagnostic(
+        _NOT_SLIDING.format(kind=facts.kind), "unused_input", fields=("displacement_m",)
+    )
+    listener.remark(displacement_m == displacement_m, ignored)
     if facts.search_needs == "block":  # shape, friction and dip decide how it moves
         p2 = p2_at_rest(judged, functions)
         listener.refuse(p2 != p2, NO_UNIQUE_MOTION)
         return {**dict(zip(facts.parameters, (k, p2), strict=True)), **stated}
     listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
-    listener.remark((judged.backed ^ True) & stands_free_of(facts, False), NOT_BACKED)
+    listener.remark((judged.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
     if not facts.free_standing:
         return {"p2": judged.body.p2, "kr": k, **stated}
     body = judged.body
@@ -388,8 +407,9 @@ def numbers_of_shape(
     weaker = forward <= backward
     kr = functions.where(weaker, forward, backward)
     uneven = abs(forward - backward) > 1e-6 * (1.0 + forward * backward) * abs(forward)
-    listener.remark(uneven & weaker, _WEAKER.format(sense="forward"))
-    listener.remark(uneven & (weaker ^ True), _WEAKER.format(sense="backward"))
+    for holds, sense in ((weaker, "forward"), (weaker ^ True, "backward")):
+        text = Diagnostic(_WEAKER.format(sense=sense), "not_symmetric")
+        listener.remark(uneven & holds, text)
     restitution = stated.get("restitution", own)
     restitution = functions.where(restitution == restitution, restitution, own)
     return {**stated, "p2": p2, "kr": kr, "restitution": restitution}

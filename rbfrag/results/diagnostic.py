@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Rows: TypeAlias = "Sequence[int] | NDArray[np.intp]"
 
 ROWS_LISTED = 1_000
 """Most rows of a warning that a document lists."""
@@ -11,12 +17,15 @@ ROWS_LISTED = 1_000
 NOTE, WARNING = SEVERITIES = ("note", "warning")
 
 CODES: Mapping[str, tuple[str, str]] = {
+    "after_first_slip": (NOTE, "the answer is that of the block after its first slip"),
+    "at_limit": (WARNING, "the block is at the limit of stability"),
     "back_friction_neglected": (NOTE, "friction on the back face is neglected (conservative)"),
     "by_mechanics": (NOTE, "mechanics decides in place of the fitted model"),
     "check_unit": (WARNING, "a value that is seldom meant: another unit may have been typed"),
     "cohesion_not_given": (NOTE, "rows without cohesion in a table that gives it elsewhere"),
     "cohesion_without_effect": (NOTE, "cohesion does not act on a base that opens"),
     "component_converted": (NOTE, "measures or a curve converted to a single component"),
+    "cross_tilt_neglected": (NOTE, "a flat plane is tilted across the section"),
     "curve_ends": (WARNING, "the hazard curve ends before the fragility does"),
     "decimal_comma": (NOTE, "a number with a decimal comma was understood"),
     "density_assumed": (NOTE, "the density of the rock is assumed"),
@@ -25,30 +34,45 @@ CODES: Mapping[str, tuple[str, str]] = {
     "example_skipped": (NOTE, "the example of the template was skipped"),
     "extrapolation": (WARNING, "block or shaking outside the fitted range"),
     "fit": (NOTE, "data that a fit leaves out, or estimates that are uncertain"),
+    "flat_back_plane": (WARNING, "the back plane is flatter than the base"),
     "friction_not_given": (NOTE, "the friction angle is assumed to prevent sliding"),
     "heel_tips": (WARNING, "pulses into the slope tip a sliding block (unconservative)"),
     "ignored_columns": (WARNING, "columns of a table that the answer does not depend on"),
     "incomplete_map": (WARNING, "a ShakeMap without all of its nodes or values"),
+    "leans_on_back_plane": (NOTE, "a sliding block leans on its back plane at rest"),
+    "locked": (NOTE, "no horizontal acceleration moves the block in its mode"),
+    "medians_assumed": (NOTE, "uncertain blocks are assumed to be their medians"),
     "model_choice": (NOTE, "the measures do not suffice for a better model"),
     "model_not_stored": (NOTE, "a fit of the built-in data set is not stored"),
     "no_drained_bound": (NOTE, "the question without water has no answer"),
+    "no_prediction_interval": (NOTE, "the prediction interval for one earthquake is unknown"),
     "no_shaking": (NOTE, "P = 0 without shaking"),
+    "not_backed": (WARNING, "a free-standing block is predicted as if backed (unconservative)"),
+    "not_symmetric": (NOTE, "the symmetric block of the weaker sense is predicted (conservative)"),
     "note": (NOTE, "any other note; its text says all"),
-    "rows_rejected": (WARNING, "rows of a table that have no answer"),
+    "oblique_planes": (WARNING, "base and back are oblique to each other"),
+    "prestress_neglected": (NOTE, "pre-stress of a wedged heel is neglected (conservative)"),
     "rotd50_component": (NOTE, "the measures are assumed to be RotD50"),
+    "rough_back_plane": (NOTE, "friction of a rough back plane is neglected (conservative)"),
+    "rows_rejected": (WARNING, "rows of a table that have no answer"),
     "shaking_certain": (NOTE, "the uncertainty of the shaking is not given, and not integrated"),
     "single_component": (NOTE, "the measures are assumed to be of a single component"),
+    "single_gmm": (NOTE, "the scenario is predicted with one ground-motion model"),
     "site_join": (NOTE, "the sites at which the blocks stand"),
+    "steep_base": (WARNING, "the base is steeper than the face"),
     "suspicious_value": (WARNING, "a value outside its credible range"),
     "synthetic_data": (WARNING, "the model is fitted to synthetic pulses, not to earthquakes"),
     "table_layout": (NOTE, "how the layout of a table was understood"),
+    "toe_lifts": (WARNING, "the toe lifts off a strong bond: the yield is an upper bound"),
     "toe_slips": (WARNING, "the toe of a toppling block slips"),
     "undrained": (NOTE, "water pressure keeps acting while the block moves (conservative)"),
     "unit_assumed": (NOTE, "a field of a file has no unit"),
     "unit_converted": (NOTE, "a column was converted to the unit of its field"),
     "unstable_at_rest": (WARNING, "the block fails without an earthquake"),
+    "unused_input": (NOTE, "an input that the answer does not depend on"),
     "unused_measures": (NOTE, "intensity measures that the model does not use"),
     "water_not_given": (NOTE, "rows without water in a table that gives it elsewhere"),
+    "weak_predictors": (NOTE, "another intensity measure or magnitude would predict better"),
 }
 """Severity and meaning of each code."""
 
@@ -65,7 +89,7 @@ class Diagnostic(str):
 
     code: str
     fields: tuple[str, ...]
-    rows: Sequence[int]
+    rows: Rows
 
     def __new__(
         cls,
@@ -73,7 +97,7 @@ class Diagnostic(str):
         code: str = "note",
         *,
         fields: tuple[str, ...] = (),
-        rows: Sequence[int] = (),
+        rows: Rows = (),
     ) -> Diagnostic:
         """Return a warning with its code."""
         assert code in CODES, code
@@ -92,9 +116,22 @@ class Diagnostic(str):
 
 
 def diagnostics(*groups: Iterable[str]) -> tuple[Diagnostic, ...]:
-    """Return the warnings of an answer, each text once: what every writer shows."""
-    texts = dict.fromkeys(text for group in groups for text in group)
-    return tuple(t if isinstance(t, Diagnostic) else Diagnostic(t) for t in texts)
+    """Return the warnings of an answer, each text once and with all of its rows."""
+    by_text: dict[str, list[Diagnostic]] = {}
+    for group in groups:
+        for text in group:
+            warning = text if isinstance(text, Diagnostic) else Diagnostic(text)
+            by_text.setdefault(warning, []).append(warning)
+    return tuple(_merged(warnings) for warnings in by_text.values())
+
+
+def _merged(warnings: Sequence[Diagnostic]) -> Diagnostic:
+    first, parts = warnings[0], [warning.rows for warning in warnings]
+    if len(parts) == 1 or not all(map(len, parts)):  # about all rows
+        return min(warnings, key=lambda warning: len(warning.rows))
+    import numpy as np
+
+    return first.replaced(rows=np.concatenate(parts))
 
 
 def as_documents(warnings: Iterable[str]) -> list[dict[str, Any]]:
@@ -125,11 +162,33 @@ def codes_by_row(warnings: Iterable[str], size: int) -> Any:
     """Return the codes of the warnings about single rows, an array of texts of shape (size,)."""
     import numpy as np
 
-    texts = np.full(size, "", dtype=object)
+    rows_by_code: dict[str, list[Any]] = {}
     for warning in diagnostics(warnings):
-        rows = np.unique(np.asarray(warning.rows, dtype=np.intp))
-        texts[rows] = [
-            text if warning.code in text.split() else f"{text} {warning.code}".strip()
-            for text in texts[rows].tolist()
-        ]
-    return texts
+        if len(warning.rows):
+            rows_by_code.setdefault(warning.code, []).append(warning.rows)
+    return texts_by_row(
+        ((code, np.concatenate(rows)) for code, rows in rows_by_code.items()), size, " "
+    )
+
+
+def texts_by_row(texts: Iterable[tuple[str, Any]], size: int, separator: str) -> Any:
+    """Return the texts that hold for each row, joined, an array of texts of shape (size,).
+
+    Args:
+        texts: up to 64 texts with the rows that they hold for, as indices or as a mask.
+        size: number of rows.
+        separator: text between two of them.
+    """
+    import numpy as np
+
+    # one bit per text, so that a million rows cost little
+    words: list[str] = []
+    bits = np.zeros(size, dtype=np.uint64)
+    for text, rows in texts:
+        bits[rows] |= np.uint64(1 << len(words))
+        words.append(text)
+    sets, index = np.unique(bits, return_inverse=True)
+    lines = np.empty(sets.shape, dtype=object)
+    for i, bit_set in enumerate(sets.tolist()):
+        lines[i] = separator.join(word for k, word in enumerate(words) if bit_set >> k & 1)
+    return lines[index]

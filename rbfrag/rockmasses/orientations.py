@@ -141,7 +141,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
             planes[name] = plane_of(value, f"{name}.plane")
     face = planes["face"]
     section = section_of(face, planes["base"], planes["back"])
-    notes = [*section.remarks]
+    notes: list[str] = [*section.remarks]
     assert section.gamma_deg is not None
     dips = {"base": section.beta_deg, "back": section.beta_deg + section.gamma_deg}
     factors = {"base": section.base_factor, "back": section.back_factor}

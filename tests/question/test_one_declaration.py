@@ -105,7 +105,7 @@ def test_python_and_requests_know_it(copied: Path) -> None:
     answer = json.loads(run(copied, "-c", ASKED).partition("\n")[0])  # the service logs below
     assert answer["same"]
     for warnings in answer["warnings"]:
-        assert "hardness is not read: no model asks for it" in warnings
+        assert "hardness is ignored: no model uses it" in warnings
     assert answer["schema"].count("Rebound hardness of the rock [MPa].") >= 2  # GET and POST
     assert "``hardness``: Rebound hardness of the rock [MPa]." in answer["help"]
     field, measure = (answer["vocabulary"][name] for name in ("hardness", "csi_g"))
@@ -123,7 +123,7 @@ def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
         copied, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6",
         "--hardness", "40",
     )  # fmt: skip
-    assert "not read: no model asks for it" in told
+    assert "ignored: no model uses it" in told
     (copied / "blocks.csv").write_text("p2,kr,PGV [cm/s],Rebound [MPa]\n3,0.1,60,40\n")
     told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "blocks.csv")
     assert "column ignored: Rebound [MPa]" in told

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import rbfrag
 from rbfrag.results.diagnostic import CODES, SEVERITIES, Diagnostic, with_diagnostics
 from tests.cli.conftest import Shell, shell
 from tests.conftest import ROOT
@@ -69,15 +68,3 @@ def test_documents_have_a_diagnostic_for_each_warning(shell: Shell, tmp_path: Pa
 def test_a_document_without_warnings_is_left_as_it_is() -> None:
     assert with_diagnostics({"a": 1}) == {"a": 1}
     assert with_diagnostics([1.0, {"warnings": []}]) == [1.0, {"warnings": [], "diagnostics": []}]
-
-
-def test_scalars_and_arrays_of_one_block_have_the_same_codes() -> None:
-    block = {"height_m": 2.0, "width_m": 0.4, "beta_deg": 3.0, "phi_deg": 38.0, "pgv_m_s": 0.5}
-    for further in ({}, {"water_m": 0.5}, {"pga_g": 1.5, "cohesion_pa": 1e4}, {"tm_s": 0.5}):
-        one = rbfrag.predict(**block, **further)
-        several = rbfrag.predict(**{**block, "height_m": [2.0, 2.0]}, **further)
-        own, codes = (
-            {text.code for text in texts if isinstance(text, Diagnostic)} - {"note"}
-            for texts in (one.warnings, several.warnings)  # type: ignore[attr-defined]
-        )
-        assert own - codes <= {"back_friction_neglected"}, further

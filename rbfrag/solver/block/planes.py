@@ -12,6 +12,7 @@ import re
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.results.diagnostic import Diagnostic
 
 STRIKE_DEG = 20.0
 """Planes that strike further off the face are no planes of the section [deg]."""
@@ -139,7 +140,7 @@ class Section(NamedTuple):
     gamma_deg: float | None
     base_factor: float
     back_factor: float
-    remarks: tuple[str, ...]
+    remarks: tuple[Diagnostic, ...]
 
 
 def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
@@ -150,7 +151,7 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
             all but parallel, or the back lies before the base.
     """
     azimuth = face.direction_deg
-    remarks: list[str] = []
+    remarks: list[Diagnostic] = []
     named = {"base": base} | ({} if back is None else {"back": back})
     line = None if back is None or _between_deg(base, back) < 1e-6 else line_of(base, back)
     for name, plane in named.items():
@@ -159,10 +160,11 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
             continue
         tilt = plane.cross_tilt_deg(azimuth)
         if plane.is_exempt(azimuth):
-            remarks.append(
+            text = (
                 f"the {name} {plane} strikes {off:.0f} deg off the face and is flat: its "
-                f"cross-tilt of {abs(tilt):.1f} deg is left out"
+                f"cross-tilt of {abs(tilt):.1f} deg is neglected"
             )
+            remarks.append(Diagnostic(text, "cross_tilt_neglected"))
             continue
         raise InputError(
             f"the {name} {plane} strikes {off:.0f} deg off the face {face}, and a section is good "
@@ -173,10 +175,11 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
     if abs(beta) >= 90.0:
         raise InputError(f"the base {base} is upright in the section", fields=("base",))
     if 0.0 < face.trace_deg(azimuth) < beta:
-        remarks.append(
+        text = (
             f"the base dips by {beta:.1f} deg, steeper than the face {face}: it does not come out "
             "of the slope"
         )
+        remarks.append(Diagnostic(text, "steep_base"))
     if back is None:
         return Section(beta, None, base.spacing_factor(azimuth), 1.0, tuple(remarks))
     if (between := _between_deg(base, back)) < _APART_DEG:
@@ -195,10 +198,11 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
     assert line is not None
     apart, flat = base.strikes_off_deg(back), base.is_exempt(azimuth)
     if line[0] > _PLUNGE_DEG or (apart > STRIKE_DEG and not flat):
-        remarks.append(
+        text = (
             f"base and back strike {apart:.0f} deg apart, and their line plunges {line[0]:.1f} deg "
             f"toward {line[1]:03.0f}: the block may leave the section sideways"
         )
+        remarks.append(Diagnostic(text, "oblique_planes"))
     return Section(
         beta, gamma, base.spacing_factor(azimuth), back.spacing_factor(azimuth), tuple(remarks)
     )

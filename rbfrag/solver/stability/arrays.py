@@ -83,6 +83,8 @@ class StabilityArray(Tabular):
             :data:`rbfrag.solver.block.arrays.REASONS`.
         toe_lifts: where the bond of the base is so strong that the toe lifts off before it
             slides, so that the yield is an upper bound.
+        phi_deg: friction angles of the bases, of rough ones the secant angles at their yields
+            [deg].
     """
 
     mode_code: CodeArray
@@ -92,6 +94,7 @@ class StabilityArray(Tabular):
     p2: FloatArray
     reason_code: CodeArray
     toe_lifts: NDArray[np.bool_]
+    phi_deg: FloatArray
 
     @property
     def mode(self) -> NDArray[np.str_]:
@@ -190,6 +193,7 @@ def stability_arrays(
             t1, t3, h = (np.where(ok, value, math.nan) for value in (t1, t3, h))
             there = {name: np.where(ok, value, 0.0) for name, value in there.items()}
         bond = water = None
+        secant_deg = there["phi_deg"]
         if "cohesion_pa" in there:
             base = h * t3 - h * t1
             bond = np.asarray(
@@ -214,7 +218,7 @@ def stability_arrays(
             length = np.maximum(np.where(np.asarray(length) > 0.0, length, base), LAB_M)
             weight = there["density_kg_m3"] * STANDARD_GRAVITY_M_S2 * 2.0 * h
             rough = roughness_at(there["jrc"], there["jcs_mpa"], length, weight, np.power)
-            planes, *_ = roughened(planes, rough, there["phi_deg"])
+            planes, secant_deg, _ = roughened(planes, rough, there["phi_deg"])
         mode, k, ky, lifts, floats = _yields(t1, t3, planes, back_fracture)
         reason[(reason == 0) & floats] = FLOATS
         state = state_code(k, planes.functions)
@@ -224,17 +228,17 @@ def stability_arrays(
             mode, state = np.where(ok, mode, NOTHING), np.where(ok, state, NOTHING)
             k, ky, p2 = (np.where(ok, value, math.nan) for value in (k, ky, p2))
             lifts = lifts & ok
-        return mode, state, k, ky, p2, reason, lifts
+        return mode, state, k, ky, p2, reason, lifts, secant_deg
 
     codes = [np.empty(shape, dtype=np.int8) for _ in range(3)]
-    k, ky, p2 = (np.empty(shape) for _ in range(3))
+    k, ky, p2, secant_deg = (np.empty(shape) for _ in range(4))
     lifts = np.empty(shape, dtype=np.bool_)
     whole = (blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, blocks.reason_code)
     inputs: list[Any] = [np.broadcast_to(array, shape) for array in whole]
     inputs += [arrays[name] for name in given]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2], lifts))
-    result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2], lifts)
+        in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2], lifts, secant_deg))
+    result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2], lifts, secant_deg)
     if nan == "raise" and result.reason_code.any():
         first = np.flatnonzero(result.reason_code.ravel())[0]
         place = tuple(int(i) for i in np.unravel_index(first, shape))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.stability.modes import words_of_mode
 
@@ -34,10 +35,12 @@ SLIPS_ON = (
     "it fails where the motion exceeds that yield, and no model is needed"
 )
 
-AFTER_SLIP = (
+AFTER_SLIP = Diagnostic(
     "the answer is that of the block after its first slip, without bond or roughness, on "
     "phi_residual_deg; before it the yield of the block is another one (rbfrag block prints it), "
-    "and a motion below that does nothing"
+    "and a motion below that does nothing",
+    "after_first_slip",
+    fields=("phi_residual_deg",),
 )
 
 
@@ -48,7 +51,7 @@ def slips_on_base(facts: KindFacts) -> bool:
 
 def after_first_slip(
     block: Block, planes: Mapping[str, Any]
-) -> tuple[dict[str, Any], tuple[str, ...]]:
+) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
     """Return planes as what follows the first slip sees them, and what is to be said of them.
 
     Args:

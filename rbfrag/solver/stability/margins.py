@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.block.formulas import SCALAR
+from rbfrag.solver.block.formulas import SCALAR, Elementwise
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import (
     AT_LIMIT,
@@ -19,6 +19,9 @@ from rbfrag.solver.stability.modes import (
     mode_code,
     mode_code_without_back,
 )
+
+if TYPE_CHECKING:
+    from rbfrag.solver.block.arrays import BlockArray
 
 Variable = Literal["phi", "alpha1", "alpha3"]
 
@@ -143,65 +146,114 @@ class MarginFacts:
     lifts: bool
 
 
-def warnings_about(block: Block, finding: MarginFacts) -> tuple[str, ...]:
-    """Return one sentence for everything that the answer takes for granted."""
-    return tuple(_sentences(block, finding))
+_ROUNDING_DEG = 1e-9
+"""Angles of single blocks and of arrays may differ by rounding; their warnings may not [deg]."""
+
+_LIMIT = Diagnostic(
+    "the block is stable at its limit: its yield acceleration is zero to rounding",
+    "at_limit",
+)
+_WEDGED = Diagnostic(
+    "gamma + phi + phi_back = {corner:.6g} degrees exceeds 180: pre-stress of a heel wedged "
+    "between the planes, which could hold the block at any acceleration, is neglected "
+    "(conservative)",
+    "prestress_neglected",
+)
+_BACK_FRICTION = Diagnostic(
+    "friction on the back face is neglected (conservative)", "back_friction_neglected"
+)
+_LEANS = Diagnostic(
+    "at rest the block leans on the back plane (beta is below alpha1): after sliding it falls "
+    "back, its angles grow, and it may become a slump",
+    "leans_on_back_plane",
+)
+_ROUGH_BACK = Diagnostic(
+    "phi_back = {phi_back:.6g} degrees exceeds phi + gamma: friction on a back plane so much "
+    "rougher than the base could hold the block beyond this acceleration (conservative)",
+    "rough_back_plane",
+)
+_FLAT_BACK = Diagnostic(
+    "the back plane dips {steepness:.6g} degrees, less than the base: the base must be the set "
+    "nearer to horizontal",
+    "flat_back_plane",
+)
 
 
-def _sentences(block: Block, finding: MarginFacts) -> Iterator[str]:
-    if abs(finding.k) <= AT_LIMIT:
-        yield "the block is stable at its limit: its yield acceleration is zero to rounding"
+def warnings_about(block: Block, finding: MarginFacts) -> tuple[Diagnostic, ...]:
+    """Return the warnings about a block and its planes."""
+    return tuple(_warnings(block, finding))
+
+
+def _warnings(block: Block, finding: MarginFacts) -> Iterator[Diagnostic]:
     if finding.backward:
-        yield (
+        yield Diagnostic(
             f"nothing supports the block from behind and its weight passes upslope of the heel "
             f"(beta = {finding.beta_deg:.6g} is below alpha1 = {block.alpha1_deg:.6g} degrees): it "
-            "turns back about the heel at rest"
+            "turns back about the heel at rest",
+            "unstable_at_rest",
         )
     elif finding.untenable:
-        yield "the reaction at the back contact cannot hold the block, which turns back at rest"
-    elif finding.state == "unstable":
-        yield "the block fails at rest: its yield acceleration is negative"
-    if finding.state == "locked":
-        yield "the block is wedged: no horizontal acceleration moves it in this mode"
-    if finding.lifts:
-        yield (
-            "the bond of the base is so strong that the toe lifts off before it slides: the "
-            "acceleration given is an upper bound"
-        )
-    if finding.back_fracture:
-        yield from _about_back_plane(block, finding)
-
-
-def _about_back_plane(block: Block, finding: MarginFacts) -> Iterator[str]:
-    corner = block.gamma_deg + finding.phi_deg + finding.phi_back_deg
-    if finding.mode in ("slide", "confined_topple") and corner > 180.0:
-        yield (
-            f"gamma + phi + phi_back = {corner:.6g} degrees exceeds 180: a heel wedged between the "
-            "planes could hold the block at any acceleration; the answer takes the back plane to "
-            "be free of pre-stress"
-        )
-    if finding.mode == "topple" and block.gamma_deg + finding.phi_back_deg > 90.0:
         yield Diagnostic(
-            "friction on the back face is neglected (conservative)",
-            "back_friction_neglected",
+            "the reaction at the back contact cannot hold the block, which turns back at rest",
+            "unstable_at_rest",
         )
-    if finding.mode == "slide" and finding.beta_deg < block.alpha1_deg:
-        yield (
-            "at rest the block leans on the back plane (beta is below alpha1): after sliding it "
-            "falls back, its angles grow, and it may become a slump"
+    elif finding.state == "unstable":
+        yield Diagnostic(
+            "the block fails at rest: its yield acceleration is negative", "unstable_at_rest"
         )
-    if (
-        finding.mode in ("slide", "slump")
-        and finding.phi_back_deg > finding.phi_deg + block.gamma_deg
-    ):
-        yield (
-            f"phi_back = {finding.phi_back_deg:.6g} degrees exceeds phi + gamma: friction on a "
-            "back plane so much rougher than the base could hold the block beyond this acceleration"
+    if finding.state == "locked":
+        yield Diagnostic(
+            "the block is wedged: no horizontal acceleration moves it in this mode", "locked"
         )
-    dip = math.fmod(block.gamma_deg + finding.beta_deg, 180.0)
-    steepness = min(abs(dip), 180.0 - abs(dip))
-    if steepness < abs(finding.beta_deg):
-        yield (
-            f"the back plane dips {steepness:.6g} degrees, less than the base: the base must be "
-            "the set nearer to horizontal"
+    if finding.lifts:
+        yield Diagnostic(
+            "the bond of the base is so strong that the toe lifts off before it slides: the "
+            "acceleration given is an upper bound",
+            "toe_lifts",
         )
+    for holds, warning, values in idealisations(
+        block, finding.mode, finding.k, finding.beta_deg, finding.phi_deg, finding.phi_back_deg,
+        finding.back_fracture, SCALAR,
+    ):  # fmt: skip
+        if holds:
+            yield warning.replaced(text=warning.format(**values))
+
+
+def idealisations(
+    block: Block | BlockArray,
+    mode: ModeName,
+    k: Any,
+    beta_deg: Any,
+    phi_deg: Any,
+    phi_back_deg: Any,
+    backed: Any,
+    functions: Elementwise[Any],
+) -> Iterator[tuple[Any, Diagnostic, dict[str, Any]]]:
+    """Yield where a warning about the planes holds, its text with values in braces, and these.
+
+    Args:
+        block: a block, or several of one mode.
+        mode: failure mode.
+        k: yield acceleration [g].
+        beta_deg: dip of the base [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg].
+        backed: whether, or behind which of them, a plane is.
+        functions: for numbers or arrays.
+    """
+    gamma_deg = block.gamma_deg
+    yield abs(k) <= AT_LIMIT, _LIMIT, {}
+    if mode in ("slide", "confined_topple"):
+        corner = gamma_deg + phi_deg + phi_back_deg
+        yield (corner > 180.0 + _ROUNDING_DEG) & backed, _WEDGED, {"corner": corner}
+    if mode == "topple":
+        yield (gamma_deg + phi_back_deg > 90.0 + _ROUNDING_DEG) & backed, _BACK_FRICTION, {}
+    if mode == "slide":
+        yield (beta_deg < block.alpha1_deg - _ROUNDING_DEG) & backed, _LEANS, {}
+    if mode in ("slide", "slump"):
+        holds = phi_back_deg > phi_deg + gamma_deg + _ROUNDING_DEG
+        yield holds & backed, _ROUGH_BACK, {"phi_back": phi_back_deg}
+    dip = abs(gamma_deg + beta_deg) % 180.0
+    steepness = functions.where(dip < 90.0, dip, 180.0 - dip)
+    holds = steepness < abs(beta_deg) - _ROUNDING_DEG
+    yield holds & backed, _FLAT_BACK, {"steepness": steepness}
