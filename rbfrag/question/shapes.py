@@ -318,11 +318,13 @@ def size_questions(p2: Any, shape: tuple[int, ...] = ()) -> tuple[Diagnostic, ..
     if not isinstance(p2, int | float):
         import numpy as np
 
-        values = np.broadcast_to(np.asarray(p2, dtype=np.float64), shape)
-        rows = np.flatnonzero((values > 0.0) & (values < LEAST_P2))
-        if not rows.size:
+        values = np.asarray(p2, dtype=np.float64)
+        values = np.broadcast_to(values, shape or values.shape)  # draws have one answer
+        small = np.flatnonzero((values > 0.0) & (values < LEAST_P2))
+        if not small.size:
             return ()
-        p2 = float(values.flat[rows[0]])
+        p2 = float(values.flat[small[0]])
+        rows = small if shape else ()
     text = SMALL_P2.format(value=p2, size=15.0 / p2)
     return (Diagnostic(text, "check_unit", rows=rows),)
 

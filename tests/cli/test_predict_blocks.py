@@ -36,6 +36,9 @@ def book(shell: Shell, tmp_path: Path) -> Path:
     return tmp_path
 
 
+BACK_FRICTION = "friction on the back face is neglected (conservative)"
+
+
 def of_one(shell: Shell, height: str, width: str, dip: str) -> Any:
     return shell.json(
         "predict", "--height", height, "--width", width, "--dip", dip, "--phi", "35", "--pgv", ".6"
@@ -52,6 +55,7 @@ def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -
             assert row[name] == pytest.approx(alone[name], rel=1e-12)
         assert (row["kind"], row["mode"], row["reason"]) == ("toppling", "topple", "")
     assert found["warnings"] == [
+        BACK_FRICTION,
         "the names of the columns are in row 4: the lines above are ignored",
         "column 5 without a name is ignored and not written",
         "column Width [cm]: converted from cm to m",
@@ -118,12 +122,13 @@ def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> 
     name = f"blocks.{suffix}"
     assert f"predict --blocks {name}" in shell("block", "--template", name).stdout
     untouched = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
-    assert untouched["warnings"] == ["the only row is 'example' of the template"]
+    assert untouched["warnings"] == [BACK_FRICTION, "the only row is 'example' of the template"]
     add_row(Path(name))
     found = shell.json("predict", "--blocks", name, "--pgv", "0.6", "--component", "single")
     (row,) = found["blocks"]
     # nothing is said of columns that are empty
-    assert found["warnings"] == ["the row 'example' of the template is skipped"]
+    skipped = "the row 'example' of the template is skipped"
+    assert found["warnings"] == [BACK_FRICTION, skipped]
     alone = of_one(shell, "2.4", "0.5", "3")
     assert row["block_id"] == "A1"
     assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)
