@@ -213,7 +213,7 @@ def predict_table(
     chosen: dict[str, dict[str, None]]
     chosen = {name: {} for name in ("kind", "model", "term", "method", "read")}
     notes: list[str] = []
-    by_row: dict[str, Diagnostic] = {}
+    by_row: list[Diagnostic] = []
     texts = (*TEXTS, *SHAKING_TEXTS)
     with (
         opened_table(origin, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table,
@@ -230,7 +230,7 @@ def predict_table(
             write = _written(table, columns, partial, stack, formulas, notes, excel_text=excel_text)
         for part in table.parts:
             predicted, answer, count = _answer(table, part, given, kind, question, empty)
-            _gather(by_row, predicted.warnings, int(counts[0]))
+            by_row += _in_table(predicted.warnings, int(counts[0]))
             write(part, answer)
             for name, words in chosen.items():
                 own = getattr(predicted, name)
@@ -255,7 +255,7 @@ def predict_table(
         missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
         notes += diagnostics(
             remarks,
-            by_row.values(),
+            by_row,
             table.warnings(used - {"weight", "loss", "loss_sigma"}),
             missing,
             formulas,
@@ -275,12 +275,12 @@ def predict_table(
     )
 
 
-def _gather(by_row: dict[str, Diagnostic], warnings: Sequence[str], start: int) -> None:
-    """Enter the warnings of a part of a table, whose first row is `start`."""
-    for warning in diagnostics(warnings):
-        rows = [int(row) + start for row in warning.rows]
-        before = by_row.get(warning)
-        by_row[str(warning)] = warning.replaced(rows=[*(before.rows if before else ()), *rows])
+def _in_table(warnings: Sequence[str], start: int) -> list[Diagnostic]:
+    """Return the warnings of a part of a table, whose first row is `start`, with its rows."""
+    return [
+        warning.replaced(rows=np.asarray(warning.rows, dtype=np.intp) + start)
+        for warning in diagnostics(warnings)
+    ]
 
 
 def _total_failures(
