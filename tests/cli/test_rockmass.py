@@ -135,7 +135,11 @@ def test_the_table_holds_the_blocks_with_their_answers(
     shell: Shell, steep: Path, tmp_path: Path, kind: str
 ) -> None:
     out = tmp_path / f"blocks.{kind}"
-    shell("rockmass", steep, "--pgv", "1.0", "--out", out, "--plot", tmp_path / "a.svg")
+    asked = ("--pgv", "1.0", "--out", out, "--plot", tmp_path / "a.svg")
+    warnings = shell.json("rockmass", steep, *asked)["warnings"]
+    if kind == "csv":
+        notes = json.loads(Path(f"{out}-metadata.json").read_text("utf-8"))["notes"]
+        assert [note["text"] for note in notes] == warnings
     made = read_rock_mass(steep).realise()
     names = ("block_id", "p2_1_s2", "kr", "weight", "pgv_m_s", "probability")
     columns = read_columns(out, names)

@@ -176,7 +176,8 @@ def rockmass(
     document = answer.as_dict()
     document["warnings"] += about
     if files.out is not None:
-        write_table(answer.table_columns(), files.out, excel_text=files.excel_text)
+        table, notes = answer.table_columns(), document["warnings"]
+        write_table(table, files.out, excel_text=files.excel_text, notes=notes)
     if files.plot is not None:
         from rbfrag.plots.plot import rockmass as draw
 
