@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.hazards import between_measures
-from rbfrag.results.numbers import confidence, count_of, interval, percent, return_period, rounded
+from rbfrag.results.numbers import count_of, percent, return_period, rounded
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer
-    from rbfrag.hazards.survival import SurvivalAnswer
 
 
 def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -19,49 +18,6 @@ def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
         name: float(f"{value:.3g}") if isinstance(value, float) else value
         for name, value in values.items()
     }
-
-
-def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
-    """Yield how likely the blocks are still standing, and what that says of the hazard curve."""
-    who = "" if answer.blocks == 1 else f"all {answer.blocks} blocks "
-    sd = f" ± {answer.age_sd_years:,.6g}" if answer.age_sd_years else ""
-    ends = confidence(answer.level, interval(answer.ci_low, answer.ci_high))
-    yield (
-        f"P({who}still standing after {answer.age_years:,.6g}{sd} years) = "
-        f"{percent(answer.probability_standing)}   ({ends})"
-    )
-    yield f"Return period of {'failure' if not who else 'a failure'} {_period(answer)}"
-    curve, five = _curve_of(answer), answer.factor_5_percent
-    factor = None if five is None else f"{float(f'{five:.2g}'):,.15g}"
-    if five is None:
-        yield f"{curve} is not rejected: no factor on its rates makes P less than 5 %"
-    elif answer.ci_low < 0.05 < answer.ci_high:
-        yield (
-            f"{curve} is neither rejected nor accepted at the 5 % level: the interval includes "
-            f"5 %; P would be 5 % with all rates multiplied by {factor}"
-        )
-    elif five < 1.0:
-        yield (
-            f"{curve} is rejected at the 5 % level: consistent only if all its rates are "
-            f"multiplied by {factor} or less"
-        )
-    else:
-        yield (
-            f"{curve} is not rejected at the 5 % level: P would be 5 % with all rates multiplied "
-            f"by {factor}"
-        )
-
-
-def _period(answer: SurvivalAnswer) -> str:
-    rate = answer.annual_rate_any
-    return "infinite: no failure" if rate == 0.0 else return_period(rate)
-
-
-def _curve_of(answer: SurvivalAnswer) -> str:
-    if len(answer.branches) == 1:
-        return "The hazard curve"
-    weighted = answer.branches[0].name != answer.hazard
-    return f"The hazard of {answer.hazard}" if weighted else f"The hazard curve {answer.hazard}"
 
 
 def losses_in_words(answer: LossAnswer) -> Iterator[str]:

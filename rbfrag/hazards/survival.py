@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
@@ -26,14 +27,25 @@ from rbfrag.hazards.standing_blocks import (
     StandingBlocks,
 )
 from rbfrag.question.keywords import LEVEL, parts_of
-from rbfrag.results.numbers import percent
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import confidence, interval, percent, return_period
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 DRAWS = 128
 """Draws of the blocks' parameters where several uncertain blocks are given."""
+
+REJECTION_LEVEL = 0.05
+"""Probability of survival below which a hazard curve is rejected."""
+
+_OF_BRANCH = (
+    "name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent",
+)  # fmt: skip
+_IN_TABLES = (
+    "probability_standing", "ci_low", "ci_high", "factor_5_percent", "factor_5_percent_ci",
+    "factor_50_percent", "factor_50_percent_ci", "bounds", "branches", "warnings",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +78,7 @@ class BranchSurvival:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SurvivalAnswer(Tabular):
+class SurvivalAnswer(Result):
     """What blocks that stand say of seismic hazard.
 
     Args:
@@ -128,6 +140,81 @@ class SurvivalAnswer(Tabular):
     def mode(self) -> str:
         """Failure mode of the blocks; empty for a fragility of the caller's."""
         return mode_of_kind(self.kind or "")
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the probability of survival and the test of the hazard curve."""
+        blocks = "" if self.blocks == 1 else f"all {self.blocks} blocks "
+        sd = f" ± {self.age_sd_years:,.6g}" if self.age_sd_years else ""
+        ends = confidence(self.level, interval(self.ci_low, self.ci_high))
+        yield (
+            f"P({blocks}still standing after {self.age_years:,.6g}{sd} years) = "
+            f"{percent(self.probability_standing)}   ({ends})"
+        )
+        rate = self.annual_rate_any
+        period = "infinite: no failure" if rate == 0.0 else return_period(rate)
+        yield f"Return period of {'a failure' if blocks else 'failure'} {period}"
+        yield f"{self._curve()} {self._test()}"
+
+    def _curve(self) -> str:
+        if len(self.branches) == 1:
+            return "The hazard curve"
+        weighted = self.branches[0].name != self.hazard
+        return f"The hazard of {self.hazard}" if weighted else f"The hazard curve {self.hazard}"
+
+    def _test(self) -> str:
+        """Return the outcome of the test at the 5 % level."""
+        if self.factor_5_percent is None:
+            return "is not rejected: no factor on its rates makes P less than 5 %"
+        factor = f"{float(f'{self.factor_5_percent:.2g}'):,.15g}"
+        if self.ci_low < REJECTION_LEVEL < self.ci_high:
+            return (
+                "is neither rejected nor accepted at the 5 % level: the interval includes 5 %; P "
+                f"would be 5 % with all rates multiplied by {factor}"
+            )
+        if self.factor_5_percent < 1.0:
+            return (
+                "is rejected at the 5 % level: consistent only if all its rates are multiplied by "
+                f"{factor} or less"
+            )
+        return (
+            "is not rejected at the 5 % level: P would be 5 % with all rates multiplied by "
+            f"{factor}"
+        )
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the hazard curve, the dependence of several blocks and the model."""
+        yield TextLine("Curve", ", ".join(filter(None, (self.imt, self.site))))
+        if self.blocks > 1:
+            yield TextLine("Joint", self.joint_law)
+        if self.model is not None:
+            yield TextLine("Model", describe.model(vars(self)))
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the factors on the rates with their intervals, bounds, and branches."""
+        intervals = {
+            "probability_standing": (self.ci_low, self.ci_high),
+            "factor_5_percent": self.factor_5_percent_ci,
+            "factor_50_percent": self.factor_50_percent_ci,
+        }
+        rows = [
+            {"": name, "value": getattr(self, name), "ci_low": low, "ci_high": high}
+            for name, (low, high) in intervals.items()
+        ]
+        yield TextTable.of_rows(rows, verbose=verbose)
+        if self.bounds is not None:
+            yield TextTable.of_rows(
+                [{"bound": law.replace("_", " "), **values} for law, values in self.bounds.items()],
+                verbose=verbose,
+            )
+        if len(self.branches) > 1:
+            branches = [branch.as_dict() for branch in self.branches]
+            names = [*branches[0]] if verbose else [*_OF_BRANCH]
+            yield TextTable.of_rows(
+                [{name: branch[name] for name in names} for branch in branches], verbose=verbose
+            )
+        if verbose:
+            values = self.as_dict().items()
+            yield TextTable((), [(name, value) for name, value in values if name not in _IN_TABLES])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

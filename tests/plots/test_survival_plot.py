@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbfrag.cli.hazard_sentences import survival_in_words
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.survival import survival
 from rbfrag.plots import survival as module
@@ -52,13 +51,13 @@ def test_the_title_says_p_as_the_shell_does(tmp_path, caught):
     found = answer(curves)
     plot_survival(curves, found, tmp_path / "a.png")
     title = figures[0].get_suptitle()
-    (sentence, *_) = survival_in_words(found)
+    sentence = found.headline()
     p = sentence.partition(" = ")[2].partition("   ")[0]
     assert title.partition("probability of ")[2].startswith(p)
 
 
 def test_large_factors_have_no_exponent():
-    (*_, factor) = survival_in_words(replace(answer(branches(1)), factor_5_percent=893.4))
+    (*_, factor) = replace(answer(branches(1)), factor_5_percent=893.4).sentences()
     assert "multiplied by 890" in factor
 
 

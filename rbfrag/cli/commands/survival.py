@@ -3,40 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
-from rbfrag.cli.hazard_sentences import survival_in_words
-from rbfrag.cli.output import (
-    cell,
-    check_files,
-    print_json,
-    print_pairs,
-    print_sentences,
-    print_table,
-    print_warnings,
-)
+from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.results.numbers import rounded
 from rbfrag.vocabulary.quantities import BLOCK, WHOLE
-
-if TYPE_CHECKING:
-    from rbfrag.hazards.survival import SurvivalAnswer
 
 EXAMPLE = (
     "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kind toppling "
     "--kr-sigma 0.1 --age 10000 --age-sd 2000 --component rotd50"
 )
-
-BRANCH = ("name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent")
-"""What is shown of a branch without --verbose."""
-
-PRINTED = (
-    "probability_standing", "ci_low", "ci_high", "factor_5_percent", "factor_5_percent_ci",
-    "factor_50_percent", "factor_50_percent_ci", "bounds", "branches", "warnings",
-)  # fmt: skip
-"""Values that stand in sentences and tables."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,38 +85,4 @@ def survival(
         from rbfrag.plots.survival import plot_survival
 
         plot_survival(read, answer, plot)
-    if printing.json:
-        print_json(answer.as_dict())
-        return
-    _print(answer, verbose=printing.verbose)
-
-
-def _print(answer: SurvivalAnswer, *, verbose: bool) -> None:
-    """Print sentences, the numbers with their intervals, and a table of several curves."""
-    print_sentences(survival_in_words(answer))
-
-    def shown(value: Any) -> Any:
-        return cell(value) if verbose or not isinstance(value, float) else rounded(value)
-
-    ends = {
-        "probability_standing": (answer.ci_low, answer.ci_high),
-        "factor_5_percent": answer.factor_5_percent_ci,
-        "factor_50_percent": answer.factor_50_percent_ci,
-    }
-    print_table(
-        ("", "value", "ci_low", "ci_high"),
-        [(name, *map(shown, (getattr(answer, name), *both))) for name, both in ends.items()],
-    )
-    for name, bound in (answer.bounds or {}).items():
-        values = ", ".join(f"{key} {cell(shown(value))}" for key, value in bound.items())
-        print(f"{name.replace('_', ' ')}: {values}")
-    if len(answer.branches) > 1:
-        print()
-        columns = [*answer.branches[0].as_dict()] if verbose else [*BRANCH]
-        rows = [one.as_dict() for one in answer.branches]
-        print_table(columns, [[shown(row[name]) for name in columns] for row in rows])
-    if verbose:
-        print()
-        others = answer.as_dict()
-        print_pairs({name: others[name] for name in others if name not in PRINTED})
-    print_warnings(answer.warnings)
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
