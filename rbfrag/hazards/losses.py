@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.hazards import between_measures
 from rbfrag.hazards.event_counts import (
@@ -38,8 +40,8 @@ from rbfrag.hazards.uncertainty import (
     rate_interval,
     share_interval,
 )
-from rbfrag.results.numbers import percent
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import percent, return_period, rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray
@@ -53,6 +55,11 @@ Given are the parts, their number, and what all have in common.
 EACH_COUNT_TO = 20
 """Numbers of failures up to which each is given; beyond them steps of equal ratio."""
 
+ROWS_SHOWN = 12
+"""Rows of an exceedance curve on a terminal; documents have all."""
+
+_OF_YEARS = ("largest_of_year", "sum_of_year", "beyond_effective_time")
+_LABEL_WIDTH = 28
 _STEPS = 40
 _REACHED = 1.0 - 1e-12  # a sum counts as reaching itself
 _THIN = 0.05
@@ -111,7 +118,7 @@ class Exceedance:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LossAnswer(Tabular):
+class LossAnswer(Result):
     """What an event set, or a scenario, does to a portfolio of blocks.
 
     Its table is that of the events (`to_frame`).
@@ -211,6 +218,102 @@ class LossAnswer(Tabular):
         if len(self.laws) > 1 or np.isnan(self.any_fails).any():
             return None
         return self.mean(self.any_fails[0])
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the loss, the expected failures, their uncertainty, and the rate of any failure."""
+        for label, text in self._numbers():
+            yield f"{label:<{_LABEL_WIDTH}}{text}"
+        yield "Uncertainty of expected failures by source (not combined):"
+        yield f"  {' · '.join(self._sources())}"
+
+    def _numbers(self) -> Iterator[tuple[str, str]]:
+        number = int(self.portfolio.count.sum())
+        blocks = f"{number:,} block{'' if number == 1 else 's'}"
+        failures, rate = rounded(self.average_annual_failures), self.annual_rate_any
+        if self.events.is_scenario:
+            yield "Expected failures", f"{failures} of {blocks}"
+            if rate is not None:
+                yield "P(at least one failure)", percent(rate)
+            return
+        if self.average_annual_loss is not None:
+            yield "Average annual loss", rounded(self.average_annual_loss)
+        events = f"{self.events.effective_years:,.0f}-year event set"
+        yield "Expected failures", f"{failures} /yr    {blocks}, {events}"
+        if rate is not None:
+            often = f"return period {return_period(rate)}" if rate > 0.0 else "none"
+            yield "At least one failure", often
+
+    def _sources(self) -> Iterator[str]:
+        """Yield the interval of the expected failures from each source of uncertainty."""
+        uncertainty = self.uncertainty["average_annual_failures"]
+        sources = {
+            "event-set sampling": uncertainty.counting,
+            "fragility parameters": uncertainty.knowledge,
+            "logic tree": uncertainty.branches,
+        }
+        for source, ends in sources.items():
+            if ends is not None:
+                percentiles = " (5th–95th)" if source == "logic tree" else ""
+                yield f"{source} {rounded(ends[0])}–{rounded(ends[1])}{percentiles}"
+        if self.tau is not None:
+            low, high = between_measures.factors_between(self.tau)
+            yield f"choice of intensity measure × {low:.2f}–{high:.2f}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the events, their intensity measures, bounds, and the models."""
+        number, shaken = self.events.event_id.size, np.unique(self.events.event).size
+        yield TextLine("Events", f"{number:,}, of which {shaken:,} shake a site")
+        measures = describe.measures(self.portfolio.measures)
+        yield TextLine("Shaking", f"{measures}, component {self.portfolio.component.name}")
+        if self.annual_rate_any is None:
+            low, high = (self.mean(values) for values in self.bounds)
+            if self.events.is_scenario:
+                ends = (
+                    f"P(at least one failure) {percent(low)} (full dependence) to {percent(high)} "
+                    "(independent)"
+                )
+            else:
+                ends = (
+                    f"at least one failure: return period {return_period(high)} (independent) to "
+                    f"{return_period(low)} (full dependence)"
+                )
+            yield TextLine("Bounds", ends)
+        models = map(describe.stored_model, self.portfolio.models)
+        yield TextLine("Model", "; ".join(dict.fromkeys(models)))
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the exceedance curves and the rows of blocks; all values if verbose.
+
+        Args:
+            verbose: with every value and all rows of the curves.
+        """
+        document = self.as_dict()
+        blocks = document.pop("blocks")
+        curves = {
+            name: document.pop(name)
+            for name in [*document]
+            if name.startswith(("exceedance", "loss_exceedance"))
+        }
+        if verbose:
+            bounds = {
+                f"{name}_{law}": value
+                for law, values in document.pop("bounds").items()
+                for name, value in values.items()
+            }
+            values = {name: v for name, v in (document | bounds).items() if name != "warnings"}
+            yield TextTable((), [item for item in values.items() if item[1] is not None])
+        for curve in curves.values():
+            by_law = curve if isinstance(curve, dict) else {"": curve}
+            for law, rows in by_law.items():
+                if rows:
+                    shown = [
+                        {"bound": law.replace("_", " ")}
+                        | {name: value for name, value in row.items()
+                           if verbose or name not in _OF_YEARS}
+                        for row in rows[:: 1 if verbose else math.ceil(len(rows) / ROWS_SHOWN)]
+                    ]  # fmt: skip
+                    yield TextTable.of_rows(shown, verbose=verbose)
+        yield TextTable.of_rows(blocks, verbose=verbose)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

@@ -2,43 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.commands.simulate import WorkerOptions
-from rbfrag.cli.hazard_sentences import losses_in_words, rounded_values
-from rbfrag.cli.output import (
-    ProgressBar,
-    check_files,
-    print_json,
-    print_pairs,
-    print_rows,
-    print_sentences,
-    print_table,
-    print_warnings,
-    write_table,
-)
+from rbfrag.cli.output import ProgressBar, check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.fragility import describe
-
-if TYPE_CHECKING:
-    from rbfrag.hazards.losses import LossAnswer
 
 EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
-
-MOST_ROWS = 12
-"""Rows of a curve that people are shown; JSON has all."""
-
-SHORT = (
-    "events", "average_annual", "annual_rate_any", "expected_", "probability_any",
-    "effective_years", "model", "component",
-)  # fmt: skip
-"""How the names of the values begin that are shown without --verbose."""
-
-OF_YEARS = ("largest_of_year", "sum_of_year", "beyond_effective_time")
-"""Columns of a curve that are left out without --verbose."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,37 +141,4 @@ def losses(
         from rbfrag.plots.losses import plot_losses
 
         plot_losses(answer, plot)
-    if printing.json:
-        print_json(answer.as_dict())
-        return
-    _print(answer, verbose=printing.verbose)
-
-
-def _print(answer: LossAnswer, *, verbose: bool) -> None:
-    """Print sentences, the numbers, the curve and the rows of the blocks."""
-    document: dict[str, Any] = answer.as_dict()
-    warnings, rows = document.pop("warnings"), document.pop("blocks")
-    print_sentences(losses_in_words(answer))
-    curves = {
-        name: document.pop(name)
-        for name in [*document]
-        if name.startswith(("exceedance", "loss_exceedance"))
-    }
-    for law, bound in document.pop("bounds").items():
-        document |= {f"{name}_{law}": value for name, value in bound.items()}
-    known = {name: value for name, value in document.items() if value is not None}
-    if not verbose:
-        known["model"] = "; ".join(map(describe.stored_model, answer.portfolio.models))
-    short = {name: known[name] for name in known if name.startswith(SHORT)}
-    print_pairs(known if verbose else rounded_values(short))
-    for curve in curves.values():
-        for part in curve.values() if isinstance(curve, dict) else [curve]:
-            if part:
-                print()
-                thin = part[:: math.ceil(len(part) / MOST_ROWS)]
-                names = [name for name in part[0] if verbose or name not in OF_YEARS]
-                shown = [row if verbose else rounded_values(row) for row in thin]
-                print_table(names, [[row[name] for name in names] for row in shown])
-    print()
-    print_rows([row if verbose else rounded_values(row) for row in rows])
-    print_warnings(warnings)
+    print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
