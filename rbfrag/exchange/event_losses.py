@@ -181,7 +181,11 @@ def _by_one_measure(
             fields=("imt", "model"),
         )
     velocity = velocity_of(events.measures[name], magnitudes[events.event])
-    remark = "PGV is taken from PGA and the magnitudes of the ruptures: PGV itself is better"
+    remark = Diagnostic(
+        "PGV is predicted from PGA and the magnitudes of the ruptures; ground motions of PGV are "
+        "better",
+        "pgv_from_pga",
+    )
     by_velocity = replace(events, measures={"pgv_m_s": velocity})
     return by_velocity, component_of_velocity(meaning), LAW_TAU, (remark,)
 

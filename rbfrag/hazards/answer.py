@@ -51,7 +51,7 @@ from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.results.numbers import percent, relative
+from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
@@ -400,16 +400,17 @@ def _of_curves(sites: Sequence[Sequence[HazardCurve]]) -> Iterator[str]:
 def _numbers_in_words(result: Rates) -> Iterator[str]:
     worst = np.nan_to_num(result.error[result.rate > NEVER]).max(initial=0.0)
     if worst > NUMERICAL_AIM:
-        yield (
-            f"quadrature of a rate may be off by {relative(worst)}: its P changes abruptly "
-            "between levels of the curve"
+        yield Diagnostic(
+            f"the numerical error of a rate is up to {percent(worst)}: the fragility changes "
+            "abruptly between levels of the curve",
+            "quadrature_error",
         )
     outside = np.nan_to_num(result.outside)
     if (outside > NOTABLE).any():
         of = "" if outside.size == 1 else f" of {int((outside > NOTABLE).sum()):,} blocks"
         yield Diagnostic(
-            f"up to {percent(outside.max())} of the rate{of} comes from blocks and shaking "
-            "outside the ranges that the model was fitted on",
+            f"up to {percent(outside.max())} of the rate{of} comes from blocks and shaking outside "
+            "the fitted range",
             "extrapolation",
         )
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rbfrag.question.components import Component
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 TAU = {"pgv_m_s": 0.15, "sa10_g": 0.15}
@@ -23,9 +24,10 @@ LAW_TAU = 0.25
 PREFERRED = ("pgv_m_s", "sa10_g")
 """The measures that answer by themselves, the better first."""
 
-PGA_ALONE = (
-    "a rate from PGA alone is biased: the fit averages over the PGV that goes with a PGA in strong "
-    "earthquakes, and smaller earthquakes of the same PGA have less PGV"
+PGA_ALONE = Diagnostic(
+    "a rate from PGA alone is biased: the model averages over the PGV of the strong earthquakes "
+    "that it is fitted to, and smaller earthquakes have less PGV at the same PGA",
+    "pga_alone",
 )
 
 _CONSTANT, _SLOPE, _BY_MAGNITUDE, _SCATTER, _SATURATION = -0.623, 0.873, 0.472, 0.434, 7.6

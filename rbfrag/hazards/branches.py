@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 _ADDS_UP = 2e-3
@@ -31,12 +32,18 @@ def curve_name(curve: HazardCurve) -> str:
     return curve.statistic or curve.source
 
 
-def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[str]:
-    """Yield what is to be said of a curve of quantiles."""
+def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[Diagnostic]:
+    """Yield a warning if a curve is a quantile of the hazard.
+
+    Args:
+        curve: the hazard curve.
+        answer: the quantity that is computed from it.
+    """
     if curve.statistic.startswith("quantile"):
-        yield (
-            f"{curve.statistic} is the hazard of no single model, and {answer} under it no "
-            f"quantile of {answer}: branches with their weights say more"
+        yield Diagnostic(
+            f"{curve.statistic} is not a realization of the hazard, and {answer} under it is not "
+            f"that quantile of {answer}: use the realizations with their weights",
+            "quantile_curve",
         )
 
 

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import ALONE
 from rbfrag.question.shaking import doubts_about, doubts_about_rates
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.result import Tabular
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import SPECTRAL
+from rbfrag.vocabulary.quantities import QUANTITIES, SPECTRAL
 
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
@@ -90,6 +91,15 @@ class HazardCurve(Tabular):
         if self.measure == "sa_g":
             return f"SA({self.period_s:g})"
         return self.measure.split("_")[0].upper()
+
+    @property
+    def unit(self) -> str:
+        """Unit of the levels."""
+        return QUANTITIES[self.measure].unit
+
+    def level_text(self, index: int) -> str:
+        """Return a level with its measure and unit: "PGV = 0.2 m/s"."""
+        return f"{self.imt} = {self.levels[index]:g} {self.unit}"
 
     @property
     def known_as(self) -> str | None:
@@ -176,12 +186,15 @@ def hazard_curve(
             f"{source}: {x.size} levels and {rate.size} rates: give one rate for each level"
         )
     _refuse_disorder(x, rate, measure, source)
-    warnings = []
+    warnings: list[Diagnostic] = []
     endless = np.isinf(rate)
     if endless.any():
         warnings.append(
-            f"{source}: {int(endless.sum())} lowest levels are exceeded with probability 1, which "
-            "gives no rate: they are left out"
+            Diagnostic(
+                f"{source}: the {int(endless.sum())} lowest levels are omitted: exceeded with "
+                "probability 1, they have no annual rate",
+                "infinite_rates",
+            )
         )
         x, rate = x[~endless], rate[~endless]
     end_level = None
@@ -197,8 +210,8 @@ def hazard_curve(
     # a curve may go on to levels that nothing reaches, at rates that say so
     reached = x[rate > _SELDOM]
     name = SPECTRAL.get(period_s or 0.0, measure) if measure == "sa_g" else measure
-    warnings += [f"{source}: {text}" for text in doubts_about({name: reached})]
-    warnings += [f"{source}: {text}" for text in doubts_about_rates(rate)]
+    doubts = (*doubts_about({name: reached}), *doubts_about_rates(rate))
+    warnings += [doubt.replaced(text=f"{source}: {doubt}") for doubt in doubts]
     return HazardCurve(measure, x, rate, end_level, source=source, warnings=tuple(warnings), **of)
 
 

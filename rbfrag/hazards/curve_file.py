@@ -25,6 +25,7 @@ from rbfrag.hazards.curve import (
 from rbfrag.hazards.measure_type import IntensityType, openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENTS
+from rbfrag.results.diagnostic import Diagnostic
 
 CurveLike = HazardCurve | str | os.PathLike[str]
 """A curve, or the file that holds it."""
@@ -167,11 +168,13 @@ def suited_curves(
         for name in ALONE:
             chosen = [curve for curve in curves if curve.known_as == name]
             if chosen:
-                text = (
-                    f"of {', '.join(names)} the curve of {chosen[0].imt} is taken, the measure "
-                    "that tells most of toppling by itself: imt chooses another"
+                note = Diagnostic(
+                    f"the file has hazard curves of {', '.join(names)}: that of {chosen[0].imt} is "
+                    "used, the best single predictor of toppling; imt selects another",
+                    "curve_selected",
+                    fields=("imt",),
                 )
-                return [replace(one, warnings=(*one.warnings, text)) for one in chosen]
+                return [replace(curve, warnings=(*curve.warnings, note)) for curve in chosen]
     wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
     raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
 

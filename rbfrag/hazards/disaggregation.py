@@ -17,6 +17,8 @@ from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.mass import STEP, Grid, smoothing_of, under
 from rbfrag.hazards.shaking import LevelShaking, component_of
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
+from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.numbers import rate as rate_text
 from rbfrag.solver.results import FloatArray
 
 _VALUE = re.compile(r"mean|rlz\d+")
@@ -152,12 +154,20 @@ class Disaggregation:
         kept = np.flatnonzero(rate > _RAREST * rate[0])[_EVERY // 2 :: _EVERY]
         texts = [
             *LevelShaking.of(curve, component=name).warnings,
-            "PGV is taken from PGA and the magnitudes of its disaggregation: PGV itself is better",
+            Diagnostic(
+                "PGV is predicted from PGA and the magnitudes of its disaggregation; a hazard "
+                "curve of PGV is better",
+                "pgv_from_pga",
+            ),
         ]
         if curve.end_level is None:
             texts.append(
-                f"the curve of PGA ends at {end:g} g, exceeded {curve.annual_rate[-1]:.2g} times a "
-                "year: stronger shaking counts as that level"
+                Diagnostic(
+                    f"the hazard curve ends at PGA = {end:g} g, exceeded at "
+                    f"{rate_text(curve.annual_rate[-1])} /yr: stronger shaking counts as that "
+                    "level (unconservative)",
+                    "curve_ends",
+                )
             )
         return replace(
             curve, measure="pgv_m_s", levels=np.exp(onto.u[kept] - 0.5 * step), end_level=None,

@@ -19,10 +19,15 @@ from rbfrag.hazards.joint_thresholds import JointRates, joint_rates
 from rbfrag.hazards.kernel import KernelBlocks, Rates, error_step, probabilities
 from rbfrag.hazards.mass import Indices, SiteMass
 from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 NO_LAW = "bounds"
 """Joint law where only bounds are known."""
+
+UNKNOWN_TO_MODEL = "the model has no dependence between the blocks of one earthquake"
+SEVERAL_MODELS = "the dependence between blocks of several models is unknown"
+BOUNDS_GIVEN = "bounds are given for full dependence and for independence"
 
 MOST_JOINT = 4096
 """Most blocks that the dependence is taken for."""
@@ -213,14 +218,14 @@ def joint_at_sites(
     if not any(result):
         return tuple(result), ()
     counted = int(number[number > 1].max())
+    number_text = f"{counted:,}" if sites == 1 else f"up to {counted:,}"
     return tuple(result), (
-        f"annual_rate_any: {'all' if sites == 1 else 'up to'} {counted} blocks are taken as those "
-        "of one site, of unknown azimuth",
-        *(
-            f"{text}: bounds has annual_rate_any under full dependence and if they fail "
-            "independently"
-            for text in why
+        Diagnostic(
+            f"at least one failure: {number_text} blocks are assumed to be at one site, with "
+            "unknown azimuths",
+            "unknown_azimuths",
         ),
+        *(Diagnostic(f"{text}: {BOUNDS_GIVEN}", "unknown_dependence") for text in why),
     )
 
 
@@ -229,11 +234,11 @@ def _unknown(here: Sequence[KernelBlocks], number: int) -> str:
     models = {blocks.model.name: blocks.model for blocks in here}
     if any(model.dependence is None or model.method.block.size is None
            for model in models.values()):  # fmt: skip
-        return "what the blocks share in one earthquake is not known to this model"
+        return UNKNOWN_TO_MODEL
     if len(models) > 1:
-        return "what blocks of several models share in one earthquake is not known"
+        return SEVERAL_MODELS
     if number > MOST_JOINT:
-        return f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
+        return f"the dependence of more than {MOST_JOINT:,} blocks is not computed"
     return ""
 
 

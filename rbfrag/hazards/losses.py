@@ -27,7 +27,7 @@ from rbfrag.hazards.event_counts import (
 )
 from rbfrag.hazards.event_means import EventMeans, axes_of, event_means
 from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.joint_rate import NO_LAW
+from rbfrag.hazards.joint_rate import BOUNDS_GIVEN, NO_LAW, SEVERAL_MODELS, UNKNOWN_TO_MODEL
 from rbfrag.hazards.kernel import interval_end
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.hazards.shaking import NOTABLE
@@ -40,11 +40,13 @@ from rbfrag.hazards.uncertainty import (
     rate_interval,
     share_interval,
 )
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent, return_period, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 Run = Callable[[Iterator[SomeYears], int, EventYears], Iterator[PartCounts]]
 """Does the parts of the work by `count_years` and yields the results in any order.
@@ -731,44 +733,48 @@ def _warnings(
     if len(portfolio.measures) > 1:
         names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
         warnings.append(
-            f"the engine draws {names} of one event and site independently given the rupture, and "
-            "pairs them as nature does not: P of PGV and PGA comes out 10 to 50 % too low; PGV "
-            "alone is safer"
+            Diagnostic(
+                f"the event set has {names} drawn independently given the rupture, although they "
+                "are correlated: P from PGV and PGA is 10–50 % too low (unconservative); use PGV "
+                "alone",
+                "independent_measures",
+            )
         )
     if len(laws) > 1:
-        why = (
-            "blocks of several models have no joint law"
-            if len(portfolio.models) > 1
-            else "what the blocks share in one earthquake is not known to this model"
-        )
-        warnings.append(
-            f"{why}: given are bounds, full dependence and independence at the shaking of each site"
-        )
+        why = SEVERAL_MODELS if len(portfolio.models) > 1 else UNKNOWN_TO_MODEL
+        text = f"{why}: {BOUNDS_GIVEN} at the shaking of each site"
+        warnings.append(Diagnostic(text, "unknown_dependence"))
     elif portfolio.count.sum() > 1:
-        warnings.append("the blocks are taken as of unknown azimuth: none shares a side by intent")
+        text = "the azimuths of the blocks are assumed to be unknown and independent"
+        warnings.append(Diagnostic(text, "unknown_azimuths"))
     if np.isnan(any_fails).any():
-        warnings.append(
-            "without samples nothing is said of what several blocks do together: bounds are given"
-        )
+        text = "joint failures of several blocks are not computed without samples: bounds are given"
+        warnings.append(Diagnostic(text, "no_samples"))
     rate, outside = float(blocks[0].sum()), float(blocks[2].sum())
     if rate > 0.0 and outside > NOTABLE * rate:
         warnings.append(
-            f"{percent(outside / rate)} of the failures come from blocks and shaking outside "
-            "the ranges that the model was fitted on"
+            Diagnostic(
+                f"{percent(outside / rate)} of the failures come from blocks and shaking outside "
+                "the fitted range",
+                "extrapolation",
+            )
         )
     effective = events.effective_years
     if effective is not None:
         rare = (blocks[0] > 0.0) & (blocks[0] * effective < 1.0)
         if rare.any():
             warnings.append(
-                f"{int(portfolio.count @ rare)} of {int(portfolio.count.sum())} blocks fail less "
-                f"than once in the {effective:.6g} years that the events cover: their rates are "
-                "not resolved"
+                Diagnostic(
+                    f"{int(portfolio.count @ rare):,} of {int(portfolio.count.sum()):,} blocks "
+                    f"fail less than once in the {effective:,.0f} years of the event set: their "
+                    "rates are not resolved",
+                    "unresolved_rates",
+                )
             )
     return (*warnings, *_weakest_at_thin_shaking(events, portfolio))
 
 
-def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
+def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator[Diagnostic]:
     """Yield a warning where blocks fail at shaking that the engine may have left out.
 
     Its minimum_intensity stands in no file; few rows lie below it.
@@ -777,11 +783,13 @@ def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator
     if not here.any() or events.is_scenario:
         return
     name = portfolio.measures[0]
+    measure, unit = describe.measures([name]), QUANTITIES[name].unit
     thin = {n: np.full(1, np.quantile(v[here], _THIN)) for n, v in events.measures.items()}
     p, _ = portfolio.probability(np.arange(portfolio.size), thin, (0.0, 0.0, 0.0))
     if p.max() > NOTABLE:
-        yield (
-            f"at {name} = {thin[name][0]:.3g}, below which the files have few rows, a block "
-            f"already fails with a probability of {p.max():.2g}: if minimum_intensity of the job "
-            "was not far below that, failures are missing from the answer"
+        yield Diagnostic(
+            f"P(failure) of a block is already {percent(float(p.max()))} at {measure} = "
+            f"{thin[name][0]:.3g} {unit}, and few ground motions of the event set are weaker: "
+            "failures are missing if the minimum_intensity of the job is not far below that value",
+            "intensity_cutoff",
         )

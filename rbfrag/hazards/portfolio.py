@@ -19,6 +19,7 @@ from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.uncertain import normal_product, scatter_steps
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.components import Component
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -155,15 +156,13 @@ class Portfolio:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the models take for granted, each text once."""
-        texts = [
-            text
-            for model in self.answering
-            for text in (
-                model.method.block.support if model.kind == model.method.block.kind else "",
-                *model.notes,
-            )
-        ]
-        return tuple(dict.fromkeys(filter(None, texts)))
+        texts: list[str] = []
+        for model in self.answering:
+            block = model.method.block
+            if model.kind == block.kind and block.support:
+                texts.append(Diagnostic(block.support, "support_assumed"))
+            texts += model.notes
+        return tuple(dict.fromkeys(texts))
 
     @property
     def is_uncertain(self) -> bool:

@@ -16,6 +16,8 @@ from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.results.diagnostic import Diagnostic
+from rbfrag.results.numbers import percent
+from rbfrag.results.numbers import rate as rate_text
 from rbfrag.solver.results import FloatArray
 
 _SCATTER_POINTS = 25
@@ -138,11 +140,15 @@ def _measure(
             fields=("convert_sigma",),
         )
     warnings.append(
-        f"PGV = {used.factor:.4g} m/s per g times {curve.imt} in the median ({used.source}); "
-        f"ln PGV scatters about it by {spread:g}, which is integrated"
+        Diagnostic(
+            f"PGV is predicted from {curve.imt}: median {used.factor:.4g} m/s per g, σ_ln "
+            f"{spread:g}, integrated ({used.source})",
+            "spectral_conversion",
+        )
     )
     if curve.known_as is not None:
-        warnings.append(f"there are models of {curve.imt} itself: it need not be converted")
+        text = f"{curve.imt} need not be converted: there are models of it"
+        warnings.append(Diagnostic(text, "conversion_not_needed"))
     return "pgv_m_s", used.factor, spread
 
 
@@ -177,18 +183,18 @@ def ends_in_words(
             continue
         worst = int(np.argmax(np.where(doubtful, size, -1.0)))
         curve, sites = curves[site[worst]], np.unique(site[doubtful]).size
-        unit = curve.measure.replace("sa_g", curve.imt + " in g")
-        name = f"the curve of {curve.place}" if len(curves) > 1 and curve.place else "the curve"
-        others = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
+        of_site = f" of {curve.place}" if len(curves) > 1 and curve.place else ""
+        more_sites = f" (and {sites - 1:,} more of {len(curves):,} sites)" if sites > 1 else ""
         if size is more:
             yield Diagnostic(
-                f"{name} ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
-                f"{float(more[worst]):.3g} failures a year to the answer{others}",
+                f"the hazard curve{of_site} ends at {curve.level_text(-1)}: stronger shaking may "
+                f"add up to {rate_text(float(more[worst]))} /yr to the rate{more_sites}",
                 "curve_ends",
             )
         else:
             yield Diagnostic(
-                f"{name} begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
-                f"is already {float(below[worst]):.3g}: weaker shaking is not counted{others}",
+                f"the hazard curve{of_site} begins at {curve.level_text(0)}, where P(failure) is "
+                f"already {percent(float(below[worst]))}: weaker shaking is neglected "
+                f"(unconservative){more_sites}",
                 "curve_ends",
             )

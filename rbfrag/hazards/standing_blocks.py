@@ -34,6 +34,7 @@ from rbfrag.hazards.model_parts import parts_by_model
 from rbfrag.hazards.shaking import LevelShaking, ends_in_words
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 from rbfrag.vocabulary.quantities import BLOCK, NUMBERS
@@ -195,8 +196,9 @@ class ModelBlocks:
     def warnings(self) -> tuple[str, ...]:
         """What the model and the curve's meaning take for granted."""
         block = self.model.method.block
-        assumed = (block.support,) if self.model.kind == block.kind and block.support else ()
-        return (*self.remarks, *self.shaking.warnings, *assumed, *self.model.notes)
+        assumed = block.support if self.model.kind == block.kind else ""
+        notes = (Diagnostic(assumed, "support_assumed"),) if assumed else ()
+        return (*self.remarks, *self.shaking.warnings, *notes, *self.model.notes)
 
     def placement(self) -> Placement | None:
         """Return the blocks as those of one site with unknown azimuths; None without a size."""

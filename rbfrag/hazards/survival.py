@@ -27,6 +27,7 @@ from rbfrag.hazards.standing_blocks import (
     StandingBlocks,
 )
 from rbfrag.question.keywords import LEVEL, parts_of
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import confidence, interval, percent, return_period
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
@@ -413,14 +414,16 @@ def _warnings(
         yield from rate.warnings
     outside = max(rate.outside for rate in rates)
     if outside > NOTABLE:
-        yield (
+        yield Diagnostic(
             f"up to {percent(outside)} of the rate comes from blocks and shaking outside the "
-            "ranges that the model was fitted on"
+            "fitted range",
+            "extrapolation",
         )
     if blocks.laws[0] == DEPENDENT:
-        yield (
-            "what the blocks share in one earthquake is not known here: they are taken to fail all "
-            "or none, which says least against the hazard; bounds also has the independent case"
+        yield Diagnostic(
+            "the dependence between the blocks is unknown: full dependence is assumed, the weakest "
+            "evidence against the hazard; bounds also has independence",
+            "unknown_dependence",
         )
 
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from rbfrag.fragility.measures import CREDIBLE
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import QUANTITIES, SHAKING
 
 MOST_A_YEAR = 100.0
 """Rates of exceedance above this are of another unit, or of no earthquakes [1/a]."""
 
 
-def doubts_about(measures: Mapping[str, Any]) -> Iterator[str]:
+def doubts_about(measures: Mapping[str, Any]) -> Iterator[Diagnostic]:
     """Yield what is to be said of values of measures that no earthquake has.
 
     Args:
@@ -26,10 +27,11 @@ def doubts_about(measures: Mapping[str, Any]) -> Iterator[str]:
         values = values[np.isfinite(values)]
         _, most, text = CREDIBLE[name]
         if values.size and (largest := float(values.max())) > most:
-            yield f"{name} = {largest:.4g} {QUANTITIES[name].unit} is {text}"
+            value = f"{name} = {largest:.4g} {QUANTITIES[name].unit}"
+            yield Diagnostic(f"{value} is {text}", "suspicious_value")
 
 
-def doubts_about_rates(annual_rate: Any) -> Iterator[str]:
+def doubts_about_rates(annual_rate: Any) -> Iterator[Diagnostic]:
     """Yield what is to be said of rates of exceedance that no earthquakes have.
 
     Args:
@@ -37,7 +39,7 @@ def doubts_about_rates(annual_rate: Any) -> Iterator[str]:
     """
     largest = float(np.max(annual_rate, initial=0.0))
     if largest > MOST_A_YEAR:
-        yield (
-            f"the curve has a rate of {largest:.4g} a year: are these rates of exceedance in one "
-            "year?"
+        yield Diagnostic(
+            f"the curve has a rate of {largest:.4g} /yr: are these annual rates of exceedance?",
+            "suspicious_value",
         )

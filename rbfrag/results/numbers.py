@@ -89,6 +89,24 @@ def place(lon: float, lat: float) -> str:
     return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
 
 
+def rate(value: float) -> str:
+    """Return an annual rate [1/yr] without its unit, with two significant digits: "2.3e-4"."""
+    if value == 0.0 or 0.1 <= value < 1000.0:
+        return f"{value:.2g}"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def rate_interval(low: float, high: float) -> str:
+    """Return an interval of annual rates [1/yr] without its unit: "1.9e-4–2.7e-4"."""
+    return "–".join(dict.fromkeys((rate(low), rate(high))))
+
+
+def equation(text: str) -> str:
+    """Return a printed number as the right-hand side of an equation: "= 15 %", or "<0.01 %"."""
+    return text if text[0] in "<>" else f"= {text}"
+
+
 def rounded(value: float) -> str:
     """Return a number with three digits and without an exponent where people write none."""
     if value != 0.0 and not 1e-4 <= abs(value) < 1e7:

@@ -117,7 +117,7 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert max(each) < found["annual_rate_any"] < sum(each)
     # a Poisson process of earthquakes
     assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
-    assert any("blocks are taken as those of one site" in text for text in found["warnings"])
+    assert any("blocks are assumed to be at one site" in text for text in found["warnings"])
     printed = shell(*asked).stdout
     assert f"return period {return_period(found['annual_rate_any'])}" in printed
     assert f"Expected failures {found['expected_failures_per_year']:.2g} /yr of 2 blocks" in printed
@@ -239,7 +239,7 @@ def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree:
     assert mean["curve_kind"] == "mean"
     assert found["annual_rate"] == pytest.approx(mean["annual_rate"], rel=2e-3)
     middle = shell.json("hazard", logic_tree / "quantile_curve-0.5-PGV_7.csv", *asked)
-    assert any("quantile-0.5 is the hazard of no single model" in w for w in middle["warnings"])
+    assert any("quantile-0.5 is not a realization" in w for w in middle["warnings"])
     printed = shell("hazard", *branches, *asked, "--weights", "0.5,0.3,0.2").stdout
     assert "rlz-002" in printed
     other = shell("hazard", branches[0], curve, *asked[2:], expect=2).stderr

@@ -50,7 +50,7 @@ def test_usgs_nshm(formats_dir: Path) -> None:
         read_hazard_curves(path, imt="PGV")
     (best,) = suited_curves(curves)
     assert best.imt == "SA(1)"
-    assert "the curve of SA(1) is taken" in best.warnings[-1]
+    assert "that of SA(1) is used" in best.warnings[-1]
     assert suited_curves([pga]) == [pga]
     assert suited_curves(curves, converted_period_s=0.5)[0].imt == "SA(0.5)"
     with pytest.raises(

@@ -89,7 +89,7 @@ def test_the_scatter_of_a_conversion_is_integrated(
     expected = of_pgv.annual_rate[0] * used.factor**B * math.exp(0.5 * (B * spread) ** 2)
     assert found.annual_rate[0] == pytest.approx(expected, rel=2e-3)
     assert found.term == "pgv_kr"
-    assert any(f"scatters about it by {spread:g}" in text for text in found.warnings)
+    assert any(f"σ_ln {spread:g}, integrated" in text for text in found.warnings)
 
 
 def test_one_class_of_blocks(measures_db: str) -> None:

@@ -92,7 +92,7 @@ def test_without_an_estimate_both_bounds_are_given() -> None:
     assert found.joint.probability_any is None
     assert bound(found, "fully_dependent") == pytest.approx(found.annual_rate[0], rel=5e-4)
     assert bound(found, "independent") > 1.05 * bound(found, "fully_dependent")
-    assert any("not known to this model" in text for text in found.warnings)
+    assert any("the model has no dependence" in text for text in found.warnings)
 
 
 def test_many_blocks_have_the_bounds_of_few(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,7 +190,7 @@ def test_a_quantile_curve_is_warned_of() -> None:
     curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0, statistic="quantile-0.84")
     found = hazard(curve, 3.0, 0.1, model=model_row(), component="single")
     assert found.curve_kind == "quantile-0.84"
-    assert any("quantile-0.84 is the hazard of no single model" in text for text in found.warnings)
+    assert any("quantile-0.84 is not a realization" in text for text in found.warnings)
 
 
 def test_quantiles_are_those_of_branches_and_parameters_together() -> None:

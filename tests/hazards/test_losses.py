@@ -476,4 +476,4 @@ def test_kinds_and_their_options(job: Path) -> None:
     )
     assert rows[1]["average_annual_failures"] != rows[2]["average_annual_failures"]
     assert answer.as_dict()["kind"] == "toppling, rocking"
-    assert any("several models have no joint law" in text for text in answer.warnings)
+    assert any("blocks of several models is unknown" in text for text in answer.warnings)

@@ -106,7 +106,7 @@ def test_two_equal_blocks_that_fail_together_are_one() -> None:
     )
     # the answer is what says least against the hazard, and says so
     assert both.probability_standing == pytest.approx(one.probability_standing, rel=1e-12)
-    assert any("not known here" in text for text in both.warnings)
+    assert any("dependence between the blocks is unknown" in text for text in both.warnings)
 
 
 def answered(row: ModelRow, p2: Any, kr: Any, **asked: Any) -> Any:
@@ -166,7 +166,7 @@ def test_the_copula_lies_between_its_bounds() -> None:
         answer.bounds[name]["probability_standing"] for name in ("independent", "fully_dependent")
     )
     assert alone < answer.probability_standing < together
-    assert not any("not known here" in text for text in answer.warnings)
+    assert not any("dependence between the blocks is unknown" in text for text in answer.warnings)
 
 
 def test_limits_of_the_copula() -> None:
@@ -224,7 +224,7 @@ def test_without_weights_the_first_curve_answers() -> None:
     assert answer.branches[1].probability_standing == pytest.approx(
         math.exp(-2 * RATE * YEARS), rel=1e-6
     )
-    assert any("quantile-0.84 is the hazard of no single model" in w for w in answer.warnings)
+    assert any("quantile-0.84 is not a realization" in w for w in answer.warnings)
 
 
 def test_blocks_that_nothing_fells_have_no_factor() -> None:
@@ -280,9 +280,9 @@ def test_more_than_the_ranges_and_the_ends_is_told() -> None:
         short, 300.0, 1.0, kind="toppling", age_years=YEARS, model=row, component="single"
     )
     told = " ".join(answer.warnings)
-    assert "the curve begins at" in told
-    assert "the curve ends at" in told
-    assert "outside the ranges that the model was fitted on" in told
+    assert "the hazard curve begins at" in told
+    assert "the hazard curve ends at" in told
+    assert "outside the fitted range" in told
     assert "backed by a rock face" in told
 
 
