@@ -127,6 +127,12 @@ def model(document: Mapping[str, Any]) -> str:
     return ", ".join(filter(None, (*read, sized, kind, own)))
 
 
+def named_model(document: Mapping[str, Any]) -> str:
+    """Return the name of a model and what people call it: "bounded-pgv_kr (PGV, …)"."""
+    title = model(document)
+    return title if title == document["model"] else f"{document['model']} ({title})"
+
+
 def stored_model(row: ModelRow) -> str:
     """Return what people call a stored model."""
     return model({"model": row.name, "term": row.term, "method": row.method})

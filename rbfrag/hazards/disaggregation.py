@@ -18,7 +18,7 @@ from rbfrag.hazards.mass import STEP, Grid, smoothing_of, under
 from rbfrag.hazards.shaking import LevelShaking, component_of
 from rbfrag.question.components import SINGLE_COMPONENT, component_named
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import rate as rate_text
+from rbfrag.results.numbers import annual_rate
 from rbfrag.solver.results import FloatArray
 
 _VALUE = re.compile(r"mean|rlz\d+")
@@ -164,7 +164,7 @@ class Disaggregation:
             texts.append(
                 Diagnostic(
                     f"the hazard curve ends at PGA = {end:g} g, exceeded at "
-                    f"{rate_text(curve.annual_rate[-1])} /yr: stronger shaking counts as that "
+                    f"{annual_rate(curve.annual_rate[-1])} /yr: stronger shaking counts as that "
                     "level (unconservative)",
                     "curve_ends",
                 )

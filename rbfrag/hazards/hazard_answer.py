@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,12 @@ from rbfrag.hazards.joint_rate import JointRate
 from rbfrag.hazards.mass import Indices
 from rbfrag.results.numbers import (
     NEVER,
+    SMALLEST,
+    annual_rate,
+    annual_rates,
     confidence,
+    equals,
+    interval,
     percent,
     return_period,
     return_periods,
@@ -28,13 +34,15 @@ from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import QUANTITIES
 
 ROWS_SHOWN = 20
 """Blocks that a terminal lists; documents and written tables have all."""
 
 SHORTEST_SHOWN = 3
 """Blocks that are named by their return periods."""
+
+NOTABLE_FACTOR = 2.0
+"""Factor on a rate by shaking above the last level from which on the answer is a range."""
 
 SMALLEST_FRACTION = 5e-4
 """Contributions below this fraction of a rate are not printed."""
@@ -196,8 +204,12 @@ class HazardAnswer(Result):
         return columns
 
     def fractions_between(self, levels: FloatArray) -> FloatArray:
-        """Return the fractions of the first block's rate from shaking between levels."""
-        rate = max(float(self.annual_rate[0]), np.finfo(float).tiny)
+        """Return the fractions of the first block's rate from shaking between levels.
+
+        Of several branches they are those of the first, as `contribution` is.
+        """
+        rates = self.branches[0].annual_rate if self.branches else self.annual_rate
+        rate = max(float(rates[0]), np.finfo(float).tiny)
         below = np.append(0.0, self.contribution[0].cumsum()) / rate
         return np.diff(np.interp(np.log(levels), np.log(self.edges), below))
 
@@ -211,69 +223,84 @@ class HazardAnswer(Result):
         if self.tau is not None:
             yield between_measures.in_words(self.tau)
 
+    def _most(self, rates: FloatArray) -> FloatArray:
+        """Return rates with the most that shaking above the last level may add [1/yr]."""
+        return rates + self.above_at_most - self.above
+
     def _of_one_block(self) -> Iterator[str]:
-        rate, low, high, chance = (
+        rate, low, high, chance, most = (
             float(values[0])
-            for values in (self.annual_rate, self.ci_low, self.ci_high, self.probability)
-        )
-        ends = confidence(self.level, return_periods(low, high))
-        yield self._range() or f"Return period of failure {return_period(rate)}   ({ends})"
-        chances = [1.0 - math.exp(-end * self.years) for end in (low, high)]
-        yield (
-            f"Mean annual rate {rate:.2g} /yr; P(failure in {self.years:g} years) = "
-            f"{with_interval(chance, *chances)}"
-        )
+            for values in (
+                self.annual_rate, self.ci_low, self.ci_high, self.probability,
+                self._most(self.annual_rate),
+            )
+        )  # fmt: skip
+        in_years = f"P(failure in {self.years:g} years)"
+        if most > max(NOTABLE_FACTOR * rate, NEVER):
+            end = f"the hazard curve ends at {self.curves[0].level_text(-1)}"
+            most_chance = 1.0 - math.exp(-most * self.years)
+            most_chance = 1.0 if most_chance > 1.0 - SMALLEST else most_chance
+            if rate > NEVER:
+                yield (
+                    f"Return period of failure between {years(most)} and {return_period(rate)}: "
+                    f"{end}"
+                )
+                yield (
+                    f"Mean annual rate {annual_rates(rate, most)} /yr; {in_years} = "
+                    f"{interval(chance, most_chance)}"
+                )
+            else:
+                yield f"Return period of failure at least {return_period(most)}: {end}"
+                yield (
+                    f"Mean annual rate at most {annual_rate(most)} /yr; {in_years} at most "
+                    f"{percent(most_chance)}"
+                )
+        else:
+            ends = confidence(self.level, return_periods(low, high))
+            period = return_period(rate)
+            yield f"Return period of failure {period}" + (f"   ({ends})" if high > NEVER else "")
+            chances = [1.0 - math.exp(-end * self.years) for end in (low, high)]
+            yield (
+                f"Mean annual rate {annual_rate(rate)} /yr; "
+                f"{equals(in_years, with_interval(chance, *chances))}"
+            )
         if self.drained is not None and self.drained[0] >= 0.0:
             yield f"Drained return period {return_period(float(self.drained[0]))}"
-
-    def _range(self) -> str:
-        """Return the range of the return period where the curve ends too early; else nothing.
-
-        Stronger shaking than the last level may more than double the rate of the block.
-        """
-        rate = float(self.annual_rate[0])
-        most = rate + float(self.above_at_most[0] - self.above[0])
-        if not most > 2.0 * rate:
-            return ""
-        curve = self.curves[0]
-        known = QUANTITIES.get(curve.measure)
-        unit = "g" if known is None else known.unit
-        least = f"between {years(most)} and {return_period(rate)}"
-        return (
-            f"Return period of failure {least if rate > NEVER else f'at least {years(most)} years'}"
-            f": the hazard curve ends at {curve.imt} = {curve.levels[-1]:g} {unit}"
-        )
 
     def _of_all_blocks(self) -> Iterator[str]:
         size, sites = int(self.count.sum()), len(self.curves)
         expected = self.expected_failures_per_year
-        ends = confidence(self.level, f"{self.total_low:.2g}–{self.total_high:.2g}")
-        where = f" at {sites:,} sites" if sites > 1 else ""
-        yield f"Expected failures {expected:.2g} /yr of {size:,} blocks{where}   ({ends})"
+        blocks = f"{size:,} blocks{f' at {sites:,} sites' if sites > 1 else ''}"
+        most = float(np.nansum(self.count * self._most(self.annual_rate)))
+        if most > NOTABLE_FACTOR * expected:
+            text = annual_rates(expected, most)
+            yield f"Expected failures {text} /yr of {blocks}: the hazard curve ends too early"
+        else:
+            ends = confidence(self.level, annual_rates(self.total_low, self.total_high))
+            yield f"Expected failures {annual_rate(expected)} /yr of {blocks}   ({ends})"
         for curve, joint in zip(self.curves, self.joints, strict=True):
-            if joint is None:
-                continue
-            place = f"{curve.place}: at" if curve.place else "At"
-            period = f"P in {self.years:g} years"
-            rate, chance = joint.annual_rate_any, joint.probability_any
-            if rate is not None and chance is not None:
-                yield (
-                    f"{place} least one failure: return period {return_period(rate)}; {period} "
-                    f"{percent(chance)}"
-                )
-                continue
-            least, most = (
-                percent(joint.bounds[name]["probability_any"])
-                for name in ("fully_dependent", "independent")
-            )
-            ends = f"{least} (full dependence) to {most} (independent)"
-            yield f"{place} least one failure: {period} {ends}"
+            if joint is not None:
+                place = f"{curve.place}: at" if curve.place else "At"
+                yield f"{place} least one failure: {self._of_any_failure(joint)}"
         rates, names = np.nan_to_num(self.annual_rate), self._names()
         shortest = [
             f"{names[i] or f'block {i + 1}'} ({return_period(rates[i])})"
             for i in np.argsort(-rates, kind="stable")[:SHORTEST_SHOWN].tolist()
         ]
-        yield f"Shortest return periods: {', '.join(shortest)}"
+        bound = " at most" if most > NOTABLE_FACTOR * expected else ""
+        yield f"Shortest return periods{bound}: {', '.join(shortest)}"
+
+    def _of_any_failure(self, joint: JointRate) -> str:
+        in_years = f"P in {self.years:g} years"
+        rate, chance, ends = joint.annual_rate_any, joint.probability_any, joint.annual_rate_any_ci
+        if rate is None or chance is None or ends is None:
+            least, most = (
+                percent(joint.bounds[name]["probability_any"])
+                for name in ("fully_dependent", "independent")
+            )
+            return f"{in_years} from {least} (full dependence) to {most} (independence)"
+        period = f"return period {return_period(rate)}; {equals(in_years, percent(chance))}"
+        return f"{period}   ({confidence(self.level, f'{return_periods(*ends)} years')})"
 
     def _names(self) -> tuple[str | None, ...]:
         return self.names or (None,) * self.annual_rate.size
@@ -282,15 +309,18 @@ class HazardAnswer(Result):
         """Yield the hazard curve, the period and the model."""
         curve = self.curves[0]
         place = curve.place if len(self.curves) == 1 else ""
-        yield TextLine("Curve", ", ".join(filter(None, (curve.imt, place, self.curve_kind))))
+        source = "" if self.branches or len(self.curves) > 1 else Path(curve.source).name
+        curve_parts = (curve.imt, source, place, self.curve_kind)
+        yield TextLine("Curve", ", ".join(filter(None, curve_parts)))
         if self.quantiles and self._is_single:
             low, high = float(self.branches_low[0]), float(self.branches_high[0])
+            periods = return_periods(low, high)
             yield TextLine(
-                "Branches", f"return period {return_periods(low, high)} years (5th–95th percentile)"
+                "Branches", f"return period {periods} years (5th–95th percentile of the logic tree)"
             )
         if not self._is_single:
-            yield TextLine("Period", f"{self.years:g} years")
-        yield TextLine("Model", describe.model(vars(self)))
+            yield TextLine("Period", f"{self.years:g} years, of the column probability")
+        yield TextLine("Model", describe.named_model(vars(self)))
         rows = self.annual_rate.size + len(self.rejected)
         if not self._is_single and rows > ROWS_SHOWN:
             yield TextLine("Blocks", f"{rows:,}, of which the first {ROWS_SHOWN} are listed")
@@ -314,7 +344,10 @@ class HazardAnswer(Result):
             values = {name: value for name, value in document.items() if name not in apart}
             yield TextTable((), [*(values | bounds).items()])
         if self._is_single and self.annual_rate[0] > 0.0:
-            yield TextTable(("from", "to", "share_%"), self._contributions())
+            curve = self.curves[0]
+            branch = f" of {self.branches[0].name}" if self.branches else ""
+            headers = (f"{curve.imt} [{curve.unit}]", f"percentage of the rate{branch}")
+            yield TextTable(headers, self._contributions())
         shown = [
             {
                 name if name != "drained" else "drained_annual_rate": (
@@ -335,16 +368,17 @@ class HazardAnswer(Result):
 
     def _contributions(self) -> list[list[object]]:
         """Return the percentages of the rate between the levels of the curve."""
-        curve, unit = self.curves[0], QUANTITIES[self.measure].unit
-        parts = self.fractions_between(curve.levels).tolist()
+        levels = self.curves[0].levels
         rows: list[list[object]] = [
-            [f"{curve.imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * part, 1)]
-            for low, high, part in zip(curve.levels[:-1], curve.levels[1:], parts, strict=True)
+            [f"{low:.3g}–{high:.3g}", round(100.0 * part, 1)]
+            for low, high, part in zip(
+                levels[:-1], levels[1:], self.fractions_between(levels).tolist(), strict=True
+            )
             if part >= SMALLEST_FRACTION
         ]
         beyond = float(self.above[0] / self.annual_rate[0])
         if beyond >= SMALLEST_FRACTION:
-            rows.append([f"{curve.imt} {curve.levels[-1]:.3g}", "beyond", round(100.0 * beyond, 1)])
+            rows.append([f"> {levels[-1]:.3g}", round(100.0 * beyond, 1)])
         return rows
 
     def as_dict(self) -> dict[str, Any]:

@@ -41,7 +41,16 @@ from rbfrag.hazards.uncertainty import (
     share_interval,
 )
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import percent, return_period, rounded
+from rbfrag.results.numbers import (
+    annual_rate,
+    annual_rates,
+    confidence,
+    interval,
+    percent,
+    return_period,
+    return_periods,
+    two_digits,
+)
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.quantity import finite_or_none
@@ -231,19 +240,24 @@ class LossAnswer(Result):
     def _numbers(self) -> Iterator[tuple[str, str]]:
         number = int(self.portfolio.count.sum())
         blocks = f"{number:,} block{'' if number == 1 else 's'}"
-        failures, rate = rounded(self.average_annual_failures), self.annual_rate_any
+        failures, rate = self.average_annual_failures, self.annual_rate_any
         if self.events.is_scenario:
-            yield "Expected failures", f"{failures} of {blocks}"
+            yield "Expected failures", f"{two_digits(failures)} of {blocks}"
             if rate is not None:
-                yield "P(at least one failure)", percent(rate)
+                ends = interval(*self.uncertainty["annual_rate_any"].counting)
+                yield "P(at least one failure)", f"{percent(rate)}   ({self._sampling(ends)})"
             return
         if self.average_annual_loss is not None:
-            yield "Average annual loss", rounded(self.average_annual_loss)
+            yield "Average annual loss", two_digits(self.average_annual_loss)
         events = f"{self.events.effective_years:,.0f}-year event set"
-        yield "Expected failures", f"{failures} /yr    {blocks}, {events}"
+        yield "Expected failures", f"{annual_rate(failures)} /yr    {blocks}, {events}"
         if rate is not None:
-            often = f"return period {return_period(rate)}" if rate > 0.0 else "none"
-            yield "At least one failure", often
+            ends = return_periods(*self.uncertainty["annual_rate_any"].counting)
+            often = f"return period {return_period(rate)}   ({self._sampling(ends)})"
+            yield "At least one failure", often if rate > 0.0 else "none in the event set"
+
+    def _sampling(self, ends: str) -> str:
+        return f"{confidence(self.level, ends)}, event-set sampling"
 
     def _sources(self) -> Iterator[str]:
         """Yield the interval of the expected failures from each source of uncertainty."""
@@ -255,8 +269,9 @@ class LossAnswer(Result):
         }
         for source, ends in sources.items():
             if ends is not None:
-                percentiles = " (5th–95th)" if source == "logic tree" else ""
-                yield f"{source} {rounded(ends[0])}–{rounded(ends[1])}{percentiles}"
+                text = "–".join(map(two_digits, ends))
+                text = text if self.events.is_scenario else annual_rates(*ends)
+                yield f"{source} {text}{' (5th–95th)' if source == 'logic tree' else ''}"
         if self.tau is not None:
             low, high = between_measures.factors_between(self.tau)
             yield f"choice of intensity measure × {low:.2f}–{high:.2f}"
@@ -264,7 +279,7 @@ class LossAnswer(Result):
     def lines(self) -> Iterator[TextLine]:
         """Yield the events, their intensity measures, bounds, and the models."""
         number, shaken = self.events.event_id.size, np.unique(self.events.event).size
-        yield TextLine("Events", f"{number:,}, of which {shaken:,} shake a site")
+        yield TextLine("Events", f"{number:,}, of which {shaken:,} have ground motion at a site")
         measures = describe.measures(self.portfolio.measures)
         yield TextLine("Shaking", f"{measures}, component {self.portfolio.component.name}")
         if self.annual_rate_any is None:
@@ -280,8 +295,9 @@ class LossAnswer(Result):
                     f"{return_period(low)} (full dependence)"
                 )
             yield TextLine("Bounds", ends)
-        models = map(describe.stored_model, self.portfolio.models)
-        yield TextLine("Model", "; ".join(dict.fromkeys(models)))
+        models = self.portfolio.models
+        names = (f"{row.name} ({describe.stored_model(row)})" for row in models)
+        yield TextLine("Model", "; ".join(names))
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the exceedance curves and the rows of blocks; all values if verbose.

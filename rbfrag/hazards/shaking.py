@@ -16,8 +16,7 @@ from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import percent
-from rbfrag.results.numbers import rate as rate_text
+from rbfrag.results.numbers import annual_rate, percent
 from rbfrag.solver.results import FloatArray
 
 _SCATTER_POINTS = 25
@@ -188,7 +187,7 @@ def ends_in_words(
         if size is more:
             yield Diagnostic(
                 f"the hazard curve{of_site} ends at {curve.level_text(-1)}: stronger shaking may "
-                f"add up to {rate_text(float(more[worst]))} /yr to the rate{more_sites}",
+                f"add up to {annual_rate(float(more[worst]))} /yr to the rate{more_sites}",
                 "curve_ends",
             )
         else:

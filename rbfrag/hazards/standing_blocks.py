@@ -82,12 +82,14 @@ class AnyRate:
             its interval, or the rate alone.
         mean: the mean over the draws of the first of each [1/a].
         outside: part of it from outside the ranges that the model was fitted on.
+        beyond: the most that shaking above the last level of the curve may add to the rate [1/a].
         warnings: what the ends of the curve leave open.
     """
 
     annual_rate: FloatArray
     mean: float
     outside: float
+    beyond: float
     warnings: tuple[str, ...]
 
 
@@ -111,7 +113,8 @@ class FragilityBlocks:
         ends = result.annual_rate, result.above, result.above_at_most, result.below
         texts = ends_in_words([curve], _FIRST_SITE, *(values[:1] for values in ends))
         rates = result.annual_rate[:, None, None]
-        return AnyRate(rates, float(rates[0, 0, 0]), 0.0, tuple(texts))
+        beyond = float((result.above_at_most - result.above)[0])
+        return AnyRate(rates, float(rates[0, 0, 0]), 0.0, beyond, tuple(texts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +228,8 @@ class ModelBlocks:
             by_law = self._together(blocks, mass, each)
         share = outside.sum() / max(float(rate.sum()), np.finfo(np.float64).tiny)
         mean = float(self.weight @ by_law[0, :, 0])
-        return AnyRate(by_law, mean, float(share), tuple(warnings))
+        above = min(float((most - beyond * last).sum()), beyond)
+        return AnyRate(by_law, mean, float(share), above, tuple(warnings))
 
     def _mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over the draws, shape (m,)."""

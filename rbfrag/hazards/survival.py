@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Unpack
@@ -15,6 +16,7 @@ from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branches import Weights, branch_curves, curve_name, quantile_warning
 from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike
+from rbfrag.hazards.hazard_answer import NOTABLE_FACTOR
 from rbfrag.hazards.model_parts import RateKeywords
 from rbfrag.hazards.shaking import NOTABLE, LevelShaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
@@ -28,7 +30,15 @@ from rbfrag.hazards.standing_blocks import (
 )
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import confidence, interval, percent, return_period
+from rbfrag.results.numbers import (
+    NEVER,
+    confidence,
+    equals,
+    interval,
+    percent,
+    return_period,
+    two_digits,
+)
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import by_model, mode_of_kind
 from rbfrag.solver.results import FloatArray
@@ -40,6 +50,7 @@ DRAWS = 128
 REJECTION_LEVEL = 0.05
 """Probability of survival below which a hazard curve is rejected."""
 
+_NOT_IN_JSON = ("standing", "annual_rate_beyond")
 _OF_BRANCH = (
     "name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent",
 )  # fmt: skip
@@ -110,6 +121,8 @@ class SurvivalAnswer(Result):
         level: confidence level of the interval.
         warnings: what to know about the answer.
         standing: survival for any factor.
+        annual_rate_beyond: the most that shaking above the last level of the curve may add to the
+            rate [1/a].
     """
 
     probability_standing: float
@@ -136,24 +149,48 @@ class SurvivalAnswer(Result):
     level: float
     warnings: tuple[str, ...]
     standing: Standing = field(repr=False)
+    annual_rate_beyond: float = 0.0
 
     @property
     def mode(self) -> str:
         """Failure mode of the blocks; empty for a fragility of the caller's."""
         return mode_of_kind(self.kind or "")
 
+    @property
+    def _ends_early(self) -> bool:
+        rate, most = self.annual_rate_any, self.annual_rate_any + self.annual_rate_beyond
+        return most > max(NOTABLE_FACTOR * rate, NEVER)
+
+    @property
+    def _factor_beyond(self) -> float:
+        """Smallest factor on P by shaking above the last level: exp(-rate beyond · mean age).
+
+        P is the mean of exp(-rate · age) over ages. The mean of its product with exp(-rate beyond ·
+        age) is at least the product of the means (Chebyshev), and the mean of the latter at least
+        its value at the mean age (Jensen).
+        """
+        return math.exp(-self.annual_rate_beyond * self.age_years)
+
     def sentences(self) -> Iterator[str]:
-        """Yield the probability of survival and the test of the hazard curve."""
+        """Yield the probability of survival, the return period, and the test of the curve."""
         blocks = "" if self.blocks == 1 else f"all {self.blocks} blocks "
         sd = f" ± {self.age_sd_years:,.6g}" if self.age_sd_years else ""
-        ends = confidence(self.level, interval(self.ci_low, self.ci_high))
-        yield (
-            f"P({blocks}still standing after {self.age_years:,.6g}{sd} years) = "
-            f"{percent(self.probability_standing)}   ({ends})"
-        )
+        event = f"P({blocks}still standing after {self.age_years:,.6g}{sd} years)"
+        value = percent(self.probability_standing)
+        failure = "a failure" if blocks else "failure"
         rate = self.annual_rate_any
-        period = "infinite: no failure" if rate == 0.0 else return_period(rate)
-        yield f"Return period of {'a failure' if blocks else 'failure'} {period}"
+        if self._ends_early:
+            most = return_period(rate + self.annual_rate_beyond)
+            p = self.probability_standing
+            ends = interval(p * self._factor_beyond, p)
+            yield f"{equals(event, ends)}: the hazard curve ends too early"
+            longest = f" and at most {return_period(rate)}" if rate > NEVER else ""
+            yield f"Return period of {failure} at least {most}{longest}"
+        else:
+            ends = interval(self.ci_low, self.ci_high)
+            level = f"   ({confidence(self.level, ends)})" if ends != value else ""
+            yield f"{equals(event, value)}{level}"
+            yield f"Return period of {failure} {return_period(rate)}"
         yield f"{self._curve()} {self._test()}"
 
     def _curve(self) -> str:
@@ -163,32 +200,36 @@ class SurvivalAnswer(Result):
         return f"The hazard of {self.hazard}" if weighted else f"The hazard curve {self.hazard}"
 
     def _test(self) -> str:
-        """Return the outcome of the test at the 5 % level."""
-        if self.factor_5_percent is None:
-            return "is not rejected: no factor on its rates makes P less than 5 %"
-        factor = f"{float(f'{self.factor_5_percent:.2g}'):,.15g}"
-        if self.ci_low < REJECTION_LEVEL < self.ci_high:
+        """Return the outcome of the test at the 5 % level; undecided if the interval has 5 %."""
+        level = f"at the {100.0 * REJECTION_LEVEL:g} % level"
+        least = self.ci_low * self._factor_beyond
+        if least < REJECTION_LEVEL < self.ci_high:
+            reason = "it ends too early" if self.ci_low >= REJECTION_LEVEL else "the interval of P"
+            includes = "" if self.ci_low >= REJECTION_LEVEL else " includes 5 %"
+            return f"is neither rejected nor accepted {level}: {reason}{includes}{self._factor()}"
+        if self.ci_high <= REJECTION_LEVEL and self.factor_5_percent is not None:
+            factor = two_digits(self.factor_5_percent)
             return (
-                "is neither rejected nor accepted at the 5 % level: the interval includes 5 %; P "
-                f"would be 5 % with all rates multiplied by {factor}"
+                f"is rejected {level}: consistent only if all its rates are multiplied by {factor} "
+                "or less"
             )
-        if self.factor_5_percent < 1.0:
-            return (
-                "is rejected at the 5 % level: consistent only if all its rates are multiplied by "
-                f"{factor} or less"
-            )
-        return (
-            "is not rejected at the 5 % level: P would be 5 % with all rates multiplied by "
-            f"{factor}"
-        )
+        return f"is not rejected {level}{self._factor()}"
+
+    def _factor(self) -> str:
+        if self.factor_5_percent is None or self._ends_early:
+            return ""
+        factor = two_digits(self.factor_5_percent)
+        return f"; P would be 5 % with all its rates multiplied by {factor}"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the hazard curve, the dependence of several blocks and the model."""
         yield TextLine("Curve", ", ".join(filter(None, (self.imt, self.site))))
         if self.blocks > 1:
-            yield TextLine("Joint", self.joint_law)
-        if self.model is not None:
-            yield TextLine("Model", describe.model(vars(self)))
+            yield TextLine("Failures", f"joint failures by {self.joint_law}")
+        if self.model is None:
+            yield TextLine("Model", "user-supplied fragility function")
+        else:
+            yield TextLine("Model", describe.named_model(vars(self)))
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the factors on the rates with their intervals, bounds, and branches."""
@@ -220,7 +261,7 @@ class SurvivalAnswer(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
         return {
-            **{name: value for name, value in vars(self).items() if name != "standing"},
+            **{name: value for name, value in vars(self).items() if name not in _NOT_IN_JSON},
             "factor_5_percent_ci": list(self.factor_5_percent_ci),
             "factor_50_percent_ci": list(self.factor_50_percent_ci),
             "how": "fragility of the caller's" if self.model is None else by_model(self.model),
@@ -323,6 +364,7 @@ def survival(
         level=answering.get("level", LEVEL),
         warnings=tuple(dict.fromkeys(_warnings(each, rates, blocks))),
         standing=middle,
+        annual_rate_beyond=max(rate.beyond for rate in (rates[:1] if weight is None else rates)),
     )
 
 

@@ -68,6 +68,11 @@ def years(rate: float, digits: int = 2) -> str:
     return f"{float(f'{1.0 / rate:.{digits}g}'):,.15g}"
 
 
+def two_digits(value: float) -> str:
+    """Return a number with two significant digits and without an exponent: "890"."""
+    return f"{float(f'{value:.2g}'):,.15g}"
+
+
 def return_period(rate: float) -> str:
     """Return the return period of an annual rate [1/yr]: "4,400 years"."""
     return f"{years(rate)} years" if rate > NEVER else "over 100 million years"
@@ -89,7 +94,7 @@ def place(lon: float, lat: float) -> str:
     return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
 
 
-def rate(value: float) -> str:
+def annual_rate(value: float) -> str:
     """Return an annual rate [1/yr] without its unit, with two significant digits: "2.3e-4"."""
     if value == 0.0 or 0.1 <= value < 1000.0:
         return f"{value:.2g}"
@@ -97,14 +102,9 @@ def rate(value: float) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-def rate_interval(low: float, high: float) -> str:
+def annual_rates(low: float, high: float) -> str:
     """Return an interval of annual rates [1/yr] without its unit: "1.9e-4–2.7e-4"."""
-    return "–".join(dict.fromkeys((rate(low), rate(high))))
-
-
-def equation(text: str) -> str:
-    """Return a printed number as the right-hand side of an equation: "= 15 %", or "<0.01 %"."""
-    return text if text[0] in "<>" else f"= {text}"
+    return "–".join(dict.fromkeys((annual_rate(low), annual_rate(high))))
 
 
 def rounded(value: float) -> str:

@@ -120,7 +120,7 @@ def test_a_scenario(shell: Shell, job: Path) -> None:
     assert answer["average_annual_failures"] is None
     assert 0.0 < answer["expected_failures"] < 1.0
     printed = shell("losses", folder, "--blocks", "blocks.csv", "--plot", "curve.png").stdout
-    assert "Expected failures           0.501 of 4 blocks" in printed
+    assert "Expected failures           0.5 of 4 blocks" in printed
 
 
 def test_bounds_are_printed_and_drawn(shell: Shell, job: Path) -> None:

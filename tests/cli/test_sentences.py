@@ -6,7 +6,13 @@ import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.sentences import rock_mass_in_words
-from rbfrag.results.numbers import return_period, return_periods, rounded
+from rbfrag.results.numbers import (
+    annual_rate,
+    annual_rates,
+    return_period,
+    return_periods,
+    rounded,
+)
 
 
 @pytest.mark.parametrize(
@@ -27,6 +33,14 @@ def test_an_interval_of_return_periods_starts_with_the_shorter() -> None:
     assert return_periods(1.0 / 5312.0, 1.0 / 3704.0) == "3,700–5,300"
     assert return_periods(0.0, 1.0 / 3704.0) == "3,700–over 100 million"
     assert return_periods(0.001, 0.001001) == "1,000"
+
+
+def test_rates_have_two_digits_and_an_exponent_where_they_are_small() -> None:
+    assert [annual_rate(value) for value in (0.0, 0.5, 12.0, 2.34e-4, 1e-10)] == [
+        "0", "0.5", "12", "2.3e-4", "1.0e-10",
+    ]  # fmt: skip
+    assert annual_rates(1.9e-4, 2.73e-4) == "1.9e-4–2.7e-4"
+    assert annual_rates(1.9e-4, 1.91e-4) == "1.9e-4"
 
 
 @pytest.mark.parametrize(

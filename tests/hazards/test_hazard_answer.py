@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.hazard_answer import HazardAnswer
-from rbfrag.results.numbers import return_period, return_periods
+from rbfrag.results.numbers import annual_rate, return_period, return_periods, with_interval
 from tests.fragility.conftest import SHARED, model_row
 
 
@@ -30,18 +32,37 @@ def test_one_block_has_a_return_period_with_its_interval() -> None:
         f"Return period of failure {return_period(rate)}   "
         f"(95 % confidence interval {return_periods(low, high)})"
     )  # fmt: skip
-    assert second.startswith("Mean annual rate ")
-    assert "P(failure in 50 years) = " in second
+    assert second == (
+        f"Mean annual rate {annual_rate(rate)} /yr; P(failure in 50 years) = "
+        f"{with_interval(*(1.0 - math.exp(-50.0 * value) for value in (rate, low, high)))}"
+    )
     assert third.startswith("Not included in the interval: choice of intensity measure, × ")
     drained = replace(answer, drained=np.array([1e-4]))
     assert "Drained return period 10,000 years" in [*drained.sentences()]
 
 
 def test_a_curve_that_ends_early_gives_a_range() -> None:
-    first = answered(last=0.7).headline()
+    first, second, _ = answered(last=0.7).sentences()
     assert first.startswith("Return period of failure between ")
     assert first.endswith("years: the hazard curve ends at PGV = 0.7 m/s")
-    assert answered(last=0.05).headline().startswith("Return period of failure at least ")
+    assert re.match(
+        r"Mean annual rate [\d.e-]+–2.1e-3 /yr; P\(failure in 50 years\) = [\d.–]+ %", second
+    )
+    # shaking above the last level, at 0.05 m/s and once in 2.5 years, may fail the block each time
+    first, second, _ = answered(last=0.05).sentences()
+    assert first == (
+        "Return period of failure at least 2.5 years: the hazard curve ends at PGV = 0.05 m/s"
+    )
+    assert second == "Mean annual rate at most 0.4 /yr; P(failure in 50 years) at most 100 %"
+    first, *_, last, _ = answered([3.0, 3.0], 0.1, last=0.7).sentences()
+    assert first.endswith(" /yr of 2 blocks: the hazard curve ends too early")
+    assert last.startswith("Shortest return periods at most: ")
+
+
+def test_a_rate_of_never_has_no_interval() -> None:
+    first, second, _ = answered(kr=300.0, last=1e4).sentences()
+    assert first == "Return period of failure over 100 million years"
+    assert second.endswith("P(failure in 50 years) <0.01 %")
 
 
 def test_several_blocks_have_a_sum_and_their_shortest_return_periods() -> None:

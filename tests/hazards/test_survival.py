@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -317,3 +318,30 @@ def test_a_free_block_of_los_angeles(formats_dir: Path) -> None:
     assert worked.annual_rate_any == pytest.approx(1.334e-3, rel=5e-3)
     assert worked.factor_5_percent == pytest.approx(0.225, rel=5e-3)
     assert worked.probability_standing == pytest.approx(1.6e-6, rel=2e-2)
+
+
+def test_an_interval_that_includes_5_percent_decides_nothing() -> None:
+    curve = hazard_curve("pgv_m_s", np.array([0.1, 1.0, 10.0]), np.array([1e-2, 1e-3, 1e-4]))
+    answer = survival(curve, fragility=lambda x: np.clip(x, 0.0, 1.0), age_years=300.0)
+
+    def test_of(p: float, low: float, high: float) -> str:
+        changed = replace(answer, probability_standing=p, ci_low=low, ci_high=high)
+        return [*changed.sentences()][-1]
+
+    assert " is rejected at the 5 % level" in test_of(0.02, 0.01, 0.03)
+    assert " is neither rejected nor accepted at the 5 % level" in test_of(0.04, 0.02, 0.08)
+    assert " is not rejected at the 5 % level" in test_of(0.2, 0.1, 0.3)
+
+
+def test_a_curve_that_ends_early_gives_a_range() -> None:
+    curve = hazard_curve("pgv_m_s", np.array([0.01, 0.1, 0.2]), np.array([1e-2, 2e-3, 1e-3]))
+    answer = survival(curve, fragility=lambda x: np.clip(x - 0.19, 0.0, 1.0), age_years=2000.0)
+    assert answer.annual_rate_beyond == pytest.approx(1e-3, rel=0.05)
+    first, second, last = answer.sentences()
+    assert first.endswith(" %: the hazard curve ends too early")
+    assert second.startswith("Return period of failure at least 1,0")
+    assert last.endswith("is not rejected at the 5 % level")
+    # in 5,000 years at a rate of 1e-3 /yr less than 1 % would stand
+    old = survival(curve, fragility=lambda x: np.clip(x - 0.19, 0.0, 1.0), age_years=5000.0)
+    *_, last = old.sentences()
+    assert last.endswith("is neither rejected nor accepted at the 5 % level: it ends too early")
