@@ -7,11 +7,13 @@ no library.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.fragility import describe
 from rbfrag.fragility.lookup import stored_row
 from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, TERMS
 from rbfrag.fragility.method import SINGLE, Numbers, arrays
@@ -20,7 +22,8 @@ from rbfrag.fragility.prediction import is_single, single
 from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
 from rbfrag.question.components import COMPONENT_SIGMA, to_single_component, total_sigma
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.vocabulary.quantities import INTENSITY
+from rbfrag.results.result import Result, TextLine, TextTable
+from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
 
 SITE = ("rjb_km", "vs30_m_s")
 """Fields that make a question one of a scenario."""
@@ -162,8 +165,58 @@ def _mechanism_index(mechanism: str | Sequence[str | None] | None) -> Any:
     return MECHANISMS.index(name)
 
 
-def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, float]]:
-    """Return the shaking of one site: median, where two thirds lie, and standard deviations of ln.
+@dataclass(frozen=True, eq=False, repr=False)
+class ScenarioShaking(Result):
+    """Intensity measures at one site in an earthquake scenario, of the component RotD50.
+
+    Args:
+        measures: by name the ``median``, its percentiles ``p16`` and ``p84``, the standard
+            deviation of ln ``sigma`` and its between- and within-event parts ``tau`` and ``phi``.
+        inputs: the numbers of the scenario.
+        source: mechanism and ground-motion model.
+        warnings: what to know about the answer.
+    """
+
+    measures: Mapping[str, Mapping[str, float]]
+    inputs: Mapping[str, Any]
+    source: Source
+    warnings: tuple[str, ...] = ()
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the median of the first measure with its percentiles."""
+        name, values = next(iter(self.measures.items()))
+        unit = QUANTITIES[name].unit
+        yield (
+            f"Median {describe.measures([name])} {values['median']:.2g} {unit}   "
+            f"(16th–84th percentile {values['p16']:.2g}–{values['p84']:.2g} {unit})"
+        )
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the scenario, the ground-motion model and its component."""
+        texts = {"magnitude": "M {:g}", "rjb_km": "R_JB {:g} km", "vs30_m_s": "Vs30 {:g} m/s",
+                 "amplification": "amplification {:g}"}  # fmt: skip
+        parts = [text.format(self.inputs[n]) for n, text in texts.items() if n in self.inputs]
+        if self.source.mechanism is not None:
+            parts.append(str(self.source.mechanism))
+        yield TextLine("Scenario", ", ".join(parts))
+        gmm = "BSSA14 (Boore et al. 2014)" if self.source.gmm is None else str(self.source.gmm)
+        yield TextLine("Model", f"{gmm}, component RotD50")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the measures with their percentiles and standard deviations of ln."""
+        rows: list[dict[str, object]] = [
+            {"measure": describe.measures([name]), **values, "unit": QUANTITIES[name].unit}
+            for name, values in self.measures.items()
+        ]
+        yield TextTable.of_rows(rows, verbose=verbose)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the measures under the keys of the JSON contract."""
+        return {name: dict(values) for name, values in self.measures.items()}
+
+
+def scenario_shaking(given: Mapping[str, Any], source: Source) -> ScenarioShaking:
+    """Return the shaking of one site in an earthquake scenario.
 
     Args:
         given: as for :func:`scenario`, with ``amplification`` and ``amplification_sigma``.
@@ -184,7 +237,7 @@ def in_numbers(given: Mapping[str, Any], source: Source) -> dict[str, dict[str, 
         result[name] = {
             "median": median, "p16": low, "p84": high, "sigma": sigma, "tau": each.tau, "phi": phi,
         }  # fmt: skip
-    return result
+    return ScenarioShaking(result, given, source)
 
 
 def _numbers(given: Mapping[str, Any]) -> Numbers:
