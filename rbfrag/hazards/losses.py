@@ -45,6 +45,7 @@ from rbfrag.results.numbers import (
     annual_rate,
     annual_rates,
     confidence,
+    count_of,
     interval,
     percent,
     return_period,
@@ -238,8 +239,7 @@ class LossAnswer(Result):
         yield f"  {' · '.join(self._sources())}"
 
     def _numbers(self) -> Iterator[tuple[str, str]]:
-        number = int(self.portfolio.count.sum())
-        blocks = f"{number:,} block{'' if number == 1 else 's'}"
+        blocks = count_of(int(self.portfolio.count.sum()), "block")
         failures, rate = self.average_annual_failures, self.annual_rate_any
         if self.events.is_scenario:
             yield "Expected failures", f"{two_digits(failures)} of {blocks}"

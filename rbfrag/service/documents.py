@@ -303,7 +303,7 @@ class RockmassAnswer(_Answer):
 
 
 class Contribution(_Document):
-    """The part of a rate that comes from an interval of the shaking [1/a]."""
+    """The part of a rate that comes from an interval of the shaking [1/yr]."""
 
     from_: float = Field(alias="from")
     to: float
@@ -311,7 +311,7 @@ class Contribution(_Document):
 
 
 class SiteRate(_Document):
-    """The rate at one of several sites."""
+    """The annual rate of failure at one of several sites [1/yr]."""
 
     site: str | None
     block_id: str | None
@@ -324,15 +324,22 @@ class SiteRate(_Document):
 
 
 class HazardDocument(_Answer):
-    """Annual rates of toppling [1/a]: what `rbfrag hazard` prints as JSON."""
+    """Annual rates of failure [1/yr]: what `rbfrag hazard` prints as JSON.
 
+    A curve of one site has the rate and its `contributions`; curves of several sites have a row of
+    `blocks` for each and the expected failures of all. `between_measures` is the dispersion of
+    rates between intensity measures; null where it is unknown.
+    """
+
+    years: float
+    level: float
+    how: str
     model: str
     term: str
     method: str
-    years: float
-    level: float
     imt: str
     curve_kind: str | None
+    between_measures: dict[str, float] | None
     warnings: list[str]
     site: str | None = None
     annual_rate: float | None = None
@@ -342,4 +349,8 @@ class HazardDocument(_Answer):
     probability: float | None = None
     drained: dict[str, float] | None = None
     contributions: list[Contribution] | None = None
-    answers: list[SiteRate] | None = None
+    annual_rate_any: float | None = None
+    expected_failures_per_year: float | None = None
+    expected_failures_low: float | None = None
+    expected_failures_high: float | None = None
+    blocks: list[SiteRate] | None = None
