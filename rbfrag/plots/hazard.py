@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,15 +50,10 @@ def plot_contribution(
     figure = canvas.new_figure(6.4, 6.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
     draw_contribution(top, bottom, curve, answer)
-    rate = float(answer.annual_rate[0])
     place = f" at {curve.place}" if curve.place else ""
-    figure.suptitle(
-        as_written(f"hazard of {curve.imt}{place}, model {describe.model(vars(answer))}", 75)
-        + f"\nthe block fails {rate:.3g} times a year ({exact_percent(answer.level)} interval "
-        f"{answer.ci_low[0]:.3g} to {answer.ci_high[0]:.3g}),\n"
-        f"{percent(answer.probability[0])} in {answer.years:g} years",
-        fontsize=10,
-    )
+    model = as_written(f"hazard of {curve.imt}{place}, model {describe.model(vars(answer))}", 75)
+    sentences = (as_written(text, 85) for text in islice(answer.sentences(), 2))
+    figure.suptitle("\n".join((model, *sentences)), fontsize=10)
     return canvas.save_figure(figure, out)
 
 

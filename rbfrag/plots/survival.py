@@ -15,7 +15,6 @@ from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
 from rbfrag.plots import canvas
 from rbfrag.plots.hazard import measure_title
 from rbfrag.plots.labels import as_written, write_near
-from rbfrag.results.numbers import with_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,12 +67,7 @@ def plot_survival(
     for axes in panels:
         canvas.open_corner(axes)
     canvas.light_grid(*panels[:2])
-    who = "The block stands" if answer.blocks == 1 else f"All {answer.blocks} blocks stand"
-    figure.suptitle(
-        f"{who} for {answer.age_years:,.6g} years with a probability of "
-        + with_interval(answer.probability_standing, answer.ci_low, answer.ci_high),
-        fontsize=11,
-    )
+    figure.suptitle(answer.headline(), fontsize=11)
     canvas.legend_below(figure, 4)
     return canvas.save_figure(figure, out)
 

@@ -321,6 +321,7 @@ class SiteRate(_Document):
     numerical_error: float
     probability: float
     drained: dict[str, float] | None
+    reason: str
 
 
 class HazardDocument(_Answer):

@@ -93,7 +93,7 @@ def test_names_of_sites_and_events_are_letters_and_stay_on_the_sheet(tmp_path, c
     plot_shakemap(places, places, np.geomspace(1e-4, 1, 5), tmp_path / "b.png", title=LONG)
     rate = figures[0]
     assert "\\$5" in rate.get_suptitle()
-    assert f"{answer.annual_rate[0]:.3g} times a year" in rate.get_suptitle()
+    assert answer.headline() in rate.get_suptitle()
     assert overlapping(rate, [rate._suptitle, *(axes.title for axes in rate.axes)]) == []
     (sheet,) = maps
     title = sheet.axes[0].title
