@@ -332,17 +332,9 @@ class HazardAnswer(Result):
             verbose: with every value and every row.
         """
         document = self.as_dict()
-        rows = document.pop("blocks", [])
-        apart = ("warnings", "branches", "sites", "contributions", "drained", "bounds",
-                 "annual_rate_at_least")  # fmt: skip
+        rows = document.get("blocks", [])
         if verbose:
-            bounds = {
-                f"{name}_{law}": value
-                for law, values in document.get("bounds", {}).items()
-                for name, value in values.items()
-            }
-            values = {name: value for name, value in document.items() if name not in apart}
-            yield TextTable((), [*(values | bounds).items()])
+            yield TextTable.of_values(document)
         if self._is_single and self.annual_rate[0] > 0.0:
             curve = self.curves[0]
             branch = f" of {self.branches[0].name}" if self.branches else ""

@@ -313,13 +313,7 @@ class LossAnswer(Result):
             if name.startswith(("exceedance", "loss_exceedance"))
         }
         if verbose:
-            bounds = {
-                f"{name}_{law}": value
-                for law, values in document.pop("bounds").items()
-                for name, value in values.items()
-            }
-            values = {name: v for name, v in (document | bounds).items() if name != "warnings"}
-            yield TextTable((), [item for item in values.items() if item[1] is not None])
+            yield TextTable.of_values(document)
         for curve in curves.values():
             by_law = curve if isinstance(curve, dict) else {"": curve}
             for law, rows in by_law.items():

@@ -51,13 +51,6 @@ REJECTION_LEVEL = 0.05
 """Probability of survival below which a hazard curve is rejected."""
 
 _NOT_IN_JSON = ("standing", "annual_rate_beyond")
-_OF_BRANCH = (
-    "name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent",
-)  # fmt: skip
-_IN_TABLES = (
-    "probability_standing", "ci_low", "ci_high", "factor_5_percent", "factor_5_percent_ci",
-    "factor_50_percent", "factor_50_percent_ci", "bounds", "branches", "warnings",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,13 +243,9 @@ class SurvivalAnswer(Result):
             )
         if len(self.branches) > 1:
             branches = [branch.as_dict() for branch in self.branches]
-            names = [*branches[0]] if verbose else [*_OF_BRANCH]
-            yield TextTable.of_rows(
-                [{name: branch[name] for name in names} for branch in branches], verbose=verbose
-            )
+            yield TextTable.of_rows(branches, verbose=verbose)
         if verbose:
-            values = self.as_dict().items()
-            yield TextTable((), [(name, value) for name, value in values if name not in _IN_TABLES])
+            yield TextTable.of_values(self.as_dict())
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

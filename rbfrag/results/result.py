@@ -31,6 +31,17 @@ class TextTable(NamedTuple):
     rows: Sequence[Sequence[object]]
 
     @classmethod
+    def of_values(cls, document: Mapping[str, Any]) -> TextTable:
+        """Return the numbers and texts of a document, nested ones by their path, without lists."""
+        rows: list[tuple[str, object]] = []
+        for name, value in document.items():
+            if isinstance(value, Mapping):
+                rows += [(f"{name}.{key}", nested) for key, nested in cls.of_values(value).rows]
+            elif not isinstance(value, list):
+                rows.append((name, value))
+        return cls((), rows)
+
+    @classmethod
     def of_rows(cls, rows: Sequence[Mapping[str, object]], *, verbose: bool = False) -> TextTable:
         """Return rows under their names, without the columns that are empty in all of them.
 
