@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import rbfrag
-from rbfrag.cli.hazard_sentences import place_in_words
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.hazards.answer import counted
-from rbfrag.results.numbers import annual_rate, return_period
+from rbfrag.results.numbers import annual_rate, place, return_period
 from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
@@ -222,8 +221,8 @@ def test_blocks_stand_at_the_nearest_site_by_place(
 
 
 def test_places_have_letters_for_signs() -> None:
-    assert place_in_words(-122.005, 37.1) == "37.100 N, 122.005 W"
-    assert place_in_words(174.79, -41.3) == "41.300 S, 174.790 E"
+    assert place(-122.005, 37.1) == "37.100 N, 122.005 W"
+    assert place(174.79, -41.3) == "41.300 S, 174.790 E"
 
 
 def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree: Path) -> None:
