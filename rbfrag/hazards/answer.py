@@ -51,7 +51,7 @@ from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.results.numbers import percent
+from rbfrag.results.numbers import percent, relative
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
@@ -401,7 +401,7 @@ def _numbers_in_words(result: Rates) -> Iterator[str]:
     worst = np.nan_to_num(result.error[result.rate > NEVER]).max(initial=0.0)
     if worst > NUMERICAL_AIM:
         yield Diagnostic(
-            f"the numerical error of a rate is up to {percent(worst)}: the fragility changes "
+            f"the numerical error of a rate is up to {relative(worst)}: the fragility changes "
             "abruptly between levels of the curve",
             "quadrature_error",
         )

@@ -14,7 +14,7 @@ from rbfrag.hazards.hazard_answer import HazardAnswer
 from rbfrag.plots import canvas
 from rbfrag.plots.curve import AXIS
 from rbfrag.plots.labels import as_written
-from rbfrag.results.numbers import exact_percent, percent, relative
+from rbfrag.results.numbers import relative
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
