@@ -34,6 +34,7 @@ from rbfrag.results.numbers import (
     NEVER,
     confidence,
     equals,
+    exact_percent,
     interval,
     percent,
     return_period,
@@ -194,7 +195,7 @@ class SurvivalAnswer(Result):
 
     def _test(self) -> str:
         """Return the outcome of the test at the 5 % level; undecided if the interval has 5 %."""
-        level = f"at the {100.0 * REJECTION_LEVEL:g} % level"
+        level = f"at the {exact_percent(REJECTION_LEVEL)} level"
         least = self.ci_low * self._factor_beyond
         if least < REJECTION_LEVEL < self.ci_high:
             reason = "it ends too early" if self.ci_low >= REJECTION_LEVEL else "the interval of P"
