@@ -26,7 +26,8 @@ from rbfrag.db.campaigns import CombinationRecord, insert_combinations
 from rbfrag.db.engine import opened_database
 from rbfrag.db.sqlite_file import connect_sqlite
 from rbfrag.db.stored_combination import stored_combination
-from rbfrag.solver.results import CriticalResult, SearchPoints
+from rbfrag.solver.critical_result import CriticalResult
+from rbfrag.solver.results import SearchPoints
 
 TABLES = ("combination", "outcome_interval", "simulation")
 ROUNDS = 3

@@ -22,10 +22,11 @@ from rbfrag.bench.cases import find_records
 from rbfrag.fragility.fit.data import NARROW
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.single_run import TOPPLED
-from rbfrag.solver.results import DEFAULT_P2, CriticalResult
+from rbfrag.solver.results import DEFAULT_P2
 from rbfrag.solver.search.critical import critical
 
 SCANNED = 20_000

@@ -39,11 +39,11 @@ from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block
 from rbfrag.solver.block.mesh_block import MeshBlock as MeshBlock
 from rbfrag.solver.critical import critical as critical
+from rbfrag.solver.critical_result import CriticalResult as CriticalResult
 from rbfrag.solver.models.sliding import sliding_displacements as sliding_displacements
 from rbfrag.solver.respond import respond as respond
 from rbfrag.solver.respond_draws import DrawnResponses as DrawnResponses
 from rbfrag.solver.respond_draws import respond_draws as respond_draws
-from rbfrag.solver.results import CriticalResult as CriticalResult
 from rbfrag.solver.results import Outcome as Outcome
 from rbfrag.solver.results import Response as Response
 from rbfrag.solver.stability.arrays import StabilityArray as StabilityArray

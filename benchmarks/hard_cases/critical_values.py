@@ -21,8 +21,9 @@ from benchmarks.hard_cases._records import made_up, vertical_of
 from benchmarks.hard_cases._rocking_block import topple
 from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.results import DEFAULT_P2, CriticalResult, Polarity
+from rbfrag.solver.results import DEFAULT_P2, Polarity
 from rbfrag.solver.search.critical import critical
 
 SEED = 7

@@ -15,11 +15,11 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import BlockOnPlanes, Shaking
 from rbfrag.solver.results import (
     MAP_DEPTH,
     POLARITIES,
-    CriticalResult,
     FloatArray,
     Polarity,
     Response,

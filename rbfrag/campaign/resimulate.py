@@ -27,14 +27,9 @@ from rbfrag.db.shock_pairs import (
 )
 from rbfrag.db.stored_combination import StoredCombination, keys_with_samples, stored_combination
 from rbfrag.errors import RbfragError
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.results import (
-    MAP_DEPTH,
-    NUMERICS_VERSION,
-    CriticalResult,
-    OutcomeIntervals,
-    SearchPoints,
-)
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, OutcomeIntervals, SearchPoints
 
 _VALUES = (
     "status",

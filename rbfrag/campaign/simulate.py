@@ -44,8 +44,9 @@ from rbfrag.db.responses import insert_responses
 from rbfrag.db.rows import Vertical
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, UnknownFieldError, WorkFailedError
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import MAP_DEPTH, CriticalResult
+from rbfrag.solver.results import MAP_DEPTH
 
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""

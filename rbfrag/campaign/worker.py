@@ -13,15 +13,9 @@ from rbfrag.db.responses import ResponseRecord
 from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import Shaking
-from rbfrag.solver.results import (
-    MAP_DEPTH,
-    NUMERICS_VERSION,
-    CriticalResult,
-    FloatArray,
-    Polarity,
-    SearchPoints,
-)
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, FloatArray, Polarity, SearchPoints
 
 
 @dataclass(frozen=True)

@@ -7,25 +7,6 @@ from typing import Any
 
 from rbfrag.results.numbers import percent, rounded, with_interval
 
-STATUS = {
-    "below_limit": "The record topples no block of this size down to the search limit",
-    "no_motion": "The record uplifts no block of this size down to the search limit",
-    "outside_model": "The motion throws blocks off their base, which the model does not follow",
-}
-
-SCALED_STATUS = {
-    "below_limit": "The block does not fail at any factor on the record up to scale_limit that "
-    "was tried",
-    "no_motion": "The block does not move at any factor on the record up to scale_limit",
-}
-
-SLIDING_STATUS = {
-    "below_limit": "No block down to the search limit slides {:g} m.",
-    "no_motion": "No block down to the search limit slides.",
-    "outside_model": "The vertical motion throws blocks off their base, which the model does not "
-    "follow.",
-}
-
 
 def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
     """Yield how a run ended, with the number that decides.
@@ -108,69 +89,6 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
             f"{with_interval(of_all['share'], of_all['ci_low'], of_all['ci_high'])} of the blocks "
             f"fail" + (f"; {percent(unknown)} undetermined" if unknown else "")
         )
-
-
-def critical_in_words(answer: Mapping[str, Any], block_kr: float | None = None) -> Iterator[str]:
-    """Yield what a search has found: the block that was asked about, and the critical value.
-
-    Args:
-        answer: a critical value under the keys of the JSON contract: k_r/PGA, or a scale.
-        block_kr: k_r of the block whose p² was searched; None for no such block.
-    """
-    if "scale" in answer:
-        yield _scale_in_words(answer)
-        return
-    pga_g, upper = answer["pga_g"], answer["upper"]
-    highest = None if upper is None else upper * pga_g
-    about = f"p² = {answer['p2']:.3g} s⁻²; PGA {rounded(pga_g)} g, {answer['polarity']} polarity"
-    if answer["status"] != "found":
-        yield (
-            STATUS[answer["status"]]
-            if answer["certified"] or highest is None
-            else f"No block of this size was seen to topple down to the search limit: not "
-            f"certified below k_r = {rounded(highest)}"
-        )
-        yield about
-        return
-    kr, ratio = rounded(answer["kr"]), rounded(answer["kr_over_pga"])
-    if answer["certified"]:
-        half_width = 0.5 * (upper - answer["lower"]) * pga_g
-        value, precision = f"k_r = {kr}", f"certified to ±{half_width:.0e}"
-    else:
-        value = f"k_r between {kr} and {rounded(upper * pga_g)}"
-        precision = f"not certified ({kr} is the strongest block seen to topple)"
-    if block_kr is None:
-        yield f"Critical {value}: {precision}"
-    else:
-        weaker, stronger = block_kr <= answer["kr"], block_kr > upper * pga_g
-        topples = "topples" if weaker else "does not topple" if stronger else "may topple"
-        yield (
-            f"The block (k_r = {rounded(block_kr)}) {topples}: the critical value of this record "
-            f"is {value}"
-        )
-    yield f"k_r/PGA = {ratio}, {precision}; {about}"
-
-
-def _scale_in_words(answer: Mapping[str, Any]) -> str:
-    if answer["scale"] is None:
-        return SCALED_STATUS[answer["status"]]
-    factor, pga = answer["scale"], answer["scale"] * answer["pga_g"]
-    return (
-        f"The block fails if the record is multiplied by {rounded(factor)} (PGA {rounded(pga)} g)"
-    )
-
-
-def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what a search for sliding blocks has found: the smallest distance, and what holds."""
-    first = document["thresholds"][0]
-    if first["status"] == "found":
-        yield (
-            f"Critical k_y = {rounded(first['ky'])} for a displacement of "
-            f"{first['displacement_m']:g} m on a level plane"
-        )
-    else:
-        yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
-    yield "On a dipping base, displacements are cos(φ − β)/cos φ times these"
 
 
 def strongest_kr(spectrum: Mapping[str, Any]) -> list[float]:

@@ -17,7 +17,8 @@ from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import Interval, Point
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
+from rbfrag.solver.critical_result import CriticalResult
+from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
 from rbfrag.version import __version__
 
 _COLUMNS = tuple(column.name for column in combination.c if column.name not in NOT_DIGESTED)

@@ -10,8 +10,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import as_written, write_near
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.toppling_run import runner
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from rbfrag.exchange.table_answers import TableAnswer
 from rbfrag.fragility.prediction import OF_EACH_MODEL, Prediction
 from rbfrag.fragility.prediction_array import OF_ARRAYS, PredictionArray
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.reports import STRENGTH_VALUES
-from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.critical_result import STRENGTH_VALUES, CriticalResult
 from rbfrag.solver.stability.joint import JointStrength
 from rbfrag.solver.stability.single import KEYS, Cohesion, Stability
 from rbfrag.vocabulary.results import RESULTS

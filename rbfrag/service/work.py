@@ -9,6 +9,7 @@ import asyncio
 import multiprocessing
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from fastapi import Request
@@ -109,7 +110,6 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical` prints as JSON."""
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.question.blocks import has_shape, one_block
-    from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
     numbers = query.given()
@@ -123,7 +123,7 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
         polarity="reverse" if query.reverse else "forward",
         full_map=query.map,
     )
-    return json_text(critical_as_dict(result, full_map=query.map))
+    return json_text(replace(result, with_map=query.map).as_dict())
 
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import Kind
 from rbfrag.solver.models import model_of_kind, model_of_mode
-from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, Polarity
+from rbfrag.solver.results import SEARCH_LIMIT, Polarity
 from rbfrag.solver.stability.single import Stability, refuse_undecided, rough_deg, stability
 
 
@@ -100,13 +102,15 @@ def critical(
     model = kind_of(kind, given)
     if model.searchable and "block" in given and "beta_deg" in given:
         judged_at_rest(given)
-    return model.critical(
-        as_motion(motion),
+    ground = as_motion(motion)
+    answer = model.critical(
+        ground,
         vertical=None if vertical is None else as_motion(vertical, "vertical"),
         polarity=polarity,
         search_limit=search_limit,
         **given,
     )
+    return replace(answer, motion=ground.label)
 
 
 def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:

@@ -15,15 +15,10 @@ from typing import Any, Self
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.kinds import KindFacts, facts_of
-from rbfrag.solver.results import (
-    BlockState,
-    CriticalResult,
-    Outcome,
-    Polarity,
-    Response,
-)
+from rbfrag.solver.results import BlockState, Outcome, Polarity, Response
 from rbfrag.solver.stability.modes import DRY, ModeName, Push
 from rbfrag.solver.stability.single import Stability
 

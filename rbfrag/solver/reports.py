@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.kinds import FOLLOWED
-from rbfrag.solver.quantity import finite_or_none
-from rbfrag.solver.results import CriticalResult, FloatArray, Part, Response, ResponseHistory
+from rbfrag.solver.results import FloatArray, Part, Response, ResponseHistory
 
 RESPONSE_NUMBERS = (
     "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s", "toppled_s",
@@ -30,13 +27,6 @@ OF_TWO_CORNERS = (
     "peak_spread",
 )  # fmt: skip
 """Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
-
-STRENGTH_VALUES = (
-    "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "search_limit", "certified",
-    "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved", "reentrant", "n_runs",
-    "p2",
-)  # fmt: skip
-"""Values of a search for a strength in its JSON answer."""
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -147,86 +137,3 @@ def _over_critical(response: Response, history: ResponseHistory) -> list[float] 
         ratio = np.where(theta < 0.0, backward, ratio)
     over: list[float] = ratio.tolist()
     return over
-
-
-NOT_PROVEN = (
-    "the scale is the smallest that was seen to fail: the scales between those that were looked "
-    "at (5 % apart) are not proven safe"
-)
-
-
-def critical_as_dict(
-    result: CriticalResult, *, remarks: Sequence[str] = (), full_map: bool = False
-) -> dict[str, Any]:
-    """Return the answer with the keys of the JSON contract.
-
-    Args:
-        result: the answer, of any kind.
-        remarks: warnings about the motion, which go before those of the answer.
-        full_map: put the map of outcomes in.
-    """
-    if "scale" in result.of_kind:
-        answer = _scaled(result)
-    elif "displacement_m" in result.of_kind:
-        answer = _sliding(result)
-    else:
-        answer = {name: getattr(result, name) for name in STRENGTH_VALUES}
-    answer |= {"polarity": result.polarity, "pga_g": result.pga_g, "how": FOLLOWED}
-    answer["warnings"] = [*remarks, *result.warnings]
-    if result.of_kind.get("scale") is not None:
-        answer["warnings"].append(NOT_PROVEN)
-    if full_map:
-        answer["map"] = map_rows(result)
-    return answer
-
-
-def map_rows(result: CriticalResult) -> list[dict[str, Any]]:
-    """Return the map of outcomes, one row per interval of k_r/PGA, rising."""
-    intervals = result.intervals
-    return [
-        {"k_lo": low, "k_hi": high, "outcome": outcome}
-        for low, high, outcome in zip(
-            intervals.k_lo.tolist(), intervals.k_hi.tolist(), intervals.outcome, strict=True
-        )
-    ]
-
-
-def _sliding(result: CriticalResult) -> dict[str, Any]:
-    return {
-        "kind": result.kind,
-        "displacement_m": result.of_kind["displacement_m"],
-        "ky_over_pga": result.kr_over_pga,
-        "lower": result.lower,
-        "upper": result.upper,
-        "ky": result.kr,
-        "status": result.status,
-        "search_limit": result.search_limit,
-        "certified": result.certified,
-        "n_runs": result.n_runs,
-    }
-
-
-def _scaled(result: CriticalResult) -> dict[str, Any]:
-    its = result.of_kind
-    scale = its["scale"]
-    y_m_s = None
-    if scale is not None:
-        y_m_s = its["yield_g"] / scale * STANDARD_GRAVITY_M_S2 / math.sqrt(result.p2)
-    return {
-        "kind": result.kind,
-        "rotation_deg": its["rotation_deg"],
-        "scale": scale,
-        "lower": its["lower_scale"],
-        "upper": scale,
-        "status": result.status,
-        "starts_scale": its["starts_scale"],
-        "scale_limit": finite_or_none(its["scale_limit"]),
-        "certified": result.certified,
-        "reentrant": result.reentrant,
-        "n_runs": result.n_runs,
-        "k_over_pga": result.kr_over_pga,
-        "pga_at_failure_g": None if scale is None else scale * result.pga_g,
-        "y_m_s": y_m_s,
-        its["yield_name"]: its["yield_g"],
-        "ps2": result.p2,
-    }

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
 
@@ -325,72 +324,3 @@ class OutcomeIntervals:
 def no_intervals() -> OutcomeIntervals:
     """Return the map of a search that made none."""
     return OutcomeIntervals(np.empty(0), np.empty(0), ())
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class CriticalResult(Tabular):
-    """The critical block of one motion: the strongest one that it brings down.
-
-    For kinds whose record is scaled, k/PGA is the block's yield acceleration over the PGA of the
-    scaled record, and takes the place of k_r/PGA; for sliding it is k_y/PGA.
-
-    Args:
-        kind: name of the model.
-        p2: the block's frequency parameter p² [1/s²]; NaN for sliding, which has none.
-        polarity: ``forward`` or ``reverse``.
-        pga_g: PGA of the horizontal motion [g].
-        status: ``found``; ``below_limit`` (nothing topples down to `search_limit`);
-            ``no_motion`` (no block down to the limit ever lifts); ``outside_model``.
-        search_limit: smallest k_r/PGA looked at.
-        kr_over_pga: the largest k_r/PGA known to topple; None unless found.
-        lower: lower end of the bracket, k_r/PGA: a block there topples, by a run that is clear of
-            its error.
-        upper: upper end of the bracket, k_r/PGA: no block there topples. Where the answer is
-            certified the two are 1e-6 apart at most. Toppling where it is not: from `upper` on a
-            dense scan has met no block that topples, and no gap in it that may hide one; of a
-            search that has found nothing it is K_up, above which nothing topples.
-        kr: the critical k_r itself.
-        y_m_s: critical toppling velocity k_r g/p [m/s].
-        certified: True when every k_r above the bracket is proven not to topple, slivers of
-            the total length `undecided` (at most 1e-9) excepted.
-        k_up_over_pga: proven upper bound over excursions from rest: nothing above it topples.
-        undecided: length of k_r/PGA above the bracket, or where it is not certified above
-            `lower`, for which safety is not proven.
-        island_width: width in k_r/PGA of the toppling interval that the bracket caps; None
-            without a full map.
-        kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored; None
-            without a full map.
-        reentrant: True when a safe island wider than 1e-6 lies below the critical value; False is
-            proven but for what the map leaves undecided. None without a full map, except of kinds
-            whose search sees it: then False means that none was met.
-        n_runs: number of simulations made.
-        warnings: sentences about suspicious input or an uncertain answer.
-        points: the blocks that were simulated for themselves.
-        intervals: what becomes of every block from the search limit upwards, if a full map was
-            asked for; of kinds whose record is scaled, what was seen.
-        of_kind: values that the kind alone has, by name: `displacement_m` of sliding; `scale`
-            and the other values of its JSON answer for a record that is scaled.
-    """
-
-    kind: str
-    p2: float
-    polarity: Polarity
-    pga_g: float
-    status: Status
-    search_limit: float
-    kr_over_pga: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    kr: float | None = None
-    y_m_s: float | None = None
-    certified: bool = False
-    k_up_over_pga: float | None = None
-    undecided: float | None = None
-    island_width: float | None = None
-    kr_over_pga_resolved: float | None = None
-    reentrant: bool | None = None
-    n_runs: int = 0
-    warnings: tuple[str, ...] = ()
-    points: SearchPoints
-    intervals: OutcomeIntervals = field(default_factory=no_intervals)
-    of_kind: Mapping[str, Any] = field(default_factory=dict)

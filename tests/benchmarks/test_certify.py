@@ -13,8 +13,9 @@ from benchmarks.certify import borders, islands
 from benchmarks.certify.checking import Count
 from benchmarks.certify.recordings import Recording, recordings
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.results import CriticalResult, OutcomeIntervals
+from rbfrag.solver.results import OutcomeIntervals
 from rbfrag.solver.search.critical import critical
 
 FEW = [

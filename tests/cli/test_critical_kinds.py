@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical import critical
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
+from rbfrag.solver.results import Outcome
 from tests.cli.conftest import Refuses, Shell
 
 SLUMP = "alpha1_deg = 56\nalpha3_deg = 76\nr3_m = 0.7\nbeta_deg = 22\nphi_deg = 30\n"
@@ -34,10 +36,9 @@ def test_slumping_answers_as_python_does(shell: Shell, record: Path, slump: Path
         rotation_deg=2.0,
         polarity="reverse",
     )
-    its = found.of_kind
-    assert (told["scale"], told["lower"]) == (its["scale"], its["lower_scale"])
+    assert (told["scale"], told["lower"]) == (found.scale, found.lower_scale)
     assert (told["status"], told["k_over_pga"]) == ("found", found.kr_over_pga)
-    assert (told["ks"], told["ps2"]) == (its["yield_g"], found.p2)
+    assert (told["ks"], told["ps2"]) == (found.yield_g, found.p2)
     assert told["y_m_s"] == pytest.approx(found.y_m_s, rel=1e-14)
     assert told["certified"] is False
     printed = shell(*asked).stdout
@@ -88,17 +89,32 @@ def test_a_block_of_another_mode_is_refused(refuses: Refuses, record: Path, slum
     assert "slump.toml: the block is not of kind slumping: its mode is slide" in message
 
 
-def test_a_sentence_and_four_numbers_unless_more_is_asked_for(shell: Shell, record: Path) -> None:
+def test_two_sentences_unless_every_value_is_requested(shell: Shell, record: Path) -> None:
     answer = shell.json("critical", record, "--p2", "3")
     short = shell("critical", record, "--p2", "3").stdout.splitlines()
     assert answer["certified"]
     assert re.fullmatch(r"Critical k_r = [\d.]+: certified to ±\de-\d+", short[0])
     assert float(short[0].split("k_r = ")[1].split(":")[0]) == pytest.approx(answer["kr"], rel=5e-3)
-    assert short[1].startswith("k_r/PGA = ")
-    names = [line.split()[0] for line in short[3:7]]
-    assert names == ["kr", "kr_over_pga", "y_m_s", "pga_g"]
+    assert re.match(r"k_r/PGA = [\d.]+, certified .* p² = 3 s⁻²; .*, forward polarity", short[1])
     every = shell("critical", record, "--p2", "3", "--verbose").stdout
     assert all(f"\n{name} " in every for name in answer if name != "warnings")
+
+
+def test_a_block_is_reported_to_topple_or_not(shell: Shell, record: Path) -> None:
+    """A run of the block decides: one weaker than the critical value may lie in a safe gap."""
+    kr = shell.json("critical", record, "--height", "2", "--width", "0.5")["kr"]
+    for width, sentence in ((0.5, "does not topple: the critical value"), (0.3, "topples: the")):
+        short = shell("critical", record, "--height", "2", "--width", width).stdout
+        assert short.startswith(f"The block (k_r = {width / 2:.3f}) {sentence}")
+        assert (width / 2 < kr) is ("does not" not in short)
+    result = critical(read_motions(record)[0], p2=3.0, full_map=True)
+    low, high = max(
+        (row["k_lo"], row["k_hi"]) for row in result.map_rows()[:-1] if row["outcome"] == "safe"
+    )
+    spared = replace(
+        result, block_kr=0.5 * (low + high) * result.pga_g, block_outcome=Outcome.STABLE
+    )
+    assert "does not topple: it is in a safe gap below the critical value" in spared.headline()
 
 
 def test_the_help_names_no_option_of_other_commands(shell: Shell) -> None:

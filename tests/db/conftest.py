@@ -25,7 +25,8 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
+from rbfrag.solver.critical_result import CriticalResult
+from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
 
 NOBODY = 65534
 

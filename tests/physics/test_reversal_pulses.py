@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.critical_result import CriticalResult
+from rbfrag.solver.results import Outcome
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import respond
 from tests.physics.linear_block import critical_angle

@@ -240,5 +240,5 @@ def test_a_wet_slump_fails_under_a_weaker_record() -> None:
     dry = critical(motion, block=block, **planes)
     wet = critical(motion, block=block, **planes, water_m=0.4, density_kg_m3=2600.0)
     drained = critical(motion, block=block, **planes, water_m=0.4, drainage="drained")
-    assert wet.of_kind["scale"] < dry.of_kind["scale"]
-    assert drained.of_kind["scale"] == dry.of_kind["scale"]
+    assert wet.scale < dry.scale
+    assert drained.scale == dry.scale

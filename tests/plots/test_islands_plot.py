@@ -14,8 +14,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import islands
 from rbfrag.plots.islands import enlarged_range, plot_islands, rotations
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.search.critical import critical
 from tests.synthetic import write_at2
 

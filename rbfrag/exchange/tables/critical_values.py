@@ -29,7 +29,8 @@ from rbfrag.fragility.method import TOPPLING_BLOCK
 from rbfrag.motions.quality import LARGEST_PGA_G
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.table import FACTORS, unit_factor
-from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, SearchPoints
+from rbfrag.solver.critical_result import CriticalResult
+from rbfrag.solver.results import SEARCH_LIMIT, SearchPoints
 from rbfrag.version import __version__
 from rbfrag.vocabulary.quantities import QUANTITIES
 

@@ -28,6 +28,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.one_freedom.equation import (
     Condition,
@@ -45,7 +46,7 @@ from rbfrag.solver.kind import (
 )
 from rbfrag.solver.mechanism import MechanismKind, driven_up_below
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, FloatArray, Outcome, Polarity
+from rbfrag.solver.results import SEARCH_LIMIT, FloatArray, Outcome, Polarity
 from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
 
 THRESHOLDS_M = (0.01, 0.05, 0.15, 0.30)

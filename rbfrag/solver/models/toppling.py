@@ -16,13 +16,14 @@ from typing import Any
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.contacts import corner_at
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.equation import Ending, Mechanism, Phase, Pose
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
-from rbfrag.solver.results import CriticalResult, Outcome, Response, ResponseHistory
+from rbfrag.solver.results import Outcome, Response, ResponseHistory
 from rbfrag.solver.stability.toe import (
     TOE_FOLLOWED,
     slides_at_toe,

@@ -19,18 +19,12 @@ import numpy as np
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.single_run import TOPPLED, Run
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import (
-    MAP_DEPTH,
-    RESOLUTION,
-    SEARCH_LIMIT,
-    CriticalResult,
-    Polarity,
-    SearchPoints,
-)
+from rbfrag.solver.results import MAP_DEPTH, RESOLUTION, SEARCH_LIMIT, Polarity, SearchPoints
 from rbfrag.solver.search.certified import (
     BRACKET_WIDTH,
     MAP_SPAN_ERROR,

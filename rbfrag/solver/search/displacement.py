@@ -20,16 +20,10 @@ from functools import cached_property
 
 import numpy as np
 
+from rbfrag.solver.critical_result import CriticalSlide
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.quantity import not_negative, positive
-from rbfrag.solver.results import (
-    SEARCH_LIMIT,
-    CriticalResult,
-    Outcome,
-    Polarity,
-    SearchPoints,
-    Status,
-)
+from rbfrag.solver.results import SEARCH_LIMIT, Outcome, Polarity, SearchPoints, Status
 
 TOLERANCE = 1e-9
 """Width of the bracket of a critical strength, over PGA."""
@@ -83,7 +77,7 @@ def critical_of(
     search_limit: float = SEARCH_LIMIT,
     tolerance: float = TOLERANCE,
     warnings: tuple[str, ...] = (),
-) -> CriticalResult:
+) -> CriticalSlide:
     """Return the greatest k_y/PGA with which a block slides further than a distance.
 
     Args:
@@ -118,7 +112,7 @@ def critical_of(
             low, high = _bracket(blocks, distance, limit, top, width)
             ends = sorted({low, high}, reverse=True)
     runs = len(blocks.known) - before
-    return CriticalResult(
+    return CriticalSlide(
         kind=kind,
         p2=math.nan,
         polarity=polarity,
@@ -135,7 +129,7 @@ def critical_of(
         n_runs=runs,
         warnings=warnings,
         points=blocks.points(ends),
-        of_kind={"displacement_m": distance},
+        displacement_m=distance,
     )
 
 

@@ -21,13 +21,13 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical_result import CriticalScale
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import Shaking
 from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
-    CriticalResult,
     FloatArray,
     IntervalOutcome,
     Outcome,
@@ -43,6 +43,11 @@ SCAN_RATIO = 1.05
 
 BRACKET = 1e-6
 """Width of the bracket of the critical scale, over the scale."""
+
+NOT_PROVEN = (
+    "the scale is the smallest that was seen to fail: the scales between those that were looked "
+    "at (5 % apart) are not proven safe"
+)
 
 Verdict = Literal["safe", "fails", "outside", "undecided"]
 
@@ -166,7 +171,7 @@ class ScaledKind(MechanismKind):
         search_limit: float = SEARCH_LIMIT,
         rotation_deg: float | None = None,
         **options: Any,
-    ) -> CriticalResult:
+    ) -> CriticalScale:
         """Return the smallest factor on a record that brings a block down.
 
         Options: `block` with `beta_deg`, `phi_deg`, `phi_back_deg`; `rotation_deg`, the peak
@@ -222,7 +227,7 @@ def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRu
 
 def critical_scale(
     shaking: Shaking, shaken: ShakenMechanism, rotation_deg: float | None, rules: ScanRules
-) -> CriticalResult:
+) -> CriticalScale:
     """Return the smallest factor on a record that turns a block so far.
 
     Args:
@@ -435,6 +440,8 @@ def _result(
             "past a lost contact the block is taken to fall on its planes without rebound, which "
             "rigid contact does not decide: another impact may bring it down at another scale"
         )
+    if bracket is not None:
+        warnings.append(NOT_PROVEN)
     lower, scale = bracket or (None, None)
     return replace(
         start,
@@ -450,11 +457,11 @@ def _result(
     )
 
 
-def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> CriticalResult:
+def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> CriticalScale:
     k = None if search.scale is None else search.k_over_pga(search.scale)
     kr = None if k is None else k * search.pga_g
     critical = critical_rad(shaken)
-    return CriticalResult(
+    return CriticalScale(
         kind=shaken.kind,
         p2=shaken.p2,
         polarity=shaking.polarity,
@@ -473,16 +480,14 @@ def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> C
         warnings=(*shaken.remarks, *shaking.warnings, *search.warnings),
         points=search.points(critical),
         intervals=search.intervals(),
-        of_kind={
-            "rotation_deg": search.rotation_deg,
-            "scale": search.scale,
-            "lower_scale": search.lower,
-            "starts_scale": search.starts,
-            "scale_limit": search.scale_limit,
-            "yield_name": shaken.yield_name,
-            "yield_g": shaken.yield_g,
-            "critical_rotation_rad": critical,
-            "ended": search.ended,
-            "runs": search.runs,
-        },
+        rotation_deg=search.rotation_deg,
+        scale=search.scale,
+        lower_scale=search.lower,
+        starts_scale=search.starts,
+        scale_limit=search.scale_limit,
+        yield_name=shaken.yield_name,
+        yield_g=shaken.yield_g,
+        critical_rotation_rad=critical,
+        ended=search.ended,
+        runs=search.runs,
     )

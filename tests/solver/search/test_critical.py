@@ -13,8 +13,9 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.results import Outcome
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import OUTCOMES, simulate
 

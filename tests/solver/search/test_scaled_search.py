@@ -15,14 +15,14 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical import critical
+from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import sliding_displacements
-from rbfrag.solver.reports import critical_as_dict
 from rbfrag.solver.respond import respond
-from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.results import Outcome
 from rbfrag.solver.search.scale import (
     ScaledRun,
     ScaleSearch,
@@ -78,7 +78,7 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
     motion, block = shaking(), slump()
     found = search(motion, block, rotation_deg=rotation_deg)
     assert found.status == "found"
-    lower, upper = found.of_kind["lower_scale"], found.of_kind["scale"]
+    lower, upper = found.lower_scale, found.scale
     assert upper - lower <= 1e-6 * upper
 
     def fails(scale: float) -> bool:
@@ -88,7 +88,7 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
         assert answer.peak_theta_rad is not None
         return rotation_deg is not None and answer.peak_theta_rad >= math.radians(rotation_deg)
 
-    scan = np.geomspace(found.of_kind["starts_scale"], upper * 1.3, 150)
+    scan = np.geomspace(found.starts_scale, upper * 1.3, 150)
     assert not any(fails(s) for s in scan[scan <= lower])
     assert fails(upper)
 
@@ -96,7 +96,7 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
 def test_the_critical_scale_is_the_inverse_of_the_strength_of_the_record() -> None:
     motion, block = shaking(), slump()
     one, three = (search(times(motion, f), block, rotation_deg=2.0) for f in (1.0, 3.0))
-    assert three.of_kind["scale"] == pytest.approx(one.of_kind["scale"] / 3.0, rel=3e-6)
+    assert three.scale == pytest.approx(one.scale / 3.0, rel=3e-6)
     assert three.y_m_s == pytest.approx(3.0 * (one.y_m_s or 0.0), rel=3e-6)
     assert three.kr_over_pga == pytest.approx(one.kr_over_pga, rel=3e-6)
 
@@ -106,7 +106,7 @@ def test_a_small_slump_turns_as_far_as_a_level_slide_says() -> None:
     motion, block = shaking(), slump(2.0)
     found = search(motion, block, rotation_deg=0.02)
     assert found.kr_over_pga is not None
-    slid = sliding_displacements(motion, [found.kr_over_pga])[0] * found.of_kind["scale"]
+    slid = sliding_displacements(motion, [found.kr_over_pga])[0] * found.scale
     turned = found.p2 * slid / STANDARD_GRAVITY_M_S2
     assert turned == pytest.approx(math.radians(0.02), rel=2e-3)
 
@@ -114,7 +114,7 @@ def test_a_small_slump_turns_as_far_as_a_level_slide_says() -> None:
 def test_rotations_are_reached_one_after_the_other_and_failure_last() -> None:
     motion, block = shaking(), slump()
     answers = [search(motion, block, rotation_deg=d) for d in (0.5, 1.0, 2.0, 5.0, None)]
-    scales = [found.of_kind["scale"] for found in answers]
+    scales = [found.scale for found in answers]
     known = [scale for scale in scales if scale is not None]
     assert len(known) == 5
     assert known == sorted(known)
@@ -127,7 +127,7 @@ def test_a_block_that_leaves_its_back_plane_is_followed_to_its_fall() -> None:
     assert found.status == "found"
     assert any("past a lost contact" in sentence for sentence in found.warnings)
     lower, upper = (
-        respond(times(shaking(), found.of_kind[name]), block=big, **planes)
+        respond(times(shaking(), getattr(found, name)), block=big, **planes)
         for name in ("lower_scale", "scale")
     )
     assert upper.outcome is Outcome.TOPPLED
@@ -137,11 +137,11 @@ def test_a_block_that_leaves_its_back_plane_is_followed_to_its_fall() -> None:
 def test_a_record_that_drives_only_uphill_never_moves_the_block() -> None:
     pulse = GroundMotion(-np.hanning(60), 0.01)
     found = search(pulse, slump())
-    assert (found.status, found.of_kind["starts_scale"], found.n_runs) == ("no_motion", None, 0)
+    assert (found.status, found.starts_scale, found.n_runs) == ("no_motion", None, 0)
     assert found.certified
     still = search(GroundMotion(np.zeros(20), 0.01), slump())
     assert still.status == "no_motion"
-    assert critical_as_dict(still)["scale_limit"] is None
+    assert still.as_dict()["scale_limit"] is None
 
 
 def test_what_was_seen_is_told_as_intervals_and_points() -> None:
@@ -155,7 +155,7 @@ def test_what_was_seen_is_told_as_intervals_and_points() -> None:
     assert seen.k_hi[seen.outcome.index("topples")] == found.kr_over_pga
     assert found.kr_over_pga in found.points.kr_over_pga
     assert not found.certified
-    assert "not proven" in critical_as_dict(found)["warnings"][-1]
+    assert "not proven" in found.as_dict()["warnings"][-1]
 
 
 @settings(max_examples=10)
@@ -164,10 +164,9 @@ def test_everything_that_was_looked_at_below_the_critical_scale_is_safe(
     seed: int, size: float
 ) -> None:
     found = search(shaking(seed), slump(size), rotation_deg=1.0)
-    its = found.of_kind
-    limit = min(its["scale"] if its["scale"] is not None else math.inf, its["scale_limit"])
-    assert all(run.verdict == "safe" for run in its["runs"] if run.scale < limit)
-    scales = [run.scale for run in its["runs"]]
+    limit = min(found.scale if found.scale is not None else math.inf, found.scale_limit)
+    assert all(run.verdict == "safe" for run in found.runs if run.scale < limit)
+    scales = [run.scale for run in found.runs]
     assert scales == sorted(set(scales))
     assert found.n_runs == len(scales)
 
@@ -179,11 +178,11 @@ def test_a_confined_block_is_searched_past_its_fall_on_the_base(rotation_deg: fl
         shaking(), block=block, **planes, kind="confined_toppling", rotation_deg=rotation_deg
     )
     assert found.status == "found"
-    lower, upper = found.of_kind["lower_scale"], found.of_kind["scale"]
+    lower, upper = found.lower_scale, found.scale
     # between them runs may end closer to failure than their error
     assert upper - lower < 2e-3 * upper
     outcomes = set()
-    for scale in (*np.geomspace(found.of_kind["starts_scale"], lower, 40)[1:], upper):
+    for scale in (*np.geomspace(found.starts_scale, lower, 40)[1:], upper):
         answer = respond(times(shaking(), scale), block=block, **planes)
         peak = answer.peak_theta_rad
         outcomes.add(answer.outcome)
@@ -245,16 +244,15 @@ def test_a_block_that_slumps_at_rest_is_refused() -> None:
 
 def test_beyond_the_end_of_the_model_nothing_is_told() -> None:
     found = search(shaking(), slump(), rotation_deg=2.0)
-    its = found.of_kind
-    last = its["runs"][0].scale
+    last = found.runs[0].scale
     ended = ScaleSearch(
         rotation_deg=2.0,
         pga_g=found.pga_g,
-        yield_g=its["yield_g"],
-        starts=its["starts_scale"],
+        yield_g=found.yield_g,
+        starts=found.starts_scale,
         scale_limit=last,
         status="below_limit",
-        runs=its["runs"],
+        runs=found.runs,
     )
     assert any(run.verdict == "fails" for run in ended.runs)
     assert ended.intervals().outcome == ("safe",)
