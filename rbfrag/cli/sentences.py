@@ -7,28 +7,6 @@ from typing import Any
 
 from rbfrag.results.numbers import percent, rounded, with_interval
 
-
-def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
-    """Yield how a run ended, with the number that decides.
-
-    Args:
-        answer: an answer of `rbfrag respond` under the keys of the JSON contract.
-        advice: what its outcome means.
-    """
-    at_s = answer.get("toppled_s")
-    drained = _drained_yield(answer).replace("; drained", "Drained yield acceleration")
-    if "started_s" in answer and answer["started_s"] is None and answer["outcome"] == "stable":
-        yield "The block does not move: the motion never exceeds its yield acceleration"
-    else:
-        yield advice if at_s is None else f"The block topples at {at_s:.2f} s. {advice}"
-    if answer.get("peak_theta_n") is not None:
-        yield f"Peak rotation {percent(answer['peak_theta_n'])} of the critical angle"
-    if answer.get("displacement_m") is not None:
-        yield f"Displacement {rounded(answer['displacement_m'])} m"
-    if drained:
-        yield drained
-
-
 YIELDS = {
     "slide": "Yield acceleration of sliding {k} g",
     "topple": "Uplift acceleration {k} g (toppling): above it the block lifts off its base, and it "

@@ -24,6 +24,7 @@ class KindFacts:
 
     Args:
         mode: failure mode of its blocks; None where no geometry chooses it.
+        verb: failure of its blocks in a sentence.
         parameters: what describes its block in predictions, and in `rbfrag.respond` without a
             shape; () where no fragility is fitted.
         free_standing: whether its blocks have no plane behind them.
@@ -36,6 +37,7 @@ class KindFacts:
 
     kind: str
     mode: ModeName | None = None
+    verb: str = "fails"
     parameters: tuple[str, ...] = ()
     free_standing: bool = False
     settings: tuple[str, ...] = ()
@@ -55,20 +57,22 @@ KINDS = {
     facts.kind: facts
     for facts in (
         KindFacts(
-            "confined_toppling", "confined_topple", ("kct", "pct2"), False, (), "block", _SCALED,
+            "confined_toppling", "confined_topple", "topples", ("kct", "pct2"), False, (), "block",
+            _SCALED,
         ),
         KindFacts(
-            "rocking", "topple", ("p2", "kr"), True, ("restitution",),
+            "rocking", "topple", "overturns", ("p2", "kr"), True, ("restitution",),
             no_search="what overturns a free-standing block is no interval of k_r (up to 122 "
             "islands for one record), so that no value is certain to be the last",
         ),
         KindFacts(
-            "sliding", "slide", ("ky", "displacement_m"), False, ("two_way", "horizontal"),
-            "displacement_m", ("displacement_m", "tolerance", "block", *PLANES),
+            "sliding", "slide", "slides too far", ("ky", "displacement_m"), False,
+            ("two_way", "horizontal"), "displacement_m",
+            ("displacement_m", "tolerance", "block", *PLANES),
         ),
-        KindFacts("slumping", "slump", ("ks", "ps2"), False, (), "block", _SCALED),
+        KindFacts("slumping", "slump", "slumps", ("ks", "ps2"), False, (), "block", _SCALED),
         KindFacts(
-            "toppling", "topple", ("p2", "kr"), False, (),
+            "toppling", "topple", "topples", ("p2", "kr"), False, (),
             "p2", ("p2", "full_map", "map_depth", "block", *PLANES),
         ),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.recognise import MotionLike, as_motion
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import confidence, interval, percent
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.excitation import excitation, motion_remarks
 from rbfrag.solver.kind import RunEnd
 from rbfrag.solver.quantity import not_negative, positive
@@ -33,7 +34,7 @@ _FAILS_BY = "displacement_m"
 
 
 @dataclass(frozen=True, repr=False)
-class DrawnResponses(Tabular):
+class DrawnResponses(Result):
     """What one motion did to the draws of one block.
 
     Args:
@@ -64,6 +65,29 @@ class DrawnResponses(Tabular):
     polarity: str
     outcomes: Mapping[str, int]
     warnings: tuple[str, ...]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the fraction of the drawn blocks that fails, with its sampling uncertainty."""
+        low = self.ci_low if self.ci_low > 1e-9 else 0.0  # rounding of a bound that is zero
+        ends = confidence(self.level, interval(low, self.ci_high))
+        value = percent(self.share_failed)
+        yield f"P(failure) {value if value[0] in '<>' else f'= {value}'}   ({ends})"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the model, the draws and their outcomes."""
+        yield TextLine("Model", self.kind.replace("_", " "))
+        draws = f"{self.failed:,} of {self.draws:,} drawn blocks fail"
+        yield TextLine("Draws", f"{draws}; seed {self.seed}, polarity {self.polarity}")
+        counts = (f"{count:,} {name}" for name, count in self.outcomes.items())
+        yield TextLine("Outcomes", ", ".join(counts))
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield every value, if verbose."""
+        if verbose:
+            apart = ("outcomes", "warnings")
+            yield TextTable(
+                (), [(name, value) for name, value in vars(self).items() if name not in apart]
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Literal
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
-from rbfrag.results.result import Tabular
-from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
+from rbfrag.results.numbers import rounded
+from rbfrag.results.result import Result, TextLine, TextTable
+from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED, KINDS
 from rbfrag.solver.stability.modes import DrainedYield, ModeName
 
 FloatArray = NDArray[np.float64]
@@ -48,19 +50,19 @@ class Outcome(StrEnum):
         member.advice = advice
         return member
 
-    STABLE = "stable", "The block came to rest again."
-    TOPPLED = "toppled", "The block is past recovery, whatever the rest of the record does."
+    STABLE = "stable", "the block comes to rest"
+    TOPPLED = "toppled", "the block is past recovery, whatever the rest of the record does"
     UNDETERMINED = (
         "undetermined",
-        "The block is closer to its critical value than the numerical error: treat it as critical.",
+        "the block is closer to its critical value than the numerical error: treat it as critical",
     )
     JUMP = (
         "jump",
-        "The vertical ground motion throws the block off its base (1 + k_v <= 0): the model of "
-        "a block in contact does not apply; use the horizontal motion alone or another method.",
+        "the vertical ground motion throws the block off its base (1 + k_v <= 0): the model of "
+        "a block in contact does not apply; use the horizontal motion alone or another method",
     )
-    CONTACT_LOST = "contact_lost", "A contact opened: the motion after it is outside the model."
-    INDETERMINATE = "indeterminate", "The rigid-body problem has no unique answer here."
+    CONTACT_LOST = "contact_lost", "a contact opened: the motion after it is outside the model"
+    INDETERMINATE = "indeterminate", "the rigid-body problem has no unique answer here"
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +186,39 @@ class Part:
     start: BlockState | None
     response: Response
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer to this motion alone, with the state of the block before and after."""
+        end = self.response.state
+        return {
+            "motion": self.motion,
+            "begins_s": self.begins_s,
+            "start": None if self.start is None else self.start.as_dict(),
+            **self.response.as_dict(),
+            "end": None if end is None else end.as_dict(),
+        }
+
+
+RESPONSE_NUMBERS = (
+    "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s", "toppled_s",
+    "error_estimate", "steps", "samples_moved", "samples_total", "final_theta_rad",
+    "displacement_m", "peak_displacement_m", "centroid_displacement_m", "stopped_s",
+    "toe_needs_deg", "toe_needs_s", "toe_slips_g",
+)  # fmt: skip
+OF_TWO_CORNERS = (
+    "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
+    "peak_spread",
+)  # fmt: skip
+"""Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
+
+OF_PART = (
+    "motion", "begins_s", "outcome", "peak_theta_rad", "final_theta_rad", "displacement_m",
+    "started_s", "stopped_s",
+)  # fmt: skip
+"""Values of each motion of a sequence in the table on a terminal."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Tabular):
+class Response(Result):
     """The answer of one run.
 
     Args:
@@ -278,6 +310,77 @@ class Response(Tabular):
     def how(self) -> str:
         """How it was answered: ``followed in time``, or ``by mechanics`` where nothing moves it."""
         return BY_MECHANICS if self.started_s is None and not self.steps else FOLLOWED
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the outcome, and the peak rotation and displacement of a block that stays."""
+        if self.started_s is None and self.outcome is Outcome.STABLE:
+            yield "The block does not move: the motion never exceeds its yield acceleration"
+            return
+        advice = self.outcome.advice
+        if self.toppled_s is None:
+            yield advice[0].upper() + advice[1:]
+        else:
+            verb = KINDS[self.kind].verb if self.kind in KINDS else "fails"
+            advice = advice.removeprefix("the block is ")
+            yield f"The block {verb} at {self.toppled_s:.2f} s: {advice}"
+        if self.peak_theta_n is not None:
+            yield f"Peak rotation {rounded(self.peak_theta_n)} of the critical angle"
+        if self.displacement_m is not None:
+            yield f"Displacement {rounded(self.displacement_m)} m"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the model, the time of the motion, the friction of the toe, the drained yield."""
+        model = self.kind.replace("_", " ")
+        if self.critical_angle_deg is not None:
+            model += f", critical angle {rounded(self.critical_angle_deg)}°"
+        yield TextLine("Model", model)
+        if self.started_s is not None:
+            times = f"starts at {self.started_s:.2f} s"
+            if self.stopped_s is not None:
+                times += f", stops at {self.stopped_s:.2f} s"
+            if self.impacts is not None:
+                times += f"; {self.impacts} impact{'' if self.impacts == 1 else 's'}"
+            yield TextLine("Motion", times)
+        for change in self.mode_changes:
+            yield TextLine("", f"from {change.time_s:.2f} s it {change.motion}")
+        if self.toe_needs_deg is not None:
+            needs = f"no slip if the friction angle is at least {rounded(self.toe_needs_deg)}°"
+            if self.toe_slips_g is not None:
+                needs += f"; slips above {rounded(self.toe_slips_g)} g at the first motion"
+            yield TextLine("Toe", needs)
+        if self.drained is not None and self.drained.yield_acceleration is not None:
+            drained = rounded(self.drained.yield_acceleration)
+            yield TextLine("Drained", f"yield acceleration {drained} g")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield every value, if verbose, and the answer to each motion of a sequence."""
+        values = self.as_dict()
+        parts = values.pop("parts", [])
+        if verbose:
+            apart = ("warnings", "mode_changes", "drained")
+            rows = [(name, value) for name, value in values.items() if name not in apart]
+            yield TextTable((), [(name, value) for name, value in rows if value is not None])
+        if parts:
+            yield TextTable(OF_PART, [[part[name] for name in OF_PART] for part in parts])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        document: dict[str, Any] = {
+            "kind": self.kind,
+            "mode": self.mode,
+            "final_mode": self.final_mode,
+            "outcome": self.outcome.value,
+            "how": self.how,
+            **{name: getattr(self, name) for name in RESPONSE_NUMBERS},
+            "drained": None if self.drained is None else asdict(self.drained),
+            "mode_changes": [asdict(change) for change in self.mode_changes],
+            "warnings": list(self.warnings),
+        }
+        if self.impacts is not None:
+            document |= {name: getattr(self, name) for name in OF_TWO_CORNERS}
+        if self.parts:
+            document["parts"] = [part.as_dict() for part in self.parts]
+        return document
 
 
 @dataclass(frozen=True, eq=False)

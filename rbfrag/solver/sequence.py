@@ -137,7 +137,7 @@ def _why(part: Part) -> str:
     outcome = part.response.outcome
     if outcome is Outcome.STABLE:
         return "where the one before leaves the block is not known"
-    return f"the one before ends as {outcome.value}. {outcome.advice}"
+    return f"the one before ends as {outcome.value}: {outcome.advice}"
 
 
 def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:

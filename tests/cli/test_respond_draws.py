@@ -32,7 +32,7 @@ def test_shares_are_those_of_python(shell: Shell) -> None:
     )  # fmt: skip
     assert {**told, "warnings": []} == {**own.as_dict(), "warnings": []}
     words = shell(*ASKED, "--kr", "0.12", "--draws", "5").stdout
-    assert "of 5 drawn blocks)" in words
+    assert "of 5 drawn blocks fail" in words
 
 
 def test_a_table_and_a_rectangle_are_drawn_from(shell: Shell) -> None:
@@ -73,4 +73,4 @@ def test_what_never_moves_is_said_so(shell: Shell) -> None:
     block = ("--kind", "rocking", "--p2", "10", "--kr", "0.3")
     assert "The block does not move" in shell("respond", "weak.AT2", *block).stdout
     drawn = shell("respond", "weak.AT2", *block, "--kr-sigma", "0.1", "--draws", "20").stdout
-    assert "P(failure) = 0 %   (sampling uncertainty 0–" in drawn
+    assert "P(failure) = 0 %   (95 % confidence interval 0–" in drawn

@@ -12,7 +12,6 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.reports import response_as_dict
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
 from tests.synthetic import shaking
@@ -71,9 +70,9 @@ def test_one_motion_in_two_parts_is_one_motion(name: str) -> None:
 @pytest.mark.parametrize("name", BLOCKS)
 def test_a_block_that_has_not_moved_answers_to_the_bit(name: str) -> None:
     weak, strong = motion(1, 0.01), motion(2)
-    alone = response_as_dict(respond(strong, **BLOCKS[name]))
+    alone = respond(strong, **BLOCKS[name]).as_dict()
     both = respond([weak, strong], **BLOCKS[name])
-    after = response_as_dict(both.parts[1].response)
+    after = both.parts[1].response.as_dict()
     assert after == alone
     assert both.displacement_m == alone["displacement_m"]
     assert both.parts[0].response.started_s is None
@@ -92,10 +91,10 @@ def test_values_of_a_sequence() -> None:
         length_s = float(motions[0].time_s[-1])
         assert part.begins_s == pytest.approx(before.begins_s + length_s + 5.0)
     assert answer.samples_total == sum(part.samples_total for part in parts)
-    as_dict = response_as_dict(answer)
+    as_dict = answer.as_dict()
     assert [part["motion"] for part in as_dict["parts"]] == [each.label for each in motions]
     assert as_dict["parts"][1]["start"] == as_dict["parts"][0]["end"]
-    assert "parts" not in response_as_dict(parts[0])
+    assert "parts" not in parts[0].as_dict()
 
 
 def test_toppling_and_rocking_start_again_from_rest() -> None:

@@ -6,40 +6,17 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rbfrag.cli.output import (
-    print_json,
-    print_pairs,
-    print_sentences,
-    print_table,
-    print_warnings,
-    say_when_compiling,
-)
+from rbfrag.cli.output import print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
-from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
-from rbfrag.results.numbers import interval, percent
 from rbfrag.vocabulary.quantities import FAILURE, JOINT, PLANES, SCATTER, SHAPE, WHOLE
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
-    from rbfrag.solver.respond_draws import DrawnResponses
     from rbfrag.solver.results import Response
-
-_PART = (
-    "motion", "begins_s", "outcome", "peak_theta_rad", "final_theta_rad", "displacement_m",
-    "started_s", "stopped_s",
-)  # fmt: skip
-"""What is told of each motion of several; all of it with --json."""
-
-SHORT = (
-    "kind", "mode", "final_mode", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
-    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive", "peak_spread", "toe_needs_deg",
-    "toe_slips_g",
-)  # fmt: skip
-"""Values that are shown without --verbose."""
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --height 2.4 --width 0.5 --plot response.png"
 
@@ -158,8 +135,8 @@ def respond(
     With --draws it is a block that is not known exactly: the answer is the share of the drawn
     blocks that fail, with its counting error.
     """
+    from rbfrag.solver.history_file import write_history
     from rbfrag.solver.kinds import KINDS
-    from rbfrag.solver.reports import response_as_dict, write_history
     from rbfrag.solver.respond import respond as run
 
     if drawn.draws is not None:
@@ -171,7 +148,7 @@ def respond(
         one = direction.each(1)[0]
         ground, upward, about = find_shaking(motions[0], one, db=db, reading=reading)
         say_when_compiling()
-        shares = respond_draws(
+        result = respond_draws(
             ground,
             vertical=upward,
             polarity=direction.polarity if direction.reverse else drawn.polarity,  # type: ignore[arg-type]
@@ -182,9 +159,8 @@ def respond(
             displacement_m=given.get("displacement_m"),
             **{"restitution": given.get("restitution"), **possible},
         )
-        _show_shares(
-            replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=printing.json
-        )
+        result = replace(result, warnings=(*about, *remarks, *result.warnings))
+        print_result(result, json=printing.json, verbose=printing.verbose)
         return
     body, what, remarks = _body(given, model.kind)
     if files.film is not None:
@@ -233,22 +209,7 @@ def respond(
             exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
             title=title,
         )  # fmt: skip
-    answer = response_as_dict(response)
-    if printing.json:
-        print_json(answer)
-        return
-    answer.pop("warnings")
-    changes = answer.pop("mode_changes")
-    parts = answer.pop("parts", [])
-    print_sentences(response_in_words(answer, response.outcome.advice))
-    shown = answer if printing.verbose else {name: answer.get(name) for name in SHORT}
-    print_pairs({name: value for name, value in shown.items() if value is not None})
-    if parts:
-        print()
-        print_table(_PART, [[part[name] for name in _PART] for part in parts])
-    for change in changes:
-        print(f"from {change['time_s']:.6g} s on the block {change['motion']}")
-    print_warnings(response.warnings)
+    print_result(response, json=printing.json, verbose=printing.verbose)
 
 
 def _possible(
@@ -279,25 +240,6 @@ def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
         "those of a shape), rectangles and tables; scattered joint sets are run by  rbfrag "
         "rockmass --motion"
     )
-
-
-def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
-    """Print the answer to --draws."""
-    answer = shares.as_dict()
-    if json:
-        print_json(answer)
-        return
-    warnings, outcomes = answer.pop("warnings"), answer.pop("outcomes")
-    low = shares.ci_low if shares.ci_low > 1e-9 else 0.0  # what is rounding beside 0 is 0
-    print(
-        f"P(failure) = {percent(shares.share_failed)}   (sampling uncertainty "
-        f"{interval(low, shares.ci_high)}; {shares.failed} of {shares.draws} drawn blocks)"
-    )
-    print()
-    print_pairs(answer)
-    for name, count in outcomes.items():
-        print(f"outcome {name}: {count}")
-    print_warnings(warnings)
 
 
 def _body(given: Given, kind: str | None) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Answers of the solver as scripts read them: dictionaries of plain values, a CSV of a history."""
+"""The motion of a block in time as CSV."""
 
 from __future__ import annotations
 
@@ -6,27 +6,13 @@ import csv
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
-from rbfrag.solver.results import FloatArray, Part, Response, ResponseHistory
-
-RESPONSE_NUMBERS = (
-    "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s", "toppled_s",
-    "error_estimate", "steps", "samples_moved", "samples_total", "final_theta_rad",
-    "displacement_m", "peak_displacement_m", "centroid_displacement_m", "stopped_s",
-    "toe_needs_deg", "toe_needs_s", "toe_slips_g",
-)  # fmt: skip
-OF_TWO_CORNERS = (
-    "critical_backward_deg", "peak_forward_rad", "peak_backward_rad", "impacts", "sensitive",
-    "peak_spread",
-)  # fmt: skip
-"""Values of a response in its JSON answer; the latter of blocks that rock about two corners."""
+from rbfrag.solver.results import FloatArray, Response, ResponseHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -42,38 +28,6 @@ MOTION_COLUMNS = (
 )  # fmt: skip
 """Columns of histories; the latter of models in which the block is displaced, empty where one
 does not apply."""
-
-
-def response_as_dict(response: Response) -> dict[str, Any]:
-    """Return the answer with the keys of the JSON contract."""
-    answer: dict[str, Any] = {
-        "kind": response.kind,
-        "mode": response.mode,
-        "final_mode": response.final_mode,
-        "outcome": response.outcome.value,
-        "how": response.how,
-        **{name: getattr(response, name) for name in RESPONSE_NUMBERS},
-        "drained": None if response.drained is None else asdict(response.drained),
-        "mode_changes": [asdict(change) for change in response.mode_changes],
-        "warnings": list(response.warnings),
-    }
-    if response.impacts is not None:
-        answer |= {name: getattr(response, name) for name in OF_TWO_CORNERS}
-    if response.parts:
-        answer["parts"] = [_part(part) for part in response.parts]
-    return answer
-
-
-def _part(part: Part) -> dict[str, Any]:
-    """Return one motion of a sequence: the answer to it alone, and both states."""
-    own, end = part.response, part.response.state
-    return {
-        "motion": part.motion,
-        "begins_s": part.begins_s,
-        "start": None if part.start is None else part.start.as_dict(),
-        **response_as_dict(own),
-        "end": None if end is None else end.as_dict(),
-    }
 
 
 def write_history(response: Response, path: str | os.PathLike[str]) -> None:
