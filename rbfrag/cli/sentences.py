@@ -7,35 +7,6 @@ from typing import Any
 
 from rbfrag.results.numbers import percent, rounded, with_interval
 
-YIELDS = {
-    "slide": "Yield acceleration of sliding {k} g",
-    "topple": "Uplift acceleration {k} g (toppling): above it the block lifts off its base, and it "
-    "topples only if the pulse lasts long enough",
-    "slump": "Yield acceleration of slumping {k} g",
-    "confined_topple": "Yield acceleration of confined toppling {k} g",
-}
-"""Headline of a block that stands, by its failure mode."""
-
-
-def block_in_words(answer: Mapping[str, Any]) -> str:
-    """Return how a block fails, and its yield acceleration.
-
-    Args:
-        answer: an answer of `rbfrag block` under the keys of the JSON contract.
-    """
-    mode = answer["mode"]
-    named = mode.replace("_", " ")
-    if answer["state"] == "locked":
-        return f"The block is locked in {named}: no horizontal acceleration moves it"
-    if answer["state"] == "unstable":
-        return f"The block is unstable at rest ({named}): it fails without an earthquake"
-    return YIELDS[mode].format(k=rounded(answer["yield_acceleration"])) + _drained_yield(answer)
-
-
-def _drained_yield(answer: Mapping[str, Any]) -> str:
-    bound = (answer.get("drained") or {}).get("yield_acceleration")
-    return "" if bound is None else f"; drained {rounded(bound)} g"
-
 
 def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield how the blocks of a rock mass fail, and how many under the shaking that is given.

@@ -37,6 +37,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "extrapolation": (WARNING, "block or shaking outside the fitted range"),
     "fit": (NOTE, "data that a fit leaves out, or estimates that are uncertain"),
     "flat_back_plane": (WARNING, "the back plane is flatter than the base"),
+    "free_standing": (NOTE, "no plane backs the block, which rocks on both corners"),
     "friction_not_given": (NOTE, "the friction angle is assumed to prevent sliding"),
     "heel_tips": (WARNING, "pulses into the slope tip a sliding block (unconservative)"),
     "ignored_columns": (WARNING, "columns of a table that the answer does not depend on"),

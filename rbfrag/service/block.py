@@ -33,12 +33,12 @@ def add_routes(routes: APIRouter) -> None:
         A block is described by height and width, by alpha1, alpha3 and r3, or by s1, s2 and gamma.
         """
         from rbfrag.question.blocks import on_planes
-        from rbfrag.solver.stability.single import stability, stability_as_dict
+        from rbfrag.solver.stability.single import stability
 
         shape = on_planes(query.given())
         result = stability(shape.block, **shape.planes)
         warnings = tuple(dict.fromkeys((*shape.remarks, *result.warnings)))
-        return stability_as_dict(shape.block, replace(result, warnings=warnings))
+        return replace(result, warnings=warnings).as_dict()
 
     @routes.get(
         "/v1/drawing",
@@ -53,14 +53,14 @@ def add_routes(routes: APIRouter) -> None:
         ground that has them. A rectangle without phi is taken to be rough enough to topple.
         """
         from rbfrag.plots.blocks.block import block_lines
-        from rbfrag.solver.stability.single import rectangle_r3_m, stability_as_dict
+        from rbfrag.solver.stability.single import rectangle_r3_m
 
         body, result, kind, numbers = _drawn(query.given())
         lines = block_lines(body, result)
         return {
             "kind": kind,
             "numbers": numbers,
-            "block": stability_as_dict(body, result),
+            "block": result.as_dict(),
             "rectangle_r3_m": rectangle_r3_m(body.p2),
             "outline_m": lines.outline,
             "contacts_m": lines.contacts,

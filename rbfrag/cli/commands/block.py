@@ -5,30 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from rbfrag.cli.output import (
-    check_files,
-    print_json,
-    print_pairs,
-    print_table,
-    print_warnings,
-    write_table,
-)
+from rbfrag.cli.output import check_files, print_json, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import MeshOptions
 from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
-from rbfrag.cli.sentences import block_in_words
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.vocabulary.quantities import AT_REST, JOINT, PLANES, SHAPE, WHOLE
 
-FREE_STANDING = (
-    "rbfrag predict --kind rocking  with the same options and a measure of the motion (--pgv 0.6) "
-    "says how probable it is that it overturns, rbfrag respond --kind rocking  what a record does"
+FREE_STANDING = Diagnostic(
+    "free-standing: rbfrag predict --kind rocking gives the probability of overturning, rbfrag "
+    "respond --kind rocking the response to a record",
+    "free_standing",
 )
 
 EXAMPLE = "Example:  rbfrag block --height 2.4 --width 0.5 --dip 3 --phi 35"
-
-
-SHORT = ("mode", "p2", "kr", "ky", "ks", "kct", "alpha1_deg", "alpha3_deg", "gamma_deg")
-"""Values that are shown without --verbose."""
 
 
 @stacked
@@ -69,11 +59,11 @@ def block(
             print(f"predict --blocks {written}  with a measure of the motion, as --pgv 0.6")
         return
     if mesh.mesh is not None:
-        _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, json=printing.json)
+        _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, printing)
         return
     from rbfrag.question.blocks import on_planes
     from rbfrag.solver.kinds import kind_of_mode
-    from rbfrag.solver.stability.single import stability, stability_as_dict
+    from rbfrag.solver.stability.single import stability
 
     with given.named():
         body, planes, _, remarks = on_planes(given)
@@ -81,36 +71,20 @@ def block(
     result = replace(result, warnings=tuple(dict.fromkeys((*remarks, *result.warnings))))
     unbacked = planes.get("back_fracture") is False
     if unbacked and kind_of_mode(result.mode, back_fracture=False).free_standing:
-        result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))
+        result = replace(result, warnings=(*result.warnings, FREE_STANDING))
     if plot is not None:
         from rbfrag.plots.blocks.block import plot_block
 
         plot_block(body, result, plot)
-    answer = stability_as_dict(body, result)
-    if printing.json:
-        print_json(answer)
-        return
-    answer.pop("warnings")
-    margins = answer.pop("margins")
-    bond = answer.pop("cohesion")
-    answer |= {f"cohesion_{name}": value for name, value in (bond or {}).items()}
-    answer |= {f"joint_{name}": value for name, value in (answer.pop("joint") or {}).items()}
-    print(block_in_words(answer))
-    print()
-    if printing.verbose:
-        print_pairs(answer)
-        for margin in margins:
-            print(
-                f"{margin['mode']} if {margin['variable']} changes by "
-                f"{margin['change_deg']:+.6g} deg"
-            )
-    else:
-        print_pairs({name: answer[name] for name in SHORT if answer[name] is not None})
-    print_warnings(result.warnings)
+    print_result(result, json=printing.json, verbose=printing.verbose)
 
 
 def _mesh(
-    path: str, about: MeshOptions, density: float | None, plot: str | None, *, json: bool
+    path: str,
+    about: MeshOptions,
+    density: float | None,
+    plot: str | None,
+    printing: options.Printing,
 ) -> None:
     """Answer for a mesh: its weakest azimuth, and what the height of contact changes."""
     from rbfrag.exchange.mesh_file import block_from_mesh
@@ -123,14 +97,4 @@ def _mesh(
         from rbfrag.plots.blocks.mesh_block import plot_mesh_block
 
         plot_mesh_block(body, plot)
-    answer = body.as_dict()
-    if json:
-        print_json(answer)
-        return
-    for name in ("azimuths", "inertia_m2", "warnings"):
-        answer.pop(name)
-    rows = answer.pop("sensitivity")
-    print_pairs(answer)
-    print()
-    print_table(list(rows[0]), [list(row.values()) for row in rows])
-    print_warnings(body.warnings)
+    print_result(body, json=printing.json, verbose=printing.verbose)

@@ -8,7 +8,7 @@ distances from the centre of mass and the inertia about a horizontal axis say th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.quantity import positive
 
 Array = NDArray[np.float64]
@@ -192,7 +193,7 @@ class ContactHull:
 
 
 @dataclass(frozen=True, repr=False)
-class MeshBlock(Tabular):
+class MeshBlock(Result):
     """A free-standing block measured as a closed mesh; make one with `rbfrag.block_from_mesh`.
 
     Args:
@@ -260,6 +261,37 @@ class MeshBlock(Tabular):
     def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of :meth:`columns`."""
         return self.columns()
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the uplift acceleration of the weakest azimuth."""
+        weakest = self.hull.weakest()
+        yield (
+            f"Uplift acceleration {rounded(weakest.kr)} g, towards azimuth "
+            f"{weakest.azimuth_deg:.0f}°: above it the block lifts off, and it overturns only if "
+            "the pulse lasts long enough"
+        )
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the numbers of the weakest azimuth and the size of the block."""
+        weakest = self.hull.weakest()
+        yield TextLine(
+            "Block",
+            f"p² = {rounded(weakest.p2)} s⁻², k_r = {rounded(weakest.kr)}, coefficient of "
+            f"restitution {rounded(weakest.restitution)}",
+        )
+        mass = "" if self.mass_kg is None else f", mass {rounded(self.mass_kg)} kg"
+        yield TextLine("Mesh", f"{self.name}, volume {rounded(self.volume_m3)} m³{mass}")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield every value, if verbose, and the effect of the height of contact."""
+        values = self.as_dict()
+        rows = values.pop("sensitivity")
+        if verbose:
+            apart = ("azimuths", "inertia_m2", "warnings")
+            yield TextTable(
+                (), [(name, value) for name, value in values.items() if name not in apart]
+            )
+        yield TextTable(tuple(rows[0]), [tuple(row.values()) for row in rows])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer of `rbfrag block --mesh --json`; k_r and p² of the weakest azimuth."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Unpack
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.block.formulas import SCALAR, bond_over_weight, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.quantity import (
@@ -59,6 +61,23 @@ from rbfrag.solver.stability.modes import (
 )
 from rbfrag.solver.stability.toe import toe_slips_g
 
+YIELDS = {
+    "slide": "Yield acceleration of sliding {} g",
+    "topple": "Uplift acceleration {} g (toppling): above it the block lifts off its base, and it "
+    "topples only if the pulse lasts long enough",
+    "slump": "Yield acceleration of slumping {} g",
+    "confined_topple": "Yield acceleration of confined toppling {} g",
+}
+"""Headline of a block that stands, by its failure mode."""
+
+KEYS = (
+    "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
+    "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
+    "delta_deg", "margins", "cohesion", "joint", "water_m", "drained", "toe_slips_g",
+    "warnings",
+)  # fmt: skip
+"""What the JSON contract has of a stability and of its block."""
+
 
 @dataclass(frozen=True)
 class Cohesion:
@@ -79,13 +98,14 @@ class Cohesion:
 
 
 @dataclass(frozen=True, repr=False)
-class Stability(Tabular):
+class Stability(Result):
     """How a block fails and at which horizontal acceleration.
 
     Yield acceleration coefficients are in g. The yield of the governing mode and that of sliding
     are given; the others are None.
 
     Args:
+        block: the block.
         mode: ``slide``, ``topple``, ``slump`` or ``confined_topple``.
         state: ``stable``, ``unstable`` (fails at rest) or ``locked`` (no horizontal
             acceleration moves it in this mode).
@@ -115,6 +135,7 @@ class Stability(Tabular):
         warnings: sentences on what the answer takes for granted.
     """
 
+    block: Block = field(compare=False)
     mode: ModeName
     state: StateName
     yield_acceleration: float
@@ -136,6 +157,58 @@ class Stability(Tabular):
     toe_slips_g: float | None = None
     push: Push | None = None
     drained: DrainedYield | None = None
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the yield acceleration of the governing mode."""
+        mode = words_of_mode(self.mode)
+        if self.state == "locked":
+            yield f"The block is locked ({mode}): no horizontal acceleration moves it"
+        elif self.state == "unstable":
+            yield f"The block is unstable at rest ({mode}): it fails without an earthquake"
+        else:
+            yield YIELDS[self.mode].format(rounded(self.yield_acceleration))
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the size and strength of the block, its angles and the drained yield."""
+        block = self.block
+        strengths = {"k_r": self.kr, "k_y": self.ky, "k_s": self.ks, "k_ct": self.kct}
+        numbers = (
+            f"{symbol} = {rounded(k)}"
+            for symbol, k in strengths.items()
+            if k is not None and math.isfinite(k)
+        )
+        yield TextLine("Block", ", ".join((f"p² = {rounded(block.p2)} s⁻²", *numbers)))
+        angles = {"α₁": block.alpha1_deg, "α₃": block.alpha3_deg, "γ": block.gamma_deg}
+        yield TextLine(
+            "Shape", ", ".join(f"{symbol} = {rounded(value)}°" for symbol, value in angles.items())
+        )
+        if self.drained is not None and math.isfinite(self.drained.yield_acceleration):
+            bound = rounded(self.drained.yield_acceleration)
+            yield TextLine("Drained", f"yield acceleration {bound} g")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield every value and the nearest boundaries to other modes, if verbose."""
+        if not verbose:
+            return
+        values = self.as_dict()
+        margins = values.pop("margins")
+        for name in ("cohesion", "joint"):
+            effect = values.pop(name) or {}
+            values |= {f"{name}_{key}": value for key, value in effect.items()}
+        del values["warnings"]
+        yield TextTable((), [*values.items()])
+        if margins:
+            yield TextTable(tuple(margins[0]), [tuple(margin.values()) for margin in margins])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract.
+
+        A yield acceleration that no number expresses is None; the state says why.
+        """
+        fields = Stability.__annotations__
+        return {
+            name: json_value(getattr(self if name in fields else self.block, name)) for name in KEYS
+        }
 
 
 def stability(
@@ -193,6 +266,7 @@ def stability(
         slips_g = toe_slips_g(block, beta_deg, finding.phi_deg, push)
     own = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
+        block=block,
         mode=finding.mode,
         state=finding.state,
         yield_acceleration=k,
@@ -406,21 +480,3 @@ def refuse_undecided(judged: Stability) -> None:
 def rough_deg(block: Block) -> float:
     """Return a friction angle [deg] at which a block topples rather than slides."""
     return 0.5 * (block.alpha3_deg + 90.0)
-
-
-KEYS = (
-    "mode", "state", "p2", "kr", "ky", "ks", "kct", "yield_acceleration", "alpha1_deg",
-    "alpha3_deg", "gamma_deg", "r1_m", "r2_m", "r3_m", "s1_m", "s2_m", "area_m2", "shape_factor",
-    "delta_deg", "margins", "cohesion", "joint", "water_m", "drained", "toe_slips_g",
-    "warnings",
-)  # fmt: skip
-"""What the JSON contract has of a stability and of its block."""
-
-
-def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
-    """Return the answer with the keys of the JSON contract.
-
-    A yield acceleration that no number expresses is None; the state says why.
-    """
-    own = Stability.__annotations__
-    return {name: json_value(getattr(stability if name in own else block, name)) for name in KEYS}
