@@ -195,7 +195,7 @@ class Stability(Result):
         for name in ("cohesion", "joint"):
             effect = values.pop(name) or {}
             values |= {f"{name}_{key}": value for key, value in effect.items()}
-        del values["warnings"]
+        del values["warnings"], values["drained"]
         yield TextTable((), [*values.items()])
         if margins:
             yield TextTable(tuple(margins[0]), [tuple(margin.values()) for margin in margins])
