@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
@@ -19,18 +19,27 @@ from rbfrag.fragility.model import Model
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.question.fields import MeasureFields
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import interval, percent, rounded, with_interval
+from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.failures import failure_warnings, failures, failures_as_dict, outcome_columns
 from rbfrag.rockmasses.file import read_rock_mass, rock_mass_of_tables
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
-from rbfrag.rockmasses.report import as_dict, block_columns
+from rbfrag.rockmasses.report import as_dict, block_columns, mass_warnings
 from rbfrag.rockmasses.scenario import Scenario, scenario
-from rbfrag.rockmasses.shaking import FailureLimits, ShakenMass
+from rbfrag.rockmasses.shaking import OUTCOMES, FailureLimits, ShakenMass
+from rbfrag.solver.stability.modes import words_of_mode
+from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
+
+ALWAYS_SHOWN = ("at_rest", "stays", "unstable")
+"""Outcomes that have a column of their own even if there are none."""
+
+QUARTERS = ("q05", "q50", "q95")
+"""Quantiles of the yield acceleration in the table of modes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RockMassAnswer(Tabular):
+class RockMassAnswer(Result):
     """Blocks of a rock mass, and what fails of them.
 
     Its table has one row a block; with a motion one a block and scale.
@@ -40,17 +49,96 @@ class RockMassAnswer(Tabular):
         scenario: probabilities by measures of the motion; None where none is given.
         outcomes: what a motion did to each block; None without a motion.
         level: confidence level of the intervals.
+        warnings: notes on the rock mass, the scenario and the motion.
     """
 
     blocks: Realisations
     scenario: Scenario | None
     outcomes: ShakenMass | None
     level: float
+    warnings: tuple[str, ...] = ()
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to know about the answer."""
-        return tuple(self.as_dict()["warnings"])
+    def sentences(self) -> Iterator[str]:
+        """Yield the failure modes, and the fraction that fails under the shaking."""
+        document = self.as_dict()
+        shares = {name: tally["share"] for name, tally in document["modes"].items()}
+        names = sorted((name for name in shares if shares[name] > 0.0), key=lambda n: -shares[n])
+        parts = [f"{words_of_mode(name)} {percent(shares[name])}" for name in names]
+        yield f"Failure modes of {document['blocks']:,} blocks: {', '.join(parts) or 'none'}"
+        scenario = document["scenario"]
+        if scenario is not None and scenario["covered_only"]["probability"] is not None:
+            total = scenario["covered_only"]
+            yield (
+                f"Mean P(failure) = {_of_average(total)} for the "
+                f"{percent(scenario['covered_share'])} of the blocks that a fragility model covers"
+            )
+            drained = total["drained"] or {"probability": None}
+            if drained["probability"] is not None and document["drainage"] == "undrained":
+                yield f"Drained: {_of_average(drained)}"
+        shaking = document["shaking"]
+        for scale in () if shaking is None else shaking["scales"]:
+            yield _of_scale(shaking["motion"], scale)
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield rejected realisations, equal counts, measures and model, and failure limits."""
+        document = self.as_dict()
+        for text, count in document["impossible"].items():
+            yield TextLine("Rejected", f"{count:,} realisations are no block: {text}")
+        for crossing in document["crossings"]:
+            error = crossing["standard_error_g"]
+            within = "" if error is None else f" ± {error:.2g}"
+            below, above = (f"{words_of_mode(crossing[side])}s" for side in ("below", "above"))
+            yield TextLine(
+                "Counts",
+                f"equal at a PGA of {rounded(crossing['pga_g'])}{within} g: more {below} below, "
+                f"more {above} above",
+            )
+        scenario, shaking = document["scenario"], document["shaking"]
+        if scenario is not None:
+            measures = (
+                f"{QUANTITIES[name].symbol or name} {scenario[name]:g} {QUANTITIES[name].unit}"
+                for name in INTENSITY
+                if name in scenario
+            )
+            yield TextLine("Shaking", ", ".join(text.strip() for text in measures))
+            models = {"": scenario["model"], **scenario["other_models"]}
+            named = (
+                f"{model} ({words_of_mode(mode)})" if mode else model
+                for mode, model in models.items()
+                if model is not None
+            )
+            yield TextLine("Model", ", ".join(named) or "none of these blocks has a model")
+        if shaking is not None:
+            yield TextLine(
+                "Motion",
+                f"{shaking['motion']}, {shaking['polarity']} polarity: {shaking['runs']:,} runs",
+            )
+            yield TextLine("Limits", self._limits(shaking))
+
+    def _limits(self, shaking: Mapping[str, Any]) -> str:
+        turned = shaking["rotation_limit_deg"]
+        rotation = "" if turned is None else f" {turned:g}° or"
+        return (
+            f"a slide fails beyond {shaking['displacement_limit_m']:g} m, a block that rotates "
+            f"beyond{rotation} recovery"
+        )
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the modes, the probabilities by mode, and failures by scale.
+
+        Args:
+            verbose: with the description of the rock mass.
+        """
+        document = self.as_dict()
+        if verbose:
+            values = {name: document[name] for name in ("realisations", "blocks", "seed")}
+            values |= {**document["variables"], "block.back_fracture": document["back_fracture"]}
+            yield TextTable((), [*values.items()])
+        yield _mode_table(document)
+        if document["scenario"] is not None:
+            yield _scenario_table(document["scenario"])
+        if document["shaking"] is not None:
+            yield from _failure_tables(document["shaking"])
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
@@ -59,9 +147,7 @@ class RockMassAnswer(Tabular):
         document = as_dict(
             self.blocks, mode_counts(self.blocks), crossings(self.blocks), self.scenario, failed
         )
-        if ran is not None:
-            document["warnings"] += failure_warnings(ran)
-        return document
+        return {**document, "warnings": list(self.warnings)}
 
     def table_columns(self) -> Mapping[str, NDArray[Any]]:
         """Return the columns by name."""
@@ -73,6 +159,95 @@ class RockMassAnswer(Tabular):
         """Return how many blocks of each mode there are, on one line."""
         counts = {name: each.count for name, each in mode_counts(self.blocks).items()}
         return f"RockMassAnswer({self.blocks.n_blocks} blocks: {counts})"
+
+
+def _of_average(average: Mapping[str, Any]) -> str:
+    """Return a mean probability with its interval."""
+    return with_interval(average["probability"], average["ci_low"], average["ci_high"])
+
+
+def _of_scale(motion: str, scale: Mapping[str, Any]) -> str:
+    """Return the fraction of the blocks that fails under a scaled motion."""
+    of_all, unknown = scale["all"]["fails_of_all"], scale["all"]["open_of_all"]
+    share = with_interval(of_all["share"], of_all["ci_low"], of_all["ci_high"])
+    undetermined = f"; {percent(unknown)} undetermined" if unknown else ""
+    return f"{motion} × {scale['scale']:g}: {share} of the blocks fail{undetermined}"
+
+
+def _mode_table(document: Mapping[str, Any]) -> TextTable:
+    """Return the counts and yield accelerations by mode."""
+    headers = ["mode", "blocks", "fraction", "±", "unstable", "locked"]
+    headers += [f"k_{name}_g" for name in QUARTERS]
+    if document["drainage"] is not None:
+        headers += [f"drained_k_{name}_g" for name in QUARTERS]
+    rows = []
+    for mode, tally in document["modes"].items():
+        states = [tally] if tally["drained"] is None else [tally, tally["drained"]]
+        fraction, error = percent(tally["share"]), percent(tally["share_error"])
+        numbers = [(state["yield_g"] or {}).get(name) for state in states for name in QUARTERS]
+        row = [mode, tally["count"], fraction, error, tally["unstable"], tally["locked"], *numbers]
+        rows.append(row)
+    return TextTable(headers, rows)
+
+
+def _scenario_table(scenario: Mapping[str, Any]) -> TextTable:
+    """Return the mean probabilities by mode."""
+    total = {**scenario["covered_only"], "share": scenario["covered_share"]}
+    answers = {**scenario["modes"], "covered blocks only": total}
+    headers = [
+        "mode",
+        "fraction",
+        "covered",
+        "P(failure)",
+        f"{percent(scenario['level'])} interval",
+    ]
+    if total["drained"] is not None:
+        headers += ["drained", "drained interval"]
+    rows = []
+    for mode, answer in answers.items():
+        bounds = [answer] if total["drained"] is None else [answer, answer["drained"] or {}]
+        cells: list[object] = []
+        for bound in bounds:
+            p = bound.get("probability")
+            ends = None if p is None else interval(bound["ci_low"], bound["ci_high"])
+            cells += [None if p is None else percent(p), ends]
+        rows.append([mode, percent(answer["share"]), answer["covered"], *cells])
+    return TextTable(headers, rows)
+
+
+def _failure_tables(shaking: Mapping[str, Any]) -> Iterator[TextTable]:
+    """Yield the failures by scale and mode, and the modes by which blocks end."""
+    counts = [tally for scale in shaking["scales"] for tally in scale["modes"].values()]
+    outcomes = [
+        name
+        for name in OUTCOMES
+        if name != "fails" and (name in ALWAYS_SHOWN or any(tally[name] for tally in counts))
+    ]
+    headers = ["scale", "PGA [g]", "mode", "blocks", "fail", "of mode", "of all", "interval"]
+    rows: list[list[object]] = []
+    ends: list[list[object]] = []
+    for scale in shaking["scales"]:
+        for mode, tally in [*scale["modes"].items(), ("all", scale["all"])]:
+            of_all, of_mode = tally["fails_of_all"], tally["fails_of_mode"]
+            rows.append(
+                [
+                    scale["scale"],
+                    round(scale["pga_g"], 4),
+                    mode,
+                    tally["count"],
+                    tally["fails"],
+                    percent(of_mode["share"]),
+                    percent(of_all["share"]),
+                    interval(of_all["ci_low"], of_all["ci_high"]),
+                    *(tally[name] for name in outcomes),
+                ]
+            )
+        for mode, tally in scale["final_modes"].items():
+            ends.append([mode, scale["scale"], *tally.values()])
+    yield TextTable([*headers, *outcomes], rows)
+    final_modes = next(iter(shaking["scales"][0]["final_modes"].values()))
+    # none: the motion does not move the block, or it is not run
+    yield TextTable(["mode", "scale", *(f"ends: {name}" for name in final_modes)], ends)
 
 
 class RockMassQuestion(MeasureFields[float | None], total=False):
@@ -163,7 +338,10 @@ def rockmass(
         ran = shake(blocks, as_motion(motion), vertical=vertical, limits=limits, **of(SHAKEN_BY))
     elif vertical is not None:
         raise InputError("vertical goes with a motion: give motion, too")
-    return RockMassAnswer(blocks, answer, ran, level)
+    warnings = mass_warnings(blocks, answer, in_motion=bool(answer or ran))
+    if ran is not None:
+        warnings += failure_warnings(ran)
+    return RockMassAnswer(blocks, answer, ran, level, tuple(warnings))
 
 
 def _rock_mass(given: object) -> RockMass:

@@ -2,42 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.results.numbers import percent, rounded, with_interval
-
-
-def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yield how the blocks of a rock mass fail, and how many under the shaking that is given.
-
-    Args:
-        document: an answer of `rbfrag rockmass` under the keys of the JSON contract.
-    """
-    shares = {name: tally["share"] for name, tally in document["modes"].items()}
-    most = sorted((name for name in shares if shares[name] > 0.0), key=lambda n: -shares[n])
-    parts = [f"{name.replace('_', ' ')} {percent(shares[name])}" for name in most]
-    yield f"Failure modes of {document['blocks']:,} blocks: {', '.join(parts) or 'none'}"
-    answer, shaking = document["scenario"], document["shaking"]
-    if answer is not None and answer["covered_only"]["probability"] is not None:
-        total = answer["covered_only"]
-        yield (
-            "Mean P(failure) = "
-            f"{with_interval(total['probability'], total['ci_low'], total['ci_high'])} for the "
-            f"{percent(answer['covered_share'])} of the blocks that a fragility model covers"
-        )
-        drained = total["drained"] or {"probability": None}
-        if drained["probability"] is not None and document["drainage"] == "undrained":
-            ends = (drained[name] for name in ("probability", "ci_low", "ci_high"))
-            yield f"Drained: {with_interval(*ends)}."
-    for scale in () if shaking is None else shaking["scales"]:
-        of_all = scale["all"]["fails_of_all"]
-        unknown = scale["all"]["open_of_all"]
-        yield (
-            f"{shaking['motion']} × {scale['scale']:g}: "
-            f"{with_interval(of_all['share'], of_all['ci_low'], of_all['ci_high'])} of the blocks "
-            f"fail" + (f"; {percent(unknown)} undetermined" if unknown else "")
-        )
+from rbfrag.results.numbers import rounded
 
 
 def strongest_kr(spectrum: Mapping[str, Any]) -> list[float]:

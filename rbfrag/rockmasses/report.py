@@ -66,10 +66,7 @@ def as_dict(
         ],
         "scenario": None if answer is None else _scenario(answer),
         "shaking": None if shaking is None else dict(shaking),
-        "warnings": [
-            *_warnings(realisations, answer, in_motion=bool(answer or shaking)),
-            *realisations.rock_mass.remarks,
-        ],
+        "warnings": mass_warnings(realisations, answer, in_motion=bool(answer or shaking)),
     }
 
 
@@ -108,7 +105,15 @@ def _average(average: Average) -> dict[str, Any]:
     return {"covered": values.pop("count"), **values}
 
 
-def _warnings(realisations: Realisations, answer: Scenario | None, *, in_motion: bool) -> list[str]:
+def mass_warnings(
+    realisations: Realisations, answer: Scenario | None, *, in_motion: bool
+) -> list[str]:
+    """Return the warnings about a rock mass and its scenario.
+
+    Args:
+        answer: probabilities by measures of the motion, if there are any.
+        in_motion: whether failures in motion are part of the answer.
+    """
     warnings = [] if answer is None else list(answer.warnings)
     if in_motion and realisations.drained is not None:
         warnings += notes_on_water(realisations)
@@ -132,7 +137,7 @@ def _warnings(realisations: Realisations, answer: Scenario | None, *, in_motion:
             f"{realisations.why_impossible}: "
             "a lognormal or a truncated distribution may describe the measurements better",
         )
-    return warnings
+    return [*warnings, *realisations.rock_mass.remarks]
 
 
 def notes_on_water(realisations: Realisations) -> tuple[str, ...]:

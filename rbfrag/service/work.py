@@ -61,10 +61,8 @@ def rock_mass(
     body: bytes, form: str, query: RockmassQuery, row_limit: int, db: str | None
 ) -> bytes:
     """Return what `rbfrag rockmass` prints as JSON, for toml, json or csv."""
-    from rbfrag.rockmasses.counts import crossings, mode_counts
+    from rbfrag.campaign.rock_mass_answer import rockmass
     from rbfrag.rockmasses.file import rock_mass_of_csv, rock_mass_of_tables, rock_mass_of_toml
-    from rbfrag.rockmasses.report import as_dict
-    from rbfrag.rockmasses.scenario import scenario
 
     if form == "json":
         document = json_of(body)
@@ -85,11 +83,9 @@ def rock_mass(
             f"{next(iter(how))} goes with a measure of the motion: give pgv, pga or sa10_g, or pgd "
             "and tm, too"
         )
-    realisations = described.realise(query.n, query.seed)
-    answer = scenario(realisations, measures, **how, db=db) if measures else None
-    return json_text(
-        as_dict(realisations, mode_counts(realisations), crossings(realisations), answer)
-    )
+    question: dict[str, Any] = {**measures, **how, "db": db}
+    answer = rockmass(described, n=query.n, seed=query.seed, **question)
+    return json_text(answer.as_dict())
 
 
 def spectrum(body: bytes, query: SpectrumQuery) -> bytes:

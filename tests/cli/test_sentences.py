@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words
-from rbfrag.cli.sentences import rock_mass_in_words
 from rbfrag.results.numbers import (
     annual_rate,
     annual_rates,
@@ -70,21 +69,3 @@ def test_what_a_campaign_has_stored(report: dict[str, int], said: str) -> None:
     others = dict.fromkeys(("no_motion", "outside_model", "not_searched"), 0)
     whole = {"kind": "toppling", "combinations": 24, **others, **report}
     assert campaign_in_words(whole) == said
-
-
-def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
-    fails = {"share": 0.2, "ci_low": 0.15, "ci_high": 0.26}
-    for unknown, end in (
-        (0.0, "20 % (15–26 %) of the blocks fail"),
-        (0.3, "20 % (15–26 %) of the blocks fail; 30 % undetermined"),
-    ):
-        document = {
-            "modes": {"slide": {"share": 1.0}}, "blocks": 200, "scenario": None,
-            "shaking": {
-                "motion": "Rinaldi",
-                "scales": [
-                    {"scale": 1.0, "all": {"fails_of_all": fails, "open_of_all": unknown}}
-                ],
-            },
-        }  # fmt: skip
-        assert list(rock_mass_in_words(document))[1].endswith(end)

@@ -2,79 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rbfrag.cli.output import (
     ProgressBar,
-    cell,
     check_files,
-    print_json,
-    print_pairs,
-    print_sentences,
-    print_table,
-    print_warnings,
+    print_result,
     say_when_compiling,
     write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.cli.sentences import rock_mass_in_words
-
-ALWAYS = ("at_rest", "stays", "unstable")
-"""Outcomes that have a column of their own even if there are none."""
-
-
-def print_failures(document: dict[str, Any]) -> None:
-    """Print the failures that a motion causes, mode by mode and scale by scale."""
-    from rbfrag.rockmasses.shaking import OUTCOMES
-
-    print()
-    turned = document["rotation_limit_deg"]
-    print(
-        f"{document['motion']}, {document['polarity']}: {document['runs']} runs; a slide fails "
-        f"beyond {document['displacement_limit_m']:g} m, a block that turns "
-        + ("past recovery" if turned is None else f"beyond {turned:g} degrees or past recovery")
-    )
-    counts = [tally for each in document["scales"] for tally in each["modes"].values()]
-    outcomes = [
-        name
-        for name in OUTCOMES
-        if name != "fails" and (name in ALWAYS or any(tally[name] for tally in counts))
-    ]
-    rows = []
-    for each in document["scales"]:
-        for mode, tally in [*each["modes"].items(), ("all", each["all"])]:
-            of_all, of_mode = tally["fails_of_all"], tally["fails_of_mode"]
-            rows.append(
-                [
-                    each["scale"],
-                    round(each["pga_g"], 4),
-                    mode,
-                    tally["count"],
-                    tally["fails"],
-                    _percent(of_mode["share"]),
-                    _percent(of_all["share"]),
-                    _percent(of_all["ci_low"]),
-                    _percent(of_all["ci_high"]),
-                    *(tally[name] for name in outcomes),
-                ]
-            )
-    headers = ["scale", "pga_g", "mode", "count", "fails", "%_of_mode", "%_of_all"]
-    print_table([*headers, "ci_low_%", "ci_high_%", *outcomes], rows)
-    ends = [
-        [mode, each["scale"], *tally.values()]
-        for each in document["scales"]
-        for mode, tally in each["final_modes"].items()
-    ]
-    print("\nmode by which blocks end; none: the motion does not move them, or they are not run")
-    print_table(["mode", "scale", *next(iter(document["scales"][0]["final_modes"].values()))], ends)
-
-
-def _percent(share: float) -> float:
-    return round(100.0 * share, 2)
-
 
 EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --plot counts.png"
 
@@ -173,8 +113,7 @@ def rockmass(
             **answering,
             on_progress=lambda progress: bar.show(progress.done, progress.total),
         )  # fmt: skip
-    document = answer.as_dict()
-    document["warnings"] += about
+    answer = replace(answer, warnings=(*answer.warnings, *about))
     if files.out is not None:
         table, notes = answer.table_columns(), document["warnings"]
         write_table(table, files.out, excel_text=files.excel_text, notes=notes)
@@ -182,94 +121,4 @@ def rockmass(
         from rbfrag.plots.plot import rockmass as draw
 
         draw(answer, files.plot)
-    if printing.json:
-        print_json(document)
-        return
-    print_sentences(rock_mass_in_words(document))
-    _print(document, verbose=printing.verbose)
-    print_warnings(document["warnings"], ("displacement_m",))
-
-
-def _print(document: dict[str, Any], *, verbose: bool) -> None:
-    if verbose:
-        print_pairs(
-            {
-                "realisations": document["realisations"],
-                "blocks": document["blocks"],
-                "seed": document["seed"],
-                **document["variables"],
-                "block.back_fracture": document["back_fracture"],
-            }
-        )
-        print()
-    for text, count in document["impossible"].items():
-        print(f"no block {count} times: {text}")
-    quantiles = ("q05", "q50", "q95")
-    headers = ["mode", "count", "share_%", "+-", "unstable", "locked"]
-    headers += [f"k_{q}_g" for q in quantiles]
-    if document["drainage"] is not None:
-        headers += [f"drained_k_{q}_g" for q in quantiles]
-    print_table(
-        headers,
-        [
-            [
-                mode,
-                tally["count"],
-                round(100.0 * tally["share"], 2),
-                round(100.0 * tally["share_error"], 2),
-                tally["unstable"],
-                tally["locked"],
-                *(
-                    (states["yield_g"] or {}).get(q)
-                    for states in (tally, tally["drained"])
-                    if states is not None
-                    for q in quantiles
-                ),
-            ]
-            for mode, tally in document["modes"].items()
-        ],
-    )
-    for crossing in document["crossings"]:
-        error = crossing["standard_error_g"]
-        within = "-" if error is None else f"{error:.2g}"
-        print(
-            f"counts cross at {crossing['pga_g']:.4g} +- {within} g "
-            f"({cell(crossing['count'])} blocks each): more {_words(crossing['below'])} below, "
-            f"more {_words(crossing['above'])} above"
-        )
-    if document["scenario"] is not None:
-        _print_scenario(document["scenario"])
-    if document["shaking"] is not None:
-        print_failures(document["shaking"])
-
-
-def _print_scenario(scenario: dict[str, Any]) -> None:
-    from rbfrag.vocabulary.quantities import INTENSITY
-
-    print()
-    names = (*INTENSITY, "model", "level")
-    others = {f"model of {_words(mode)}": name for mode, name in scenario["other_models"].items()}
-    print_pairs({**{name: scenario[name] for name in names if name in scenario}, **others})
-    rows = [
-        [mode, 100.0 * answer["share"], answer["covered"], *_probability(answer)]
-        for mode, answer in scenario["modes"].items()
-    ]
-    total = scenario["covered_only"]
-    rows.append(["covered blocks only", 100.0 * scenario["covered_share"], total["covered"]])
-    rows[-1] += _probability(total)
-    headers = ["mode", "share_%", "covered", "probability", "+-", "ci_low", "ci_high"]
-    if total["drained"] is not None:
-        headers += ["drained", "drained_low", "drained_high"]
-    print_table(headers, rows)
-
-
-def _probability(answer: dict[str, Any]) -> list[Any]:
-    drained = answer["drained"] or {}
-    return [
-        *(answer[key] for key in ("probability", "standard_error", "ci_low", "ci_high")),
-        *(drained[key] for key in ("probability", "ci_low", "ci_high") if drained),
-    ]
-
-
-def _words(mode: str) -> str:
-    return {"confined_topple": "confined topples"}.get(mode, f"{mode}s")
+    print_result(answer, json=printing.json, verbose=printing.verbose)
