@@ -115,13 +115,15 @@ class RockMassAnswer(Result):
             )
             yield TextLine("Limits", self._limits(shaking))
 
-    def _limits(self, shaking: Mapping[str, Any]) -> str:
-        turned = shaking["rotation_limit_deg"]
-        rotation = "" if turned is None else f" {turned:g}° or"
-        return (
-            f"a slide fails beyond {shaking['displacement_limit_m']:g} m, a block that rotates "
-            f"beyond{rotation} recovery"
+    @staticmethod
+    def _limits(shaking: Mapping[str, Any]) -> str:
+        """Return the limits beyond which blocks fail."""
+        limit_deg = shaking["rotation_limit_deg"]
+        rotation = (
+            "past recovery" if limit_deg is None else f"beyond {limit_deg:g}° or past recovery"
         )
+        limit_m = shaking["displacement_limit_m"]
+        return f"a slide fails beyond {limit_m:g} m, a rotating block {rotation}"
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the modes, the probabilities by mode, and failures by scale.
@@ -246,8 +248,9 @@ def _failure_tables(shaking: Mapping[str, Any]) -> Iterator[TextTable]:
             ends.append([mode, scale["scale"], *tally.values()])
     yield TextTable([*headers, *outcomes], rows)
     final_modes = next(iter(shaking["scales"][0]["final_modes"].values()))
-    # none: the motion does not move the block, or it is not run
-    yield TextTable(["mode", "scale", *(f"ends: {name}" for name in final_modes)], ends)
+    # a block without a final mode was not moved, or not run
+    modes = ("not moved" if name == "none" else f"ends: {name}" for name in final_modes)
+    yield TextTable(["mode", "scale", *modes], ends)
 
 
 class RockMassQuestion(MeasureFields[float | None], total=False):

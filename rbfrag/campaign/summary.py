@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -9,7 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.conditional import ConditionalShare
-from rbfrag.results.result import Tabular
+from rbfrag.results.numbers import interval, percent, rounded
+from rbfrag.results.result import Result, Tabular, TextTable
+
+SHORT = ("certified", "reentrant", "without_vertical", "runs", "responses", "seconds")
+"""Numbers that a terminal shows where they are not zero, unless every value is requested."""
+
+STATUSES = {
+    "found": "with a critical value",
+    "below_limit": "in which nothing fails down to the search limit",
+    "no_motion": "in which nothing moves",
+    "outside_model": "outside the model",
+    "not_searched": "with outcomes of a grid alone",
+}
+"""Status of combinations in a sentence."""
+
+CONDITIONAL = (
+    "limit", "state left", "PGA/yield", "blocks", "earthquakes", "of station", "P", "interval",
+    "P intact", "interval", "ratio",
+)  # fmt: skip
+"""Headers of the conditional fragility."""
 
 _COUNTS = ("blocks", "earthquakes", "of_station", "fails", "intact_fails", "unknown")
 
@@ -62,9 +82,38 @@ class SequenceReport(Tabular):
             for name in names
         }
 
+    def text_table(self) -> TextTable:
+        """Return the conditional fragility as a terminal shows it."""
+        return TextTable(CONDITIONAL, [_conditional_cells(row) for row in self.conditional])
+
+
+def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
+    limit = "recovery"
+    if row.displacement_m is not None:
+        limit = f"{row.displacement_m:g} m"
+    elif row.rotation_deg is not None:
+        limit = f"{row.rotation_deg:g}°"
+    state, most = "none", row.pga_over_yield_to
+    if row.state_to > 0.0:
+        state = interval(row.state_from, row.state_to)
+    ratios = f"over {row.pga_over_yield_from:g}"
+    return (
+        limit,
+        state,
+        ratios if most is None else f"{row.pga_over_yield_from:g}–{most:g}",
+        row.blocks,
+        row.earthquakes,
+        row.of_station,
+        percent(row.probability),
+        interval(row.ci_low, row.ci_high),
+        percent(row.intact_probability),
+        interval(row.intact_ci_low, row.intact_ci_high),
+        None if row.ratio is None else rounded(row.ratio),
+    )
+
 
 @dataclass(frozen=True, repr=False)
-class CampaignSummary(Tabular):
+class CampaignSummary(Result):
     """What a finished campaign reports.
 
     Args:
@@ -106,7 +155,34 @@ class CampaignSummary(Tabular):
     warnings: tuple[str, ...] = ()
     sequence: SequenceReport | None = None
 
-    def as_dict(self) -> dict[str, object]:
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of stored combinations, by their status."""
+        several = self.combinations != 1
+        before = f", {self.resumed:,} of them before" if self.resumed else ""
+        if self.sequence is not None:
+            yield (
+                f"{self.combinations:,} sequence{'s' if several else ''} of {self.kind} blocks "
+                f"stored{before}: {self.sequence.station_pairs} pairs of shocks of one station, "
+                f"{self.sequence.drawn_pairs} drawn pairs"
+            )
+            return
+        parts = [f"{getattr(self, n):,} {text}" for n, text in STATUSES.items() if getattr(self, n)]
+        yield (
+            f"{self.combinations:,} combination{'s' if several else ''} of kind {self.kind} "
+            f"stored{before}: {', '.join(parts) or 'none'}"
+        )
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
+        """Yield the numbers of the campaign, or the conditional fragility of sequences."""
+        if self.sequence is not None:
+            yield self.sequence.text_table()
+            return
+        values = self.as_dict()
+        del values["warnings"]
+        rows = [(name, value) for name, value in values.items() if verbose or name in SHORT]
+        yield TextTable((), [(name, value) for name, value in rows if verbose or value])
+
+    def as_dict(self) -> dict[str, Any]:
         """Return the keys of the JSON contract."""
         document = {**asdict(self), "warnings": list(self.warnings)}
         if self.sequence is None:

@@ -108,8 +108,11 @@ def print_result(
         if note not in questions:
             print_note(note, fields)
     width = get_terminal_size().columns if sys.stdout.isatty() else None
+    is_first = not notes and not any(result.lines())
     for table in result.tables(verbose=verbose):
-        print()
+        if not is_first:
+            print()
+        is_first = False
         if table.headers:
             print_table(table.headers, table.rows, width=width)
         else:

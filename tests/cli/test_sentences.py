@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.results.numbers import (
     annual_rate,
     annual_rates,
@@ -48,24 +47,3 @@ def test_rates_have_two_digits_and_an_exponent_where_they_are_small() -> None:
 )
 def test_three_digits(value: float, said: str) -> None:
     assert rounded(value) == said
-
-
-@pytest.mark.parametrize(
-    ("report", "said"),
-    [
-        (
-            {"found": 20, "below_limit": 4, "resumed": 0},
-            "24 combinations of kind toppling are stored: 20 with a critical value, 4 of which "
-            "nothing fails down to the search limit.",
-        ),
-        (
-            {"found": 24, "below_limit": 0, "resumed": 12},
-            "24 combinations of kind toppling are stored, 12 of them before: 24 with a critical "
-            "value.",
-        ),
-    ],
-)
-def test_what_a_campaign_has_stored(report: dict[str, int], said: str) -> None:
-    others = dict.fromkeys(("no_motion", "outside_model", "not_searched"), 0)
-    whole = {"kind": "toppling", "combinations": 24, **others, **report}
-    assert campaign_in_words(whole) == said

@@ -6,30 +6,21 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.output import (
     ProgressBar,
     check_files,
-    print_json,
-    print_pairs,
-    print_table,
-    print_warnings,
+    print_result,
     say_when_compiling,
     write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.results.numbers import exact_percent
 
 if TYPE_CHECKING:
     from rbfrag.campaign.summary import CampaignProgress
     from rbfrag.db.rows import Vertical
-    from rbfrag.fragility.conditional import ConditionalShare
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
-
-SHORT = ("certified", "reentrant", "without_vertical", "runs", "responses", "seconds")
-"""Numbers that are shown without --verbose where they are not zero."""
 
 RECOVERY = "recovery"
 """What stands for failure past recovery in a list of rotations."""
@@ -204,62 +195,9 @@ def simulate(
             on_progress=show,
             stopped=stopped,
         )
-    report = summary.as_dict()
-    pairs = summary.sequence
-    if pairs is not None and sequence.out is not None:
-        write_table(pairs.table_columns(), sequence.out, excel_text=False)
-    if printing.json:
-        print_json(report)
-        return
-    if pairs is not None:
-        print(
-            f"{summary.combinations} sequences of {summary.kind} blocks are stored, "
-            f"{summary.resumed} of them from before: {pairs.station_pairs} pairs of shocks of one "
-            f"station and {pairs.drawn_pairs} drawn pairs."
-        )
-        print()
-        print_table(_CONDITIONAL, map(_conditional_cells, pairs.conditional))
-        print_warnings(summary.warnings)
-        return
-    del report["warnings"]
-    print(campaign_in_words(report))
-    print()
-    shown = report if printing.verbose else {name: report[name] for name in SHORT if report[name]}
-    print_pairs(shown)
-    print_warnings(summary.warnings)
-
-
-_CONDITIONAL = (
-    "limit", "state left", "PGA/yield", "blocks", "earthquakes", "of station", "P", "95 %",
-    "P intact", "95 %", "ratio",
-)  # fmt: skip
-"""Headers of the conditional fragility; all of it with --json or --out."""
-
-
-def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
-    limit = "recovery"
-    if row.displacement_m is not None:
-        limit = f"{row.displacement_m:g} m"
-    elif row.rotation_deg is not None:
-        limit = f"{row.rotation_deg:g} deg"
-    state, most = "none", row.pga_over_yield_to
-    if row.state_to > 0.0:
-        state = f"{exact_percent(row.state_from)} to {exact_percent(row.state_to)}"
-    return (
-        limit,
-        state,
-        f"over {row.pga_over_yield_from:g}"
-        if most is None
-        else f"{row.pga_over_yield_from:g} to {most:g}",
-        row.blocks,
-        row.earthquakes,
-        row.of_station,
-        f"{row.probability:.3f}",
-        f"{row.ci_low:.3f} to {row.ci_high:.3f}",
-        f"{row.intact_probability:.3f}",
-        f"{row.intact_ci_low:.3f} to {row.intact_ci_high:.3f}",
-        None if row.ratio is None else f"{row.ratio:.2f}",
-    )
+    if summary.sequence is not None and sequence.out is not None:
+        write_table(summary.sequence.table_columns(), sequence.out, excel_text=False)
+    print_result(summary, json=printing.json, verbose=printing.verbose)
 
 
 def _numbers(text: str | None, option: str) -> list[float] | None:
