@@ -33,7 +33,7 @@ from rbfrag.motions.processing import (
 )
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE, is_on_structure, quality_flags
 from rbfrag.motions.text.header_check import doubts
-from rbfrag.results.result import Tabular
+from rbfrag.results.result import Result, TextLine
 
 AS_SUPPLIED = "as supplied"
 
@@ -55,7 +55,7 @@ class FailedFile:
 
 
 @dataclass(frozen=True)
-class AddReport(Tabular):
+class AddReport(Result):
     """What :func:`add_motions` did.
 
     Args:
@@ -77,6 +77,21 @@ class AddReport(Tabular):
     warnings: tuple[str, ...]
     not_read: tuple[str, ...]
 
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of motions that were added."""
+        processed = f", {len(self.processed):,} of them processed" if self.processed else ""
+        parts = [
+            f"{len(self.added):,} motion{'' if len(self.added) == 1 else 's'} added{processed}"
+        ]
+        parts += [f"{len(self.known):,} stored before"] if self.known else []
+        parts += [f"{len(self.failed):,} rejected"] if self.failed else []
+        yield "; ".join(parts)
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the columns of the metadata that are ignored."""
+        if self.not_read:
+            yield TextLine("Ignored", f"columns of the metadata: {', '.join(self.not_read)}")
+
     def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return id and state of every motion, and the file and reason of each that failed."""
         states = [
@@ -91,7 +106,7 @@ class AddReport(Tabular):
         rows = np.array(states, dtype=object).reshape(-1, len(names))
         return dict(zip(names, rows.T, strict=True))
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the JSON contract."""
         lists = {each.name: list(getattr(self, each.name)) for each in fields(self)}
         return {**lists, "failed": [{"file": f.path, "reason": f.reason} for f in self.failed]}

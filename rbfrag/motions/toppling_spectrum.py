@@ -14,7 +14,8 @@ closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, overload
 
 import numpy as np
@@ -26,6 +27,8 @@ from rbfrag.motions.polarity import FloatArray, Polarity, driving_acceleration_g
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.numbers import rounded
+from rbfrag.results.result import Result, TextLine, TextTable
 
 SERIES_BELOW = 0.5
 """p·h below which the weights of an interval are summed as power series in it."""
@@ -213,23 +216,71 @@ def _weights(h: FloatArray, p: FloatArray | float) -> tuple[FloatArray, FloatArr
     return decay, h * near, h * far
 
 
-def spectrum_as_dict(
-    motion: str, ground: GroundMotion, p2: Sequence[float], polarity: Polarity
-) -> dict[str, Any]:
-    """Return the answer under the keys of the JSON contract.
+@dataclass(frozen=True, eq=False, repr=False)
+class TopplingSpectrum(Result):
+    """Toppling spectrum of a motion in one polarity.
 
     Args:
         motion: the motion as the caller names it.
-        ground: the motion itself.
-        p2: frequency parameters [1/s²].
+        name: label of the motion.
         polarity: forward or reverse.
+        pgv_m_s: PGV of the motion [m/s].
+        p2: frequency parameters [1/s²].
+        x_m_s: toppling velocities X(p) [m/s].
+        warnings: notes on the motion.
     """
-    return {
-        "motion": motion,
-        "name": ground.label,
-        "polarity": polarity,
-        "pgv_m_s": ground.pgv_m_s,
-        "p2": list(p2),
-        "x_m_s": toppling_spectrum(ground, p2, polarity).tolist(),
-        "warnings": [*ground.remarks, *(flag.sentence for flag in quality_flags(ground))],
-    }
+
+    motion: str
+    name: str
+    polarity: str
+    pgv_m_s: float
+    p2: list[float]
+    x_m_s: list[float]
+    warnings: list[str]
+
+    @classmethod
+    def of(
+        cls, motion: str, ground: GroundMotion, p2: Sequence[float], polarity: Polarity
+    ) -> TopplingSpectrum:
+        """Return the spectrum of a motion that the caller names `motion`."""
+        x_m_s = toppling_spectrum(ground, p2, polarity).tolist()
+        warnings = [*ground.remarks, *(flag.sentence for flag in quality_flags(ground))]
+        return cls(motion, ground.label, polarity, ground.pgv_m_s, list(p2), x_m_s, warnings)
+
+    @property
+    def critical_kr(self) -> list[float]:
+        """k_r of the block of each size whose toppling velocity k_r g/p is X(p)."""
+        pairs = zip(self.p2, self.x_m_s, strict=True)
+        return [x * p2**0.5 / STANDARD_GRAVITY_M_S2 for p2, x in pairs]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the k_r that topples, from the first size to the last."""
+        pairs = zip(self.critical_kr, self.p2, strict=True)
+        sizes = [f"{rounded(kr)} at p² = {p2:g} s⁻²" for kr, p2 in pairs]
+        ends = sizes[0] if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+        yield f"Critical k_r, to 2 %: {ends}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the motion."""
+        pgv = f"PGV {rounded(self.pgv_m_s)} m/s"
+        yield TextLine("Record", f"{self.name}, {pgv}, {self.polarity} polarity")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield X and the critical k_r by size."""
+        columns = zip(self.p2, self.x_m_s, self.critical_kr, strict=True)
+        rows = [(p2, rounded(x), rounded(kr)) for p2, x, kr in columns]
+        yield TextTable(("p² [s⁻²]", "X [m/s]", "k_r"), rows)
+
+    def table_columns(self) -> Mapping[str, Any]:
+        """Return the columns by name, one row a size."""
+        size = len(self.p2)
+        texts = {name: getattr(self, name) for name in ("motion", "name", "polarity")}
+        return {
+            **{name: np.full(size, text, dtype=object) for name, text in texts.items()},
+            "p2_1_s2": np.array(self.p2),
+            "x_m_s": np.array(self.x_m_s),
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return dict(vars(self))

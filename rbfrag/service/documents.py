@@ -17,6 +17,7 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.exchange.table_answers import TableAnswer
 from rbfrag.fragility.prediction import OF_EACH_MODEL, Prediction
 from rbfrag.fragility.prediction_array import OF_ARRAYS, PredictionArray
+from rbfrag.motions.toppling_spectrum import TopplingSpectrum
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical_result import STRENGTH_VALUES, CriticalResult
 from rbfrag.solver.stability.joint import JointStrength
@@ -257,16 +258,9 @@ class Health(_Document):
     version: str
 
 
+@keys_of(TopplingSpectrum)
 class SpectrumAnswer(_Answer):
     """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum` prints as JSON."""
-
-    motion: str
-    name: str
-    polarity: str
-    pgv_m_s: float
-    p2: list[float]
-    x_m_s: list[float]
-    warnings: list[str]
 
 
 class MapRow(_Document):

@@ -91,13 +91,13 @@ def rock_mass(
 def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
     """Return what `rbfrag spectrum` prints as JSON."""
     from rbfrag.motions.polarity import POLARITIES
-    from rbfrag.motions.toppling_spectrum import spectrum_as_dict
+    from rbfrag.motions.toppling_spectrum import TopplingSpectrum
 
     ground = _motion(body, query)
     answers = [
-        spectrum_as_dict(ground.label, ground, query.sizes(), each)
-        for each in POLARITIES
-        if query.polarity in (each, "both")
+        TopplingSpectrum.of(ground.label, ground, query.sizes(), polarity).as_dict()
+        for polarity in POLARITIES
+        if query.polarity in (polarity, "both")
     ]
     return json_text(answers[0] if len(answers) == 1 else answers)
 

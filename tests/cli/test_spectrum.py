@@ -59,7 +59,7 @@ def test_table_and_picture(shell: Shell, record: Path, other: Path, tmp_path: Pa
     motion = read_motions(other)[0]
     assert float(rows[3]["x_m_s"]) == toppling_spectrum(motion, 1.0)
     assert f"{toppling_spectrum(motion, 1.0):.3g}" in shown
-    assert "m/s): critical k_r, to 2 %, 0." in shown
+    assert "Critical k_r, to 2 %: 0." in shown
     assert picture.stat().st_size > 2000
 
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rbfrag.cli.output import ProgressBar, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import ProgressBar, print_json, print_result, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, stored_row
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
-from rbfrag.cli.sentences import motion_in_words
 from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:
@@ -20,18 +19,6 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 """Characters of a line of the list."""
-
-SHORT = (
-    "id", "event", "event_id", "station", "component", "is_vertical", "dt_s", "npts", "pga_g",
-    "pgv_m_s", "pgd_m", "tm_s", "sa10_g", "flags",
-)  # fmt: skip
-"""Values of one motion that are shown without --verbose."""
-
-LABELS = (
-    "event", "station", "component", "orientation_deg", "is_vertical", "is_corrected", "recording",
-    "source_file", "trace_index",
-)  # fmt: skip
-"""What a motion's file says of it, shown under the same name."""
 
 STORED_LABELS = (
     "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
@@ -100,20 +87,7 @@ def add(
             gain=reading.gain,
             on_file=bar.show,
         )
-    if json:
-        print_json(report.as_dict())
-    else:
-        print_pairs(
-            {
-                "added": len(report.added),
-                "of these processed": len(report.processed),
-                "stored before": len(report.known),
-                "left out": len(report.failed),
-            }
-        )
-        if report.not_read:
-            print(f"not read: {', '.join(report.not_read)}")
-        print_warnings(report.warnings)
+    print_result(report, json=json)
     for bad in report.failed:
         print(f"left out: {bad.path}: {bad.reason}", file=sys.stderr)
     if report.failed:
@@ -168,42 +142,17 @@ def show(
     printing: options.Printing,
 ) -> None:
     """Show one motion: a file as it is, or a stored one by its id."""
-    from rbfrag.motions.quality import quality_flags
+    from rbfrag.motions.motion_summary import MotionSummary
 
     ground = find_motion(motion, db=db, reading=reading, allow_partial=allow_partial)
-    flags = quality_flags(ground)
-    document: dict[str, Any] = {
-        "name": ground.label,
-        **{name: getattr(ground, name) for name in LABELS},
-        "format": ground.file_format,
-        "start_time": None if ground.start_time is None else ground.start_time.isoformat(),
-        **{name: getattr(ground, name) for name in ("dt_s", "npts", "duration_s")},
-        **asdict(ground.measures),
-        **ground.spectral_accelerations,
-        "processing_applied": ground.processing_applied,
-        "sha256": ground.sha256,
-        "source_sha256": ground.source_sha256 or ground.sha256,
-        "flags": [flag.code for flag in flags],
-        "remarks": list(ground.remarks),
-    }
-    stored = stored_row(motion, db=db)
-    if stored is not None:
+    values: dict[str, Any] = {}
+    if (stored := stored_row(motion, db=db)) is not None:
         row, pair = stored
-        kept = _as_dict(row)
-        document = {**document, **{name: kept[name] for name in STORED_LABELS}}
-        document["vertical_id"] = None if pair is None else pair.vertical_id
-        document["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
-    if printing.json:
-        print_json(document)
-        return
-    remarks = document.pop("remarks")
-    print(motion_in_words(document, flags=len(document["flags"])))
-    print()
-    known = {name: value for name, value in document.items() if value is not None}
-    print_pairs(
-        known if printing.verbose else {name: known[name] for name in SHORT if name in known}
-    )
-    print_warnings([*remarks, *(flag.sentence for flag in flags)])
+        document = _as_dict(row)
+        values = {name: document[name] for name in STORED_LABELS}
+        values["vertical_id"] = None if pair is None else pair.vertical_id
+        values["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
+    print_result(MotionSummary(ground, values), json=printing.json, verbose=printing.verbose)
 
 
 @app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")
