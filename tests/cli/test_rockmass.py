@@ -81,7 +81,7 @@ def test_json_is_the_python_answer(shell: Shell, mass: Path) -> None:
 
 def test_text_names_shares_crossing_and_impossible(shell: Shell, mass: Path) -> None:
     text = shell("rockmass", mass).stdout
-    assert "slump 61 %" in text
+    assert "slide 61 %, slump 39 %" in text
     assert "Counts    equal at a PGA of 0.417 ± 0.0029 g" in text
     assert "more slumps below, more slides above" in text
     assert "Rejected  5 realisations are no block: gamma" in text
