@@ -33,17 +33,21 @@ from rbfrag.motions.processing import (
 )
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE, is_on_structure, quality_flags
 from rbfrag.motions.text.header_check import doubts
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.result import Result, TextLine
 
 AS_SUPPLIED = "as supplied"
 
-_GUESSED = (
-    f"are assumed horizontal though their names state no direction (flag {DIRECTION_GUESSED}): a "
-    "vertical one would be simulated as a horizontal; give is_vertical in a table of metadata"
-)
-_ON_STRUCTURE = (
-    f"were recorded on a structure (flag {STRUCTURE}) and stay out of campaigns and fits"
-)
+DOUBTS = {
+    DIRECTION_GUESSED: (
+        f"are assumed horizontal though their names state no direction (flag {DIRECTION_GUESSED}): "
+        "a vertical one would be simulated as a horizontal; give is_vertical in a table of metadata"
+    ),
+    STRUCTURE: (
+        f"were recorded on a structure (flag {STRUCTURE}) and stay out of campaigns and fits"
+    ),
+}
+"""Warnings about the sensors of traces, by their code."""
 
 
 @dataclass(frozen=True)
@@ -231,16 +235,18 @@ def add_motions(
                 _take_note(run, stored)
                 _take_note_of_sensors(run, file, traces)
                 remarks = [each for trace in traces for each in trace.motion.remarks]
-                run.warnings += dict.fromkeys(f"{file}: {each}" for each in doubts(remarks))
+                run.warnings += (
+                    Diagnostic(f"{file}: {text}", "header_check")
+                    for text in dict.fromkeys(doubts(remarks))
+                )
             if on_file is not None:
                 on_file(number, len(files))
         if engine is not None:
             with engine.connect() as connection:
                 run.warnings += _mixed_intervals(connection, run.place)
-    run.warnings += [
-        f"{len(names)} traces {doubt}: {', '.join(names[:5])}{', …' if len(names) > 5 else ''}"
-        for doubt, names in run.doubts.items()
-    ]
+    for code, names in run.doubts.items():
+        listed = f"{', '.join(names[:5])}{', …' if len(names) > 5 else ''}"
+        run.warnings.append(Diagnostic(f"{len(names)} traces {DOUBTS[code]}: {listed}", code))
     return AddReport(*(tuple(getattr(run, each.name)) for each in fields(AddReport)))
 
 
@@ -251,12 +257,13 @@ def _take_note(run: _Additions, stored: list[_Stored]) -> None:
             run.processed.append(one.motion_id)
         first = run.place.setdefault(one.motion_id, one.place)
         if first != one.place:
-            run.warnings.append(
+            text = (
                 f"{one.place} holds the same samples as {first}: stored once, as motion "
                 f"{one.motion_id}"
             )
+            run.warnings.append(Diagnostic(text, "duplicate_record"))
         elif one.doubt:
-            run.warnings.append(one.doubt)
+            run.warnings.append(Diagnostic(one.doubt, "duplicate_record"))
 
 
 def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> None:
@@ -264,11 +271,12 @@ def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> N
         motion = trace.motion
         name = f"{file.name}#{motion.trace_index} {motion.component}".rstrip()
         if trace.other_direction:
-            run.warnings.append(f"{file}: {trace.other_direction}: the metadata are used")
+            text = f"{file}: {trace.other_direction}: the metadata are used"
+            run.warnings.append(Diagnostic(text, "direction_guessed"))
         if trace.is_vertical is None:
-            run.doubts[_GUESSED].append(name)
+            run.doubts[DIRECTION_GUESSED].append(name)
         if is_on_structure(motion):
-            run.doubts[_ON_STRUCTURE].append(f"{name} at {motion.location}")
+            run.doubts[STRUCTURE].append(f"{name} at {motion.location}")
 
 
 def _take_note_of_units(
@@ -280,17 +288,21 @@ def _take_note_of_units(
             file, f"{other} is stated for it, not {units}: leave units out", fields=("units",)
         )
     if other:
-        run.warnings.append(
+        text = (
             f"{file} is in {other}, as is stated for it, not in {units}, which is for the files "
             "that state none"
         )
+        run.warnings.append(Diagnostic(text, "unit_in_file"))
 
 
-def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[str]:
+def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[Diagnostic]:
     return [
-        f"recording {mixed.name!r} has components of dt = "
-        f"{' and '.join(f'{dt:g}' for dt in mixed.dt_s)} s: those that differ are not used "
-        "together"
+        Diagnostic(
+            f"recording {mixed.name!r} has components of dt = "
+            f"{' and '.join(f'{dt:g}' for dt in mixed.dt_s)} s: those that differ are not used "
+            "together",
+            "components_differ",
+        )
         for mixed in recordings_of_mixed_dt(connection)
         if not touched.keys().isdisjoint(mixed.motion_ids)
     ]

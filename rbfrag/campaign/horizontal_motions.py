@@ -10,6 +10,7 @@ from rbfrag.db.motions import motion_rows
 from rbfrag.db.rows import MotionRow
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import DIRECTION_GUESSED, STRUCTURE
+from rbfrag.results.diagnostic import Diagnostic
 
 
 class MotionChoice(TypedDict):
@@ -44,15 +45,17 @@ def horizontal_motions(
             "others, or set include_structures",
             fields=("include_structures",),
         )
-    warnings = []
+    warnings: list[str] = []
     if len(rows) < len(every):
-        warnings.append(
+        text = (
             f"{len(every) - len(rows)} of {len(every)} horizontal motions were recorded on "
             "structures and are excluded: they are not ground motion"
         )
+        warnings.append(Diagnostic(text, "structure"))
     if guessed := sum(DIRECTION_GUESSED in row.flags for row in rows):
-        warnings.append(
+        text = (
             f"the direction of {guessed} of {len(rows)} motions is guessed: a vertical one among "
             "them is simulated as a horizontal; give is_vertical in a table of metadata"
         )
+        warnings.append(Diagnostic(text, "direction_guessed"))
     return rows, warnings

@@ -20,6 +20,7 @@ from rbfrag.db.rows import MotionRow, Vertical
 from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import facts_of
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
@@ -152,10 +153,11 @@ def plan_campaign(
         )
     if lacking:
         left = "left out" if vertical == "with" else "shaken without one only"
-        warnings.append(
+        text = (
             f"{len(lacking)} of {len(rows)} horizontal motions have no vertical one that fits and "
             f"are {left}: {_first(lacking)}"
         )
+        warnings.append(Diagnostic(text, "no_vertical"))
     plans = [
         MotionPlan(
             motion=row,

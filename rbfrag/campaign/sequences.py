@@ -32,6 +32,7 @@ from rbfrag.db.shock_pairs import (
 from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kind import BlockOnPlanes, Shaking
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.results import NUMERICS_VERSION, BlockState, Polarity, Response
@@ -138,9 +139,10 @@ def simulate_sequences(
             answers = stored_shock_pairs(connection, keys)
     of_station = sum(pair.pairing == "station" for pair in pairs)
     drawn = len(pairs) - of_station
-    warning = (
+    warning = Diagnostic(
         f"{of_station} of {len(pairs)} pairs of motions are shocks of one station; the other "
-        f"{drawn} are motions of different earthquakes, drawn with seed {seed}"
+        f"{drawn} are motions of different earthquakes, drawn with seed {seed}",
+        "pairs_drawn",
     )
     return CampaignSummary(
         kind=kind.kind,

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.quality import motion_warnings, quality_flags
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 
@@ -33,8 +33,7 @@ class MotionSummary(Result):
     warnings: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        flags = (flag.sentence for flag in quality_flags(self.motion))
-        object.__setattr__(self, "warnings", (*self.motion.remarks, *flags))
+        object.__setattr__(self, "warnings", motion_warnings(self.motion))
 
     def sentences(self) -> Iterator[str]:
         """Yield the peak values and the duration of the motion."""

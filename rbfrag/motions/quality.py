@@ -9,6 +9,7 @@ import numpy as np
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.intensity import TM_BAND_HZ
+from rbfrag.results.diagnostic import Diagnostic, with_prefix
 from rbfrag.results.numbers import exact_percent
 
 LONGEST_DT_S = 0.1
@@ -52,7 +53,7 @@ class QualityFlag:
     """One doubt about a motion: its name as stored, and value, limit and meaning in a sentence."""
 
     code: str
-    sentence: str
+    sentence: Diagnostic
 
 
 def is_on_structure(motion: GroundMotion) -> bool:
@@ -71,7 +72,7 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
     flags: list[QualityFlag] = []
 
     def doubt(code: str, sentence: str) -> None:
-        flags.append(QualityFlag(code, sentence))
+        flags.append(QualityFlag(code, Diagnostic(sentence, "record_quality")))
 
     if measures.pga_g == 0.0:
         doubt("all_zero", "every sample is zero: this is no motion")
@@ -140,3 +141,18 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
                 "PGA: it was cut out of a longer one; the ground is taken to be at rest outside it",
             )
     return tuple(flags)
+
+
+def motion_warnings(
+    motion: GroundMotion, vertical: GroundMotion | None = None
+) -> tuple[Diagnostic, ...]:
+    """Return the remarks on the reading of a motion, and its quality flags.
+
+    Args:
+        motion: the horizontal motion.
+        vertical: the vertical motion of the same recording, whose flags follow.
+    """
+    remarks = (Diagnostic(text, "record_remark") for text in motion.remarks)
+    flags = (flag.sentence for flag in quality_flags(motion))
+    upward = () if vertical is None else quality_flags(vertical)
+    return (*remarks, *flags, *(with_prefix("vertical: ", flag.sentence) for flag in upward))

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import FloatArray, Polarity, driving_acceleration_g
-from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.quality import motion_warnings
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import rounded
@@ -244,7 +244,7 @@ class TopplingSpectrum(Result):
     ) -> TopplingSpectrum:
         """Return the spectrum of a motion that the caller names `motion`."""
         x_m_s = toppling_spectrum(ground, p2, polarity).tolist()
-        warnings = [*ground.remarks, *(flag.sentence for flag in quality_flags(ground))]
+        warnings: list[str] = [*motion_warnings(ground)]
         return cls(motion, ground.label, polarity, ground.pgv_m_s, list(p2), x_m_s, warnings)
 
     @property

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.intervals import checked_level
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.rockmasses.report import block_columns
 from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass
 from rbfrag.solver.kinds import BY_MECHANICS, FOLLOWED
-from rbfrag.solver.stability.modes import MODES, TOPPLE, ModeName
+from rbfrag.solver.stability.modes import MODES, TOPPLE, ModeName, words_of_mode
 
 
 def exact_interval(count: int, of: int, level: float) -> tuple[float, float]:
@@ -203,7 +204,10 @@ def failure_warnings(shaken: ShakenMass) -> list[str]:
     return [
         *shaken.warnings,
         *(
-            f"{count} of {by_mode[mode]} blocks of mode {mode.replace('_', ' ')}: {text}"
+            Diagnostic(
+                f"{count} of {by_mode[mode]} blocks of mode {words_of_mode(mode)}: {text}",
+                "model_limits",
+            )
             for (mode, text), count in shaken.about.items()
         ),
     ]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.results.diagnostic import Diagnostic, with_prefix
 from rbfrag.rockmasses.counts import EqualCounts, ModeCount, StateCount
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.scenario import Average, Scenario
@@ -119,24 +120,25 @@ def mass_warnings(
         warnings += notes_on_water(realisations)
         modes = (each.stability.mode_code for each in (realisations, realisations.drained))
         if others := int(np.count_nonzero(np.not_equal(*modes)[realisations.is_block])):
-            warnings.append(OTHER_MODE_DRAINED.format(count=others))
+            warnings.append(Diagnostic(OTHER_MODE_DRAINED.format(count=others), "other_mode"))
     topples = realisations.of_mode("topple") & (realisations.cohesion_pa > 0.0)
     if bonded := int(np.count_nonzero(topples)):
-        warnings.append(f"{bonded} toppling blocks: {NO_EFFECT_OF_COHESION}")
+        warnings.append(with_prefix(f"{bonded} toppling blocks: ", NO_EFFECT_OF_COHESION))
     lifts = int(np.count_nonzero(realisations.is_block & realisations.stability.toe_lifts))
     if lifts:
-        warnings.append(
+        text = (
             f"{lifts} confined topples: the bond of the base is so strong that the toe lifts off "
             "before it slides: their yields are upper bounds"
         )
+        warnings.append(Diagnostic(text, "upper_bound"))
     bad = realisations.n - realisations.n_blocks
     if bad > NEAR_LIMIT * realisations.n:
-        warnings.insert(
-            0,
-            f"{bad} of {realisations.n} realisations are no block and are left out of all shares: "
-            f"{realisations.why_impossible}: "
-            "a lognormal or a truncated distribution may describe the measurements better",
+        text = (
+            f"{bad} of {realisations.n} realisations are no block and are left out of all "
+            f"fractions: {realisations.why_impossible}: a lognormal or a truncated distribution "
+            "may describe the measurements better"
         )
+        warnings.insert(0, Diagnostic(text, "rejected_realisations"))
     return [*warnings, *realisations.rock_mass.remarks]
 
 

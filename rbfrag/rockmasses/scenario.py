@@ -21,6 +21,7 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.question.many import push_of_blocks
 from rbfrag.question.question import predict
 from rbfrag.question.shapes import ModeShapes, dip_of_factor, p2_at_rest
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.formulas import array_elementwise
@@ -261,7 +262,7 @@ def scenario(
                 displacement_m=displacement_m, rotation_deg=rotation_deg,
             )  # fmt: skip
         except InputError as error:
-            no_bound = (f"no drained bound: {error}",)
+            no_bound = (Diagnostic(f"no drained bound: {error}", "no_drained_bound"),)
     modes = []
     for mode in MODES:
         blocks = realisations.of_mode(mode)
@@ -285,7 +286,7 @@ def scenario(
     warnings = _warnings(missing, reason[topples], modelled - {*lacking}, why)
     for text in (BONDED, ENDS, SLIPS_ON):
         if count := int(np.count_nonzero(reason == text)):
-            warnings.append(f"{count} blocks without an answer: {text}")
+            warnings.append(Diagnostic(f"{count} blocks without an answer: {text}", "no_answer"))
     return Scenario(
         measures=measures,
         model=getattr(answer, "model", None),
@@ -370,7 +371,7 @@ def _what_gives_way(
 ) -> Iterator[str]:
     """Yield how many slides tip about their heel at a PGA [g], and how many toes slip."""
     push = _push(realisations)
-    thresholds: dict[ModeName, tuple[str, Callable[..., Any]]] = {
+    thresholds: dict[ModeName, tuple[Diagnostic, Callable[..., Any]]] = {
         "slide": (HEEL_TIPS, heel_tips_g),
         "topple": (TOE_SLIPS, toe_slips_g),
     }
@@ -384,7 +385,8 @@ def _what_gives_way(
         if count := int(np.count_nonzero(gives_way)):
             low, high = (float(each(at_g[gives_way])) for each in (np.min, np.max))
             text = about.replace("{threshold:.2f}", f"{low:.2f} to {high:.2f}")
-            yield f"{count} of {own.size} stable blocks of mode {mode}: {text}"
+            prefix = f"{count} of {own.size} stable blocks of mode {mode}: "
+            yield about.replaced(text=f"{prefix}{text}")
 
 
 def _average(
@@ -421,17 +423,19 @@ def _warnings(
     modelled: set[ModeName],
     why: Mapping[ModeName, str],
 ) -> list[str]:
-    warnings = [
+    texts = (
         f"{mode.replace('_', ' ')}: {percent(share)} of the blocks have no answer"
         + ("" if mode in modelled else why[mode])
         for mode, share in missing.items()
-    ]
-    texts, counts = np.unique(reason.astype(str), return_counts=True)
+    )
+    warnings: list[str] = [Diagnostic(text, "no_answer") for text in texts]
+    reasons, counts = np.unique(reason.astype(str), return_counts=True)
     tally: dict[str, int] = {}
-    for text, count in zip(texts.tolist(), counts.tolist(), strict=True):
+    for text, count in zip(reasons.tolist(), counts.tolist(), strict=True):
         for sentence in filter(None, text.split("; ")):
             tally[sentence] = tally.get(sentence, 0) + count
     total = reason.size
     return warnings + [
-        f"{count} of {total} toppling blocks: {sentence}" for sentence, count in tally.items()
+        Diagnostic(f"{count} of {total} toppling blocks: {sentence}", "block_reasons")
+        for sentence, count in tally.items()
     ]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
-from rbfrag.motions.quality import quality_flags
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner
 from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.quantity import positive
@@ -406,7 +406,7 @@ def plan_shaking(
         moves=moves,
         pga_g=np.array([one.pga_g for one in excitations]),
         warnings=(
-            *_about_motion(motion, vertical, excitations[0].warnings),
+            *motion_remarks(motion, vertical, excitations[0]),
             *_about_bonds(code == BOND_BREAKS),
         ),
     )
@@ -416,18 +416,9 @@ def _about_bonds(breaks: NDArray[np.bool_]) -> tuple[str, ...]:
     count = int(np.count_nonzero(breaks.any(axis=0)))
     if not count:
         return ()
-    return (
-        f"{count} blocks with cohesion or roughness are driven beyond their yield: the first "
-        "slip ends it, and what they do after it no model describes (outcome bond_breaks); "
-        "with friction.phi_residual_deg, what is left of the friction, they are run as they are "
-        "after it",
+    text = (
+        f"{count} blocks with cohesion or roughness are driven beyond their yield: the first slip "
+        "ends it, and no model describes the motion after it (outcome bond_breaks); with "
+        "friction.phi_residual_deg, the residual friction, they are run as they are after it"
     )
-
-
-def _about_motion(
-    motion: GroundMotion, vertical: GroundMotion | None, together: tuple[str, ...]
-) -> tuple[str, ...]:
-    sentences = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *together]
-    if vertical is not None:
-        sentences += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    return tuple(sentences)
+    return (Diagnostic(text, "bond_breaks"),)

@@ -11,7 +11,8 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
-from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.quality import motion_warnings
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 PGA_MOST_G = 1000.0
@@ -197,8 +198,11 @@ def excitation(
             longer = motion if k_h.size > k_v.size else vertical
             short = "vertical" if longer is motion else "horizontal"
             warnings.append(
-                f"the {short} component has {min(k_h.size, k_v.size)} samples, the other "
-                f"{longer.npts}: it is taken as zero after its end"
+                Diagnostic(
+                    f"the {short} component has {min(k_h.size, k_v.size)} samples, the other "
+                    f"{longer.npts}: it is taken as zero after its end",
+                    "components_differ",
+                )
             )
             # the shorter one drops to zero at its last sample: a jump, two nodes at one time
             n = min(k_h.size, k_v.size)
@@ -251,8 +255,4 @@ def motion_remarks(
     motion: GroundMotion, vertical: GroundMotion | None, excited: Excitation
 ) -> tuple[str, ...]:
     """Return the sentences about suspicious motions that an answer carries."""
-    remarks = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion))]
-    remarks += excited.warnings
-    if vertical is not None:
-        remarks += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    return tuple(remarks)
+    return (*motion_warnings(motion, vertical), *excited.warnings)

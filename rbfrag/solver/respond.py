@@ -10,6 +10,7 @@ from typing import Any, cast
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
 from rbfrag.solver.kinds import KINDS, NOT_BACKED, stands_free_of
@@ -271,11 +272,15 @@ def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
     """Return what is known about the block that the answer of a model should say."""
     if model.mode == judged.mode:
         unbacked = stands_free_of(model, judged.back_fracture)
-        return (*judged.warnings, NOT_BACKED) if unbacked else judged.warnings
+        note = Diagnostic(NOT_BACKED, "free_standing")
+        return (*judged.warnings, note) if unbacked else judged.warnings
     return (
         *judged.warnings,
-        f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not what "
-        "it would do",
+        Diagnostic(
+            f"the mode of the block is {words_of_mode(judged.mode)}: it does not fail by "
+            f"{model.kind.replace('_', ' ')}",
+            "other_mode",
+        ),
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import confidence, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.excitation import excitation, motion_remarks
@@ -301,7 +302,8 @@ def _not_known(outcomes: Mapping[str, int], count: int) -> list[str]:
     if not open_ended:
         return []
     named = ", ".join(f"{n} {name}" for name, n in sorted(open_ended.items()))
-    return [
-        f"of {count} outcomes {sum(open_ended.values())} are not known ({named}) and count as not "
+    text = (
+        f"{sum(open_ended.values())} of {count} outcomes are unknown ({named}) and count as not "
         "failed"
-    ]
+    )
+    return [Diagnostic(text, "undetermined")]

@@ -11,6 +11,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.results.diagnostic import Diagnostic, with_prefix
 from rbfrag.solver.quantity import not_negative
 from rbfrag.solver.results import (
     BlockState,
@@ -88,16 +89,19 @@ def respond_in_sequence(
     """
     verticals = motions.vertical or [None] * len(motions.horizontal)
     parts: list[Part] = []
-    warnings = [] if carries_state else [f"{STARTS_ANEW}. {NOT_YET_AT_REST}"]
+    warnings: list[str] = []
+    if not carries_state:
+        warnings.append(Diagnostic(f"{STARTS_ANEW}. {NOT_YET_AT_REST}", "sequence"))
     state, begins_s, overlaps_s = start, 0.0, 0.0
     for number, (motion, vertical) in enumerate(
         zip(motions.horizontal, verticals, strict=True), start=1
     ):
         if parts and _is_over(parts[-1].response, carries_state):
-            warnings.append(f"motion {number} and later ones are left out: {_why(parts[-1])}")
+            text = f"motion {number} and later ones are left out: {_why(parts[-1])}"
+            warnings.append(Diagnostic(text, "sequence"))
             break
         if overlaps_s > 0.0:
-            warnings.append(_too_short(overlaps_s, number - 1))
+            warnings.append(Diagnostic(_too_short(overlaps_s, number - 1), "sequence"))
         answer = run(motion, vertical, state)
         first_s, last_s = float(motion.time_s[0]), float(motion.time_s[-1])
         begins_s = begins_s if parts else first_s
@@ -145,7 +149,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
     answers = [part.response for part in parts]
     outcome = max((answer.outcome for answer in answers), key=WORST_LAST.index)
     own = (
-        f"motion {number}: {text}"
+        with_prefix(f"motion {number}: ", text)
         for number, answer in enumerate(answers, start=1)
         for text in answer.warnings
     )

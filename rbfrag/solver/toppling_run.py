@@ -9,6 +9,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
@@ -128,9 +129,10 @@ def _warnings(
     outcome: Outcome,
     run: Run,
 ) -> tuple[str, ...]:
-    warnings = list(motion_remarks(motion, vertical, excited))
+    warnings: list[str] = [*motion_remarks(motion, vertical, excited)]
     if outcome is Outcome.UNDETERMINED:
-        warnings.append(outcome.advice)
+        warnings.append(Diagnostic(outcome.advice, "undetermined"))
     if outcome is Outcome.JUMP:
-        warnings.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
+        text = f"at {run.verdict_s:.3f} s: {outcome.advice}"
+        warnings.append(Diagnostic(text, "vertical_jump"))
     return tuple(warnings)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.contacts import gap_m, touching
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
@@ -309,7 +310,7 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
         steps=steps,
         samples_moved=moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
-        warnings=(*shaking.warnings, *sentences),
+        warnings=(*shaking.warnings, *(Diagnostic(text, "model_limits") for text in sentences)),
         history=_history(whole, excited) if shaking.history else None,
         final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
         displacement_m=at_end.displacement_m - before_m if at_end else None,

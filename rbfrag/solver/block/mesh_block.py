@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.quantity import positive
@@ -432,36 +433,52 @@ def _not_at_rest(name: str, hull: ContactHull, others: tuple[ContactHull, ...]) 
     )
 
 
-def _doubts(extent_m: float, hull: ContactHull, hulls: tuple[ContactHull, ...]) -> list[str]:
+def _doubts(extent_m: float, hull: ContactHull, hulls: tuple[ContactHull, ...]) -> list[Diagnostic]:
     """Return what an answer cannot be trusted in."""
     doubts = []
     least, most = USUAL_SIZE_M
     if not least <= extent_m <= most:
         doubts.append(
-            f"the mesh is {extent_m:.4g} m across, which no free-standing block is ({least:g} to "
-            f"{most:g} m): coordinates are taken as metres; scale the mesh if they are not"
+            Diagnostic(
+                f"the mesh is {extent_m:.4g} m across, which no free-standing block is "
+                f"({least:g} to {most:g} m): coordinates are assumed to be in metres; scale the "
+                "mesh if they are not",
+                "check_unit",
+            )
         )
     if 1e-3 * hull.contact_mm > 0.1 * hull.height_m:
         doubts.append(
-            f"contacts within {hull.contact_mm:g} mm reach above a tenth of the height of the "
-            f"centre of mass ({hull.height_m:.3g} m): the sides of the block count as its base"
+            Diagnostic(
+                f"contacts within {hull.contact_mm:g} mm reach above a tenth of the height of the "
+                f"centre of mass ({hull.height_m:.3g} m): the sides of the block count as its base",
+                "contact_height",
+            )
         )
     fallen = [f"{other.contact_mm:g}" for other in hulls if not other.stands]
     if fallen:
         doubts.append(
-            f"with contacts within {' or '.join(fallen)} mm the centre of mass lies outside them: "
-            "the pose, or the surface near the ground, is not known well enough"
+            Diagnostic(
+                f"with contacts within {' or '.join(fallen)} mm the centre of mass lies outside "
+                "them: the pose, or the surface near the ground, is too uncertain",
+                "contact_height",
+            )
         )
     krs = [other.weakest().kr for other in hulls if other.stands]
     if max(krs) > 1.25 * min(krs):
         doubts.append(
-            f"k_r of the weakest azimuth is {min(krs):.3g} to {max(krs):.3g} for contacts within "
-            f"{hulls[0].contact_mm:g} to {hulls[-1].contact_mm:g} mm: measure where the block "
-            "touches the ground"
+            Diagnostic(
+                f"k_r of the weakest azimuth is {min(krs):.3g} to {max(krs):.3g} for contacts "
+                f"within {hulls[0].contact_mm:g} to {hulls[-1].contact_mm:g} mm: "
+                "measure where the block touches the ground",
+                "contact_height",
+            )
         )
     if float(hull.rocking(LINES_DEG).restitution.min()) == 0.0:
         doubts.append(
-            "so stocky a block comes to rest at its first impact along some azimuths (restitution "
-            "0)"
+            Diagnostic(
+                "so stocky a block comes to rest at its first impact along some azimuths "
+                "(restitution 0)",
+                "model_limits",
+            )
         )
     return doubts

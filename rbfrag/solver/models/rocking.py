@@ -17,6 +17,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import relative
 from rbfrag.solver.block.formulas import moments_about_corners
 from rbfrag.solver.block.geometry import Block
@@ -255,45 +256,54 @@ def _warnings(
     spread: float | None,
     motion: ResponseHistory,
 ) -> list[str]:
-    warnings = []
+    warnings: list[str] = []
+
+    def warn(code: str, text: str) -> None:
+        warnings.append(Diagnostic(text, code))
+
     if outcome is Outcome.UNDETERMINED:
-        warnings.append(
-            f"after {MOST_IMPACTS} impacts the block still rocks: its outcome is not determined"
-        )
+        text = f"after {MOST_IMPACTS} impacts the block still rocks: its outcome is not determined"
+        warn("undetermined", text)
     if outcome is Outcome.JUMP:
-        warnings.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
+        warn("vertical_jump", f"at {run.verdict_s:.3f} s: {outcome.advice}")
     if min(block.toe.passed_on, block.heel.passed_on) <= 0.0:
-        warnings.append(
+        warn(
+            "model_limits",
             "the block is so stocky that angular momentum leaves it no speed after an impact: "
-            "there it comes to rest"
+            "there it comes to rest",
         )
     if sensitive:
-        warnings.append(
-            "the outcome is sensitive: it is another one for the motion times 1 + 1e-6 or 1 - 1e-6"
+        warn(
+            "sensitive_outcome",
+            "the outcome is sensitive: it is another one for the motion times 1 + 1e-6 or 1 - 1e-6",
         )
     elif outcome is Outcome.STABLE and spread is not None and spread > NOT_REPEATED:
-        warnings.append(
+        warn(
+            "sensitive_outcome",
             f"the peak rotation cannot be repeated: it changes by {relative(spread)} where the "
-            "motion is scaled by 1 + 1e-6 or 1 - 1e-6"
+            "motion is scaled by 1 + 1e-6 or 1 - 1e-6",
         )
     elif error_of(run, outcome) > CHAOTIC * min(block.toe.theta_c, block.heel.theta_c):
-        warnings.append(
+        warn(
+            "sensitive_outcome",
             "the response is chaotic: after so many impacts the size of its peaks is not "
-            "determined by the motion as it is known"
+            "determined by the motion as recorded",
         )
     tan_phi = math.tan(site.phi_rad) if site.phi_rad < 0.5 * math.pi else math.inf
     until_s = run.verdict_s if outcome is Outcome.TOPPLED else math.inf
     force = corner_force(block, motion, tan_phi, until_s)
     if force.lifts_s is not None:
-        warnings.append(
+        warn(
+            "model_limits",
             f"at {force.lifts_s:.3f} s the corner would have to pull to stay on the base: the "
-            "block bounces there, which is not followed"
+            "block bounces there, which is not followed",
         )
     if force.slips_s is not None:
-        warnings.append(
+        warn(
+            "model_limits",
             f"at {force.slips_s:.3f} s friction does not hold the corner (it needs up to "
             f"{math.degrees(math.atan(force.friction)):.4g} degrees): the block slips there, which "
-            "is not followed"
+            "is not followed",
         )
     return warnings
 

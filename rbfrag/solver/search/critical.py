@@ -19,6 +19,7 @@ import numpy as np
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.integrator.block_excitation import block_excitation
@@ -98,9 +99,10 @@ def critical(
     )  # fmt: skip
     # condition 1 of the proof
     if excitation.jump_node < excitation.w.size:
-        jump = (
+        jump = Diagnostic(
             f"1 + k_v <= 0 at {excitation.time_s[excitation.jump_node]:.3f} s: the vertical motion "
-            "throws every block; search with the horizontal motion alone"
+            "throws every block; search with the horizontal motion alone",
+            "vertical_jump",
         )
         return replace(answer, status="outside_model", warnings=(*answer.warnings, jump))
     # no block starts whose k_r no q exceeds: with vertical motion q may exceed PGA
@@ -219,25 +221,29 @@ def _lower_end(
 def _doubts(of_map: CertifiedMap, pga: float, ends: Ends, full_map: bool) -> Iterator[str]:
     """Yield what is not proven."""
     if not ends.certified:
-        yield (
+        yield Diagnostic(
             f"not certified: {_reason(of_map, pga)}; {ends.undecided / pga:.3g} of k_r/PGA above "
-            "the answer is not proven safe"
+            "the answer is not proven safe",
+            "not_certified",
         )
         if ends.lower is not None:
-            yield (
+            yield Diagnostic(
                 "the upper end is that of a dense scan of single blocks; proven is only that "
-                f"nothing topples above {of_map.k_up / pga:.6g} PGA"
+                f"nothing topples above {of_map.k_up / pga:.6g} PGA",
+                "not_certified",
             )
         if ends.lower is not None and ends.gaps:
-            yield (
+            yield Diagnostic(
                 f"{ends.gaps} gaps between blocks below the upper end may hide a block that "
-                "topples: its rotation changes too steeply with k_r to tell"
+                "topples: its rotation changes too steeply with k_r",
+                "not_certified",
             )
     elif full_map and not of_map.complete:
         # only the map below the answer is open, which the proof does not rest on
-        yield (
-            f"the map was given up at {of_map.reached / pga:.6g} PGA, after its budget: what "
-            "lies below is undecided; the critical value is not touched by this"
+        yield Diagnostic(
+            f"the map was given up at {of_map.reached / pga:.6g} PGA, at the limit of its runs: "
+            "strengths below are undecided; the critical value does not depend on them",
+            "map_incomplete",
         )
 
 

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.critical_result import CriticalSlide
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.quantity import not_negative, positive
@@ -29,9 +30,10 @@ TOLERANCE = 1e-9
 """Width of the bracket of a critical strength, over PGA."""
 
 
-NOT_DETERMINED = (
+NOT_DETERMINED = Diagnostic(
     "the accelerations are so small that a block starts and stops without end: no displacement is "
-    "determined"
+    "determined",
+    "undetermined",
 )
 
 

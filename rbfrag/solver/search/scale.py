@@ -21,6 +21,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.critical_result import CriticalScale
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.kind import Shaking
@@ -44,9 +45,10 @@ SCAN_RATIO = 1.05
 BRACKET = 1e-6
 """Width of the bracket of the critical scale, over the scale."""
 
-NOT_PROVEN = (
+NOT_PROVEN = Diagnostic(
     "the scale is the smallest that was seen to fail: the scales between those that were looked "
-    "at (5 % apart) are not proven safe"
+    "at (5 % apart) are not proven safe",
+    "not_certified",
 )
 
 Verdict = Literal["safe", "fails", "outside", "undecided"]
@@ -429,17 +431,20 @@ def _result(
     runs = sorted(runs, key=lambda each: each.scale)
     warnings = list(start.warnings)
     if ended:
-        warnings.append(
+        text = (
             f"beyond {limit:.6g} times the record the model has no answer ({ended}): whether the "
-            "block fails there is not known"
+            "block fails there is unknown"
         )
+        warnings.append(Diagnostic(text, "beyond_model"))
     if any(each.verdict == "undecided" for each in runs):
-        warnings.append("some runs end closer to failure than their error: they count as not safe")
+        text = "some runs end closer to failure than their error: they count as not safe"
+        warnings.append(Diagnostic(text, "near_limit"))
     if any(each.lost_contact for each in runs):
-        warnings.append(
-            "past a lost contact the block is taken to fall on its planes without rebound, which "
+        text = (
+            "past a lost contact the block is assumed to fall on its planes without rebound, which "
             "rigid contact does not decide: another impact may bring it down at another scale"
         )
+        warnings.append(Diagnostic(text, "model_limits"))
     if bracket is not None:
         warnings.append(NOT_PROVEN)
     lower, scale = bracket or (None, None)

@@ -22,6 +22,7 @@ from typing import Any, Generic, NamedTuple, TypedDict, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import Elementwise, N, tan_deg
 from rbfrag.solver.stability.modes import Planes, Water
 
@@ -53,21 +54,26 @@ UNDRAINED, DRAINED = DRAINAGES = ("undrained", "drained")
 ROCK_KG_M3 = 2650.0
 """Density of the rock where none is given [kg/m³]."""
 
-ASSUMED_DENSITY = f"the density is not given: {ROCK_KG_M3:,.0f} kg/m³ is assumed"
+ASSUMED_DENSITY = Diagnostic(
+    f"the density is not given: {ROCK_KG_M3:,.0f} kg/m³ is assumed", "density_assumed"
+)
 
 NO_DRAINAGE = "drainage = {!r}: it must be undrained or drained"
 
-STAYS_UNDRAINED = (
+STAYS_UNDRAINED = Diagnostic(
     "water pressure keeps acting while the block moves (conservative); a joint under 1 mm without "
-    "inflow behaves almost as drained; hydrodynamic pressure is neglected"
+    "inflow behaves almost as drained; hydrodynamic pressure is neglected",
+    "undrained",
 )
-IS_DRAINED = (
-    "drained: the water pressure is assumed to vanish as the block starts to move (unconservative)"
+IS_DRAINED = Diagnostic(
+    "drained: the water pressure is assumed to vanish as the block starts to move (unconservative)",
+    "drained",
 )
 
-NO_EFFECT_OF_COHESION = (
+NO_EFFECT_OF_COHESION = Diagnostic(
     "cohesion has no effect on k_r: the base opens in tension; the tensile strength of rock "
-    "bridges is neglected (conservative)"
+    "bridges is neglected (conservative)",
+    "cohesion_without_effect",
 )
 
 WATER_N_M3 = 9810.0

@@ -133,11 +133,12 @@ def heel_tips_g(
     return where(tips, where(threshold > 0.0, threshold, 0.0), math.inf)
 
 
-def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float) -> str:
+def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float) -> Diagnostic:
     """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
     at = "" if slips_g == math.inf else f" at {slips_g:.2f} g"
     consequence = f"phi = {phi_deg:g} gives way{at}: the slip of the toe is followed step by step"
-    return f"{NEEDS.format(need=need_deg, where=where)}; {consequence}"
+    text = f"{NEEDS.format(need=need_deg, where=where)}; {consequence}"
+    return Diagnostic(text, "toe_followed")
 
 
 def toe_needs_in_time(
