@@ -20,7 +20,6 @@ CODES: Mapping[str, tuple[str, str]] = {
     "after_first_slip": (NOTE, "the answer is that of the block after its first slip"),
     "at_limit": (WARNING, "the block is at the limit of stability"),
     "back_friction_neglected": (NOTE, "friction on the back face is neglected (conservative)"),
-    "back_plane": (WARNING, "the rock face behind may hold the block, or is not one"),
     "beyond_model": (WARNING, "the motion leaves the range of the model"),
     "block_reasons": (NOTE, "reasons and limits of the answers of several blocks"),
     "bond_breaks": (WARNING, "cohesion or roughness ends with the first slip"),
