@@ -115,7 +115,7 @@ def rockmass(
         )  # fmt: skip
     answer = replace(answer, warnings=(*answer.warnings, *about))
     if files.out is not None:
-        table, notes = answer.table_columns(), document["warnings"]
+        table, notes = answer.table_columns(), answer.warnings
         write_table(table, files.out, excel_text=files.excel_text, notes=notes)
     if files.plot is not None:
         from rbfrag.plots.plot import rockmass as draw
