@@ -7,18 +7,22 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+import pyarrow.parquet as parquet
 import pytest
 from fastapi.testclient import TestClient
 
 import rbfrag
 from rbfrag.errors import spelled
 from rbfrag.question.document import answer_block
-from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
-from rbfrag.vocabulary.quantities import INPUTS, option_of, parameter_of
+from rbfrag.vocabulary.quantities import QUESTION, option_of, parameter_of
 from tests.cli.conftest import Shell
 from tests.cli.conftest import shell as shell
+from tests.conftest import ROOT
+from tests.exchange.test_shakemap_grid import GRID
 from tests.plots.test_report import words_of
 from tests.service.page.conftest import browser as browser
 from tests.service.page.conftest import chromium as chromium
@@ -52,7 +56,7 @@ QUESTIONS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 """Questions about one block: every kind of failure, and every sort of warning."""
 
-OPTIONS = ("excel_text", *(name for name in INPUTS if "_" in name))
+OPTIONS = ("excel_text", *(name for name in QUESTION if "_" in name))
 
 
 def words(question: dict[str, Any]) -> list[str]:
@@ -124,3 +128,66 @@ def test_the_page_shows_the_same_text(name: str, open_page: Any) -> None:
     assert [plain(text) for text in lines] == [plain(text) for text in expected]
     notes = page.locator("#warnings li").all_text_contents()
     assert notes == [*diagnostics(answer.warnings)]
+
+
+CURVE = "pgv_m_s,annual_rate\n0.05,0.08\n0.1,0.03\n0.2,0.009\n0.4,0.0022\n0.8,0.0004\n1.6,5e-5\n"
+BLOCKS = (
+    "block_id,Höhe [cm],width_m,dip,phi,Colour,Water (m),lon,lat,loss\n"
+    "A,200,0.4,3,,grey,,20.0,40.5,10\nB,210,0.4,3,38,,0.5,20.0,40.5,5\nC,x,0.4,3,38,,0,20,40.5,5\n"
+)
+EVENTS = ROOT / "docs" / "examples" / "event-set"
+
+TABLES: dict[str, tuple[str | Path, ...]] = {
+    "predict": ("predict", "--blocks", "blocks.csv", "--pgv", "0.6"),
+    "hazard": ("hazard", "curve.csv", "--blocks", "blocks.csv", "--joint"),
+    "losses": ("losses", EVENTS, "--blocks", EVENTS / "blocks.csv"),
+    "map": ("shakemap", "grid.xml", "--blocks", "blocks.csv"),
+    "rate": ("hazard", "curve.csv", "--height", "2", "--width", "0.4", "--phi", "38"),
+}
+"""Questions about many blocks, and an annual rate."""
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_written_tables_have_every_warning(name: str, shell: Shell) -> None:
+    for file, text in (("curve.csv", CURVE), ("blocks.csv", BLOCKS), ("grid.xml", GRID)):
+        Path(file).write_text(text, encoding="utf-8")
+    command = TABLES[name]
+    out = ("--out", "out.csv") if name == "map" else ()
+    document = json.loads(shell(*command, *out, "--json").stdout)
+    notes = document["diagnostics"]
+    assert [note["text"] for note in notes] == [*dict.fromkeys(document["warnings"])]
+    assert len(notes) > 1
+
+    printed = shell(*command, *out).stdout
+    lines = [line.removeprefix("Note      ") for line in printed.splitlines()]
+    for note in notes:
+        assert spelled(Diagnostic(note["text"], note["code"]), OPTIONS, option_of) in lines
+
+    for suffix in ("csv", "xlsx", "parquet"):
+        shell(*command, "--out", f"out.{suffix}")
+    metadata = json.loads(Path("out.csv-metadata.json").read_text("utf-8"))["notes"]
+    sheet = pd.read_excel("out.xlsx", sheet_name="notes")
+    stored = json.loads(parquet.read_metadata("out.parquet").metadata[b"notes"])
+    for note in notes:
+        assert note["text"] in [text["text"] for text in metadata]
+        assert note["text"] in [*sheet["note"]]
+        assert note["text"] in [text["text"] for text in stored]
+
+
+def test_a_table_over_http_has_the_same_warnings(shell: Shell) -> None:
+    Path("blocks.csv").write_text(BLOCKS, encoding="utf-8")
+    document = json.loads(shell(*TABLES["predict"], "--json").stdout)
+    client = TestClient(make_app(ServiceSettings(db=None, early=False)))
+    found = client.post("/v1/table?pgv=0.6", content=Path("blocks.csv").read_bytes()).json()
+    assert found["diagnostics"] == document["diagnostics"]
+    for note in document["diagnostics"]:
+        assert note["text"] in found["table"]
+
+
+def test_a_rate_over_http_has_the_same_warnings(shell: Shell) -> None:
+    Path("curve.csv").write_text(CURVE, encoding="utf-8")
+    document = json.loads(shell(*TABLES["rate"], "--json").stdout)
+    client = TestClient(make_app(ServiceSettings(db=None, early=False)))
+    asked = "/v1/hazard?height=2&width=0.4&phi=38"
+    found = client.post(asked, content=CURVE.encode()).json()
+    assert found["diagnostics"] == document["diagnostics"]

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
 from rbfrag.results.diagnostic import diagnostics, with_diagnostics
-from rbfrag.vocabulary.quantities import INPUTS, option_of
+from rbfrag.vocabulary.quantities import QUESTION, option_of
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
     from rbfrag.results.result import Result
 
-_FIELDS = tuple(name for name in INPUTS if "_" in name)
+_FIELDS = tuple(name for name in QUESTION if "_" in name)
 """Inputs that notes name as Python does; a name without a unit is an everyday word."""
 
 
