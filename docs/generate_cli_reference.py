@@ -20,18 +20,19 @@ HEAD = """\
 
 What every command has in common:
 
-- `--help` names units and shows an example; `--json` prints one JSON document on standard
-  output and nothing else. Progress and warnings go to standard error.
+- `--help` shows the 25 most used options with their units and an example, `--help-all` all
+  options. `--json` prints one JSON document on standard output and nothing else. Progress goes
+  to standard error.
 - Exit status 0: done. 1: the work failed part-way, or a check failed; what was finished is
   kept. 2: bad input. 130: interrupted.
-- `--db` takes a path or an SQLAlchemy URL; without it `RBFRAG_DB` is used, or else
-  `rbfrag.db` in the current folder.
+- `--db` takes a path or an SQLAlchemy URL. Without it `RBFRAG_DB` is used, else `rbfrag.db` in
+  the current folder, else the built-in data set.
 - `MOTION` is a file, `FILE#INDEX` for one trace of several, or a database id.
 
 ## Shared options
 
-Options that mean the same in several commands. Below, each command names those that it takes, of
-this list from first to last.
+Options with the same meaning in several commands. Each command below lists those it shares, in
+the order of this list.
 
 """
 
@@ -75,7 +76,9 @@ def _walk(
 
 
 def _context(command: Any, name: str, parent: Any = None) -> Any:
-    return command.context_class(
+    from rbfrag.cli.parameters.stack import ALL_OPTIONS
+
+    context = command.context_class(
         command,
         info_name=name,
         parent=parent,
@@ -83,6 +86,8 @@ def _context(command: Any, name: str, parent: Any = None) -> Any:
         max_content_width=WIDTH,
         color=False,
     )
+    context.meta[ALL_OPTIONS] = True
+    return context
 
 
 def records(command: Any) -> list[tuple[str, str]]:

@@ -104,7 +104,8 @@ class UnknownFieldError(InputError, TypeError):
         for name in given:
             if name not in known.__annotations__:
                 raise cls(
-                    f"{name[:60]} is no option of {what}: it has {', '.join(known.__annotations__)}"
+                    f"unknown option {name[:60]} of {what}; the options are "
+                    f"{', '.join(known.__annotations__)}"
                 )
 
 
@@ -157,7 +158,7 @@ class MissingExtraError(InputError):
     """An optional dependency is not installed.
 
     Args:
-        purpose: what needs it, as the start of a sentence ("Plots need matplotlib").
+        purpose: what needs it, as the start of a sentence ("Plots require matplotlib").
         extra: the rbfrag extra that brings it.
     """
 

@@ -97,21 +97,21 @@ def reading(source: Path, what: str) -> Iterator[None]:
     """
     try:
         if source.is_dir():
-            raise InputError(f"{source} is a folder: name a file with {what} in it")
+            raise InputError(f"{source} is a folder: give a file with {what}")
         if is_endless(source):
-            raise InputError(f"{source} is {NO_FILE}: save {what} to a file, and name that")
+            raise InputError(f"{source} is {NO_FILE}: save {what} to a file first")
         with source.open("rb") as file:
             packed = packed_as(file.read(6))
         workbook = source.suffix.lower() in WORKBOOKS
         if packed is not None and not (workbook and packed == "zip"):
-            raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
+            raise InputError(f"{source} is a {packed} file: unpack it first and give {what}")
         yield
     except FileNotFoundError:
-        raise InputError(f"{source}: no such file; name a file with {what}") from None
+        raise InputError(f"{source}: no such file; give a file with {what}") from None
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{source}: not a text file (byte {error.start} is not {error.encoding.upper()}): name "
-            f"{what}, saved as UTF-8 (in Excel: CSV UTF-8)"
+            f"{source}: not a text file (byte {error.start} is not {error.encoding.upper()}): "
+            f"save {what} as UTF-8 (in Excel: CSV UTF-8)"
         ) from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None
@@ -132,13 +132,11 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
     with reading(source, what):
         content = bounded_bytes(source, most_bytes)
         if content is None:
-            raise InputError(
-                f"{source} is larger than {most_bytes} bytes: {what} cannot be so long"
-            )
+            raise InputError(f"{source} is larger than {most_bytes} bytes: too large for {what}")
         text = content.decode(encoding_of(content))
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
-        raise InputError(f"{source} is empty: name a file with {what}")
+        raise InputError(f"{source} is empty: give a file with {what}")
     return text
 
 
@@ -170,12 +168,12 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
     """
     named = "" if source is None else f"{os.fspath(source)}: "
     if _DOTTED.search(text):
-        raise InputError(f"{named}not valid TOML for us: a key of more than 20 parts")
+        raise InputError(f"{named}unsupported TOML: a key of more than 20 parts")
     try:
         document = tomllib.loads(text)
         _refuse_large([document])
     except RecursionError:
-        raise InputError(f"{named}not valid TOML for us: tables nested too deeply") from None
+        raise InputError(f"{named}unsupported TOML: tables nested too deeply") from None
     # beside its own error, the parser passes on that of an integer of thousands of digits
     except ValueError as error:
         raise InputError(f"{named}not valid TOML: {error}") from None
@@ -200,7 +198,7 @@ def json_document(text: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=unique_keys)
     except RecursionError:
-        raise InputError("not JSON for us: objects or arrays nested too deeply") from None
+        raise InputError("unsupported JSON: objects or arrays nested too deeply") from None
     except InputError:
         raise
     except ValueError as error:
@@ -211,13 +209,13 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return the object of some keys and values of JSON, for `object_pairs_hook`.
 
     Raises:
-        InputError: a key is there twice.
+        InputError: a key occurs twice.
     """
     document = dict(pairs)
     if len(document) < len(pairs):
         # in one pass: a hostile object may hold a million names
         double = Counter(name for name, _ in pairs).most_common(1)[0][0]
-        raise InputError(f"the key {double[:40]!r} is there twice in one JSON object: keep one")
+        raise InputError(f"the key {double[:40]!r} occurs twice in a JSON object: keep one of them")
     return document
 
 
@@ -246,19 +244,18 @@ def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: s
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         raise InputError(
-            f"{what} {target}: the suffix {target.suffix!r} is none of {', '.join(suffixes)}: "
-            "name the file with one of them"
+            f"{what} {target}: unsupported suffix {target.suffix!r}; use {', '.join(suffixes)}"
         )
     if len(os.fsencode(target.name)) > LONGEST_FILE_NAME:
         raise InputError(
             f"{what} {target}: the name is longer than {LONGEST_FILE_NAME} bytes: shorten it"
         )
     if target.is_dir():
-        raise InputError(f"{what} {target} is a folder: name a file in it")
+        raise InputError(f"{what} {target} is a folder: give a file name")
     if not target.parent.is_dir():
-        raise InputError(f"{what} {target}: there is no folder {target.parent}: make it first")
+        raise InputError(f"{what} {target}: create the folder {target.parent} first")
     if not os.access(target.parent, os.W_OK):
-        raise InputError(f"{what} {target}: the folder cannot be written: choose another")
+        raise InputError(f"{what} {target}: the folder is not writable: choose another")
     return target
 
 
@@ -280,7 +277,7 @@ def written_whole(target: Path, what: str = "file") -> Iterator[Path]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            f"{what} {target} cannot be written: {reason}; name a folder you may write"
+            f"{what} {target} cannot be written: {reason}; choose a writable folder"
         ) from None
     finally:
         partial.unlink(missing_ok=True)

@@ -271,7 +271,7 @@ def test_what_the_blocks_do_not_read_is_refused_alone_and_in_arrays(size: int | 
     if size is not None:
         question = {name: np.full(size, value) for name, value in question.items()}
     for name in ("restitution", "ky_sigma"):
-        with pytest.raises(RbfragError, match=f"{name} does not go with kind toppling"):
+        with pytest.raises(RbfragError, match=f"{name} cannot be combined with kind toppling"):
             rbfrag.predict(**question, kind="toppling", **{name: 0.5})
 
 
@@ -559,7 +559,7 @@ def test_what_the_table_once_got_wrong() -> None:
         height_m=np.array([2.5]), width_m=2.5, beta_deg=20.0, phi_deg=32.0, pgv_m_s=0.5
     )
     assert math.isnan(slides.probability[0])
-    assert slides.reason[0].startswith("slides (yield 0.21 g): state displacement_m")
+    assert slides.reason[0].startswith("slides (yield 0.21 g): give displacement_m")
 
 
 UNSTABLE = {"height_m": 2.0, "width_m": 0.2, "beta_deg": 10.0}

@@ -452,7 +452,7 @@ def test_blocks_elsewhere_are_not_answered_for_the_map(shell: Shell, formats_dir
     x, y = Transformer.from_crs("EPSG:4326", zone, always_xy=True).transform(lon, lat)
     Path("here.csv").write_text(f"p2,kr,x,y\n3,0.1,{x!r},{y!r}\n")
     missing = shell("shakemap", str(grid), "--blocks", "here.csv", "--out", "a.csv", expect=2)
-    assert "x and y need a coordinate reference system" in missing.stderr
+    assert "x and y require a coordinate reference system" in missing.stderr
     shell("shakemap", str(grid), "--blocks", "here.csv", "--crs", zone, "--out", "a.csv")
     row = next(csv.DictReader(Path("a.csv").read_text("utf-8").splitlines()))
     assert float(row["lon"]) == pytest.approx(lon, abs=1e-6)
@@ -669,7 +669,7 @@ def test_a_missing_width_names_the_column_that_may_be_it() -> None:
 def test_ignore_columns_overrules(shell: Shell) -> None:
     Path("a.csv").write_text("height_m,width_m,phi,dip quality,pgv_m_s\n2,0.4,38,good,0.6\n")
     refused = shell("predict", "--blocks", "a.csv", expect=2).stderr
-    assert "'dip quality' is not understood and may be the dip of the base" in refused
+    assert "'dip quality' is unknown; for the dip of the base" in refused
     told = shell.json("predict", "--blocks", "a.csv", "--ignore-columns", "dip quality")
     assert "column ignored: dip quality" in told["warnings"]
     assert "there is no column" in shell(

@@ -10,7 +10,15 @@ import pytest
 
 from rbfrag.question import fields
 from rbfrag.vocabulary import quantities
-from rbfrag.vocabulary.quantities import INPUTS, MEASURES, QUANTITIES, name_of, option_of, word_of
+from rbfrag.vocabulary.quantities import (
+    INPUTS,
+    MEASURES,
+    PANELS,
+    QUANTITIES,
+    name_of,
+    option_of,
+    word_of,
+)
 
 GROUPS: list[tuple[type, Collection[str]]] = [
     (fields.NumberFields, quantities.NUMBERS),
@@ -62,6 +70,21 @@ def test_every_name_and_alias_means_one_quantity() -> None:
         assert option_of(name).startswith("--")
     aliases = [alias for each in INPUTS.values() for alias in each.aliases if alias != "block"]
     assert len(aliases) == len({*aliases})
+
+
+def test_every_input_of_the_command_line_has_a_heading() -> None:
+    names = {name for group in PANELS.values() for name in group}
+    assert {*quantities.QUESTION, *quantities.AT_REST} - {*quantities.ARRAYS} <= names
+
+
+def test_help_has_label_unit_detail_and_default() -> None:
+    assert QUANTITIES["restitution"].help(option_of) == (
+        "Coefficient of restitution of rocking, 0–1 "
+        "[default: from conservation of angular momentum]"
+    )
+    assert QUANTITIES["width_m"].help(option_of) == (
+        "Width of a rectangular block along its base [m], with --height"
+    )
 
 
 def test_measures_have_a_range_and_a_unit() -> None:

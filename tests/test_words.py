@@ -1,4 +1,4 @@
-"""Names are the field's own terms: none has a word of the left column of the glossary."""
+"""Names, help and errors are in the terms of the field, without the words they replace."""
 
 from __future__ import annotations
 
@@ -6,8 +6,13 @@ import ast
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
+
+from rbfrag.cli.main import app
+from rbfrag.vocabulary.quantities import QUANTITIES, option_of
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = sorted(ROOT.glob("rbfrag/**/*.py"))
@@ -172,3 +177,73 @@ def test_options_are_spelled_by_the_command_line_alone() -> None:
             if re.search("--[a-z]", node.value)
         ]
     assert not spelled, "\n".join(spelled)
+
+
+AVOIDED = re.compile(
+    r"\b(of 100 such|tells?|telling|told|stated|refuses?|refused|besides?|share|scatters?|"
+    r"(?<!there )(is|are) no(ne)?|too far|like blocks|anew|at hand|made[- ]up|shaken|nought|"
+    r"what the block may|greatest|goes? with|go together|says?|said|speed after an impact|lobes?|"
+    r"left out|leave .{1,40} out|is taken|knows|counting error|brings down|comes loose|rungs?)\b",
+    re.IGNORECASE,
+)
+"""Words of help and errors for which the glossary has a term of the field."""
+
+
+def avoided_words(text: str) -> list[str]:
+    """Return the words of a help or error text for which there is a term of the field."""
+    return [match[0] for match in AVOIDED.finditer(text)]
+
+
+def texts_of_errors(source: str) -> Iterator[tuple[int, str]]:
+    """Yield line and text of each message that a source raises, without its variable parts."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            for part in ast.walk(node.exc):
+                if isinstance(part, ast.JoinedStr):
+                    fixed = [p.value for p in part.values if isinstance(p, ast.Constant)]
+                    yield part.lineno, "{}".join(map(str, fixed))
+                elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+                    yield part.lineno, part.value
+
+
+def helps_of(command: Any, words: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    """Yield name and text of the help of a command, its options and the commands below it."""
+    context = command.context_class(command, info_name=words[-1])
+    yield " ".join(words), command.help or ""
+    for option in command.get_params(context):
+        yield f"{' '.join(words)} {option.opts[0]}", getattr(option, "help", "") or ""
+    for name in command.list_commands(context) if hasattr(command, "list_commands") else ():
+        yield from helps_of(command.get_command(context, name), (*words, name))
+
+
+def test_help_is_in_the_terms_of_the_field() -> None:
+    found = [
+        f"{name}: {', '.join(wrong)}"
+        for name, text in helps_of(typer.main.get_command(app), ("rbfrag",))
+        if (wrong := avoided_words(text))
+    ]
+    found += [
+        f"{name}: {', '.join(wrong)}"
+        for name, quantity in QUANTITIES.items()
+        if (wrong := avoided_words(f"{quantity.help(option_of)} {quantity.prompt}"))
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_errors_are_in_the_terms_of_the_field() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {', '.join(wrong)}: {text}"
+        for path in SOURCES
+        for line, text in texts_of_errors(path.read_text())
+        if (wrong := avoided_words(text))
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["the displacement that is too far", "'x' is no number", "--out goes with --blocks", "told"],
+)
+def test_an_avoided_word_is_seen(text: str) -> None:
+    assert avoided_words(text)
+    assert not avoided_words("there is no column kr; the limit state is read-only: omit --shares")

@@ -62,12 +62,10 @@ def find_records(folder: str | os.PathLike[str] | None = None) -> Records:
         return Records(motions, f"{len(motions)} sample records of rbfrag[samples]")
     root = Path(folder if folder is not None else os.environ[RECORDS_VARIABLE])
     if not root.exists():
-        raise InputError(
-            f"there is no folder of records {root}: name one with records", fields=("records",)
-        )
+        raise InputError(f"no folder {root}: give a folder with records", fields=("records",))
     motions = _read(root)
     if not motions:
-        raise InputError(f"no horizontal accelerogram can be read in {root}: name another folder")
+        raise InputError(f"no horizontal accelerogram in {root}: give another folder")
     return Records(motions, f"{len(motions)} horizontal records")
 
 
@@ -109,7 +107,7 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Bench
         if excited.max_q > kr:
             cases.append(BenchCase(motion, polarity, excited, p2, kr))
     if not cases:
-        raise InputError("no drawn block lifts off under these records: name other records")
+        raise InputError("no drawn block lifts off under these records: give other records")
     return tuple(cases)
 
 

@@ -197,7 +197,7 @@ def add_motions(
             f"paths is of type {type(paths).__name__}: give a file or folder, or a list of them"
         )
     if suite is not None and not suite.strip():
-        raise InputError("suite: the name is empty; give one or leave it out", fields=("suite",))
+        raise InputError("suite: the name is empty; give one or omit it", fields=("suite",))
     checked_name(suite or "", "the suite")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
@@ -222,7 +222,7 @@ def add_motions(
                 if gain is not None and len(files) == 1 and not traces[0].by_gain:
                     raise MotionFileError(
                         file,
-                        "it is not in counts, or the metadata state its gain: leave gain out",
+                        "it is not in counts, or its gain is in the metadata: omit gain",
                         fields=("gain",),
                     )
                 if engine is None:
@@ -285,7 +285,7 @@ def _take_note_of_units(
     other = next((trace.other_unit for trace in traces if trace.other_unit), "")
     if other and alone:
         raise MotionFileError(
-            file, f"{other} is stated for it, not {units}: leave units out", fields=("units",)
+            file, f"its unit is {other}, not {units}: omit units", fields=("units",)
         )
     if other:
         text = (
@@ -320,13 +320,13 @@ def _files(
         elif path.exists() or archive_of(path) is not None:
             below = [path]
         else:
-            raise InputError(f"there is no file or folder {path}: check the path")
+            raise InputError(f"file or folder not found: {path}")
         for file in below:
             for record in _records(file) if file.resolve() != skipped else ():
                 any_file = True
                 yield record
     if not any_file:
-        raise InputError(f"there is no file in {', '.join(map(str, paths))}")
+        raise InputError(f"no files in {', '.join(map(str, paths))}")
 
 
 def _records(file: Path) -> list[Path]:

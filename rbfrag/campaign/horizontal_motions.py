@@ -36,7 +36,7 @@ def horizontal_motions(
     where = "the database" if suite is None else f"suite {suite!r}"
     if not every:
         raise InputError(
-            f"there is no horizontal motion in {where}: rbfrag motions add PATH  brings some"
+            f"no horizontal motions in {where}: add some with  rbfrag motions add PATH"
         )
     rows = [row for row in every if include_structures or STRUCTURE not in row.flags]
     if not rows:

@@ -204,10 +204,10 @@ def each_once(values: Sequence[float | None], option: str, for_none: str = "None
         for_none: what None is called there.
     """
     if not values:
-        raise InputError(f"{option}: the list is empty: name at least one value", fields=(option,))
+        raise InputError(f"{option}: the list is empty: give at least one value", fields=(option,))
     for value in values:
         if values.count(value) > 1:
             word = for_none if value is None else f"{value:g}"
             raise InputError(
-                f"{option}: {word} is in the list twice: name each value once", fields=(option,)
+                f"{option}: {word} is in the list twice: give each value once", fields=(option,)
             )

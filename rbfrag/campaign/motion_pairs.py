@@ -47,8 +47,8 @@ def motion_pairs(
     pairs = (*real, *drawn_pairs(rows, {pair.second.id for pair in real}, seed, draws))
     if not pairs:
         raise InputError(
-            "there are no motions of two earthquakes: add some with a table of metadata that says "
-            "which they are"
+            "no motions of two earthquakes: add some with a metadata table that gives the "
+            "earthquakes"
         )
 
     def longest_first(pair: MotionPair) -> tuple[int, str, str]:

@@ -149,7 +149,7 @@ def plan_campaign(
     if vertical != "without" and not fitting:
         raise InputError(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
-            f"{_first(lacking)}; add the vertical components, or leave them out"
+            f"{_first(lacking)}; add the vertical components, or omit them"
         )
     if lacking:
         left = "left out" if vertical == "with" else "shaken without one only"
@@ -252,7 +252,7 @@ def checked_ratios(values: Sequence[float], what: str) -> tuple[float, ...]:
     for one, next_one in pairwise(ratios):
         if one == next_one:
             raise InputError(
-                f"{what}: {one:g} is in the list twice: name each value once", fields=(what,)
+                f"{what}: {one:g} is in the list twice: give each value once", fields=(what,)
             )
     return tuple(ratios)
 

@@ -330,8 +330,8 @@ def rockmass(
     level, motion = checked_level(given.get("level", 0.95)), given.get("motion")
     if motion is not None and measures:
         raise InputError(
-            f"motion does not go with {next(iter(measures))}: give the accelerogram, or the "
-            "measures that a fragility model answers for"
+            f"motion cannot be combined with {next(iter(measures))}: give the accelerogram or the "
+            "intensity measures"
         )
     answer = scenario(blocks, measures, **of(ANSWERED_BY)) if measures else None
     vertical = as_motion(given["vertical"], "vertical") if "vertical" in given else None
@@ -340,7 +340,7 @@ def rockmass(
         limits = FailureLimits(**of(FAILS_BY))
         ran = shake(blocks, as_motion(motion), vertical=vertical, limits=limits, **of(SHAKEN_BY))
     elif vertical is not None:
-        raise InputError("vertical goes with a motion: give motion, too")
+        raise InputError("vertical requires a motion: give also motion")
     warnings = mass_warnings(blocks, answer, in_motion=bool(answer or ran))
     if ran is not None:
         warnings += failure_warnings(ran)

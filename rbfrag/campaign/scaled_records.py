@@ -149,8 +149,8 @@ class ScaledRecords(Sequences):
 def _class_of(case: Case) -> BlockClass:
     if case.settings.keys() != {"rotation_deg"}:
         raise InputError(
-            "it ends where the block leaves its back plane, as an older rbfrag had it: simulate it "
-            "again, which adds what the block does to its end"
+            "it was stored by an older rbfrag and ends where the block leaves its back plane: "
+            "simulate it again"
         )
     try:
         return BlockClass(**case.block)  # type: ignore[arg-type]

@@ -79,7 +79,8 @@ def sequences_of_kind(name: str) -> Sequences:
     campaign = campaign_of_kind(name)
     if not isinstance(campaign, Sequences):
         raise InputError(
-            f"sequence does not go with kind {name}: {STARTS_ANEW}", fields=("sequence", "kind")
+            f"sequence cannot be combined with kind {name}: {STARTS_ANEW}",
+            fields=("sequence", "kind"),
         )
     return campaign
 

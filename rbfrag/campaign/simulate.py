@@ -154,7 +154,7 @@ def simulate(
     if sequence:
         if vertical != "without":
             raise InputError(
-                "vertical does not go with sequence: leave one of them out",
+                "vertical cannot be combined with sequence: omit one of them",
                 fields=("vertical", "sequence"),
             )
         return simulate_sequences(
@@ -196,7 +196,7 @@ def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[
         if name not in campaign.options:
             owners = [each for each in campaign_kinds() if name in campaign_of_kind(each).options]
             raise InputError(
-                f"{name} goes with kind {' or '.join(owners)}, not with {kind}",
+                f"{name} requires kind {' or '.join(owners)}",
                 fields=(name, "kind"),
             )
     return campaign.cases(**described)

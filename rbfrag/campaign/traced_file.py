@@ -101,8 +101,8 @@ def read_traces(
         if index >= len(motions):
             raise MotionFileError(
                 file,
-                f"line {row.line} of the metadata names trace {index}, but the file holds "
-                f"{len(motions)}, counted from 0: correct trace_index",
+                f"line {row.line} of the metadata has trace_index {index}, but the file has "
+                f"{len(motions)} traces, counted from 0: correct trace_index",
             )
     traces = [
         Trace(

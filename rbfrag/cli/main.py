@@ -31,29 +31,29 @@ shared, and threads that wait for one another on a busy machine spin
 (docs/evidence/performance.md)."""
 
 COMMANDS = {
-    "block": "Print a block's failure mode, yield accelerations and size.",
-    "rockmass": "Draw blocks from two fracture sets; print their modes and yields.",
+    "block": "Print the failure mode, yield accelerations and p² of a block.",
+    "rockmass": "Sample blocks from two joint sets; print their modes and yields.",
     "motions": "Add, list, show and export accelerograms.",
-    "respond": "Run one block under one accelerogram.",
-    "critical": "Find the critical block of one accelerogram, with its bracket.",
-    "spectrum": "Compute the toppling spectrum X(p): what a motion can topple.",
-    "simulate": "Store critical values and outcomes of every motion and block.",
+    "respond": "Compute the response of a block to an accelerogram.",
+    "critical": "Compute the critical strength of an accelerogram, with bounds.",
+    "spectrum": "Compute the toppling spectrum X(p) of accelerograms.",
+    "simulate": "Compute and store critical values and outcomes of all motions.",
     "fit": "Fit a fragility model to stored critical values or outcomes.",
-    "predict": "Print the probability that a block fails.",
-    "scenario": "Print the shaking of an earthquake at a site, and its scatter.",
-    "hazard": "Print the annual rate at which a block topples.",
-    "losses": "Count failures and losses in the earthquakes of an event set.",
-    "survival": "Print how likely standing blocks are under a seismic hazard.",
-    "shakemap": "Write the probability that blocks topple across a ShakeMap.",
-    "report": "Write one document about blocks: PDF or HTML to attach.",
+    "predict": "Print the probability of failure of blocks.",
+    "scenario": "Print median and dispersion of the shaking in an earthquake.",
+    "hazard": "Print annual rate and return period of failure of blocks.",
+    "losses": "Compute failures and losses of blocks in an event set.",
+    "survival": "Print the survival probability of standing blocks.",
+    "shakemap": "Map the probability of failure of blocks over a ShakeMap.",
+    "report": "Write a report on blocks (PDF or HTML).",
     "export": "Write fragility functions for other tools.",
     "models": "List, show and choose fitted fragility models.",
     "plot": "Draw models, data, spectra, responses and failure modes.",
     "db": "Upgrade, describe, check, export and merge databases, and import tables.",
-    "serve": "Answer over HTTP, and serve the page.",
-    "bench": "Measure speed against error beside general ODE solvers.",
-    "demo": "Run the whole chain from records to a prediction.",
-    "warm-up": "Compile every kernel now, so that no later command waits.",
+    "serve": "Start the HTTP API and the web interface.",
+    "bench": "Compare speed and error with general ODE solvers.",
+    "demo": "Run an example from records to a prediction.",
+    "warm-up": "Compile all kernels, so that later commands start faster.",
 }
 """The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
 
@@ -144,7 +144,7 @@ def _options(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version and stop."
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit"
         ),
     ] = False,
 ) -> None:

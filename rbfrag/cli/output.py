@@ -177,9 +177,7 @@ def check_files(
 ) -> None:
     """Refuse a table or a figure that cannot be written, before long work."""
     if excel_text and table is not None and not table.lower().endswith(".csv"):
-        raise InputError(
-            f"--excel-text is about CSV, and {table} is none: its texts are texts without it"
-        )
+        raise InputError(f"--excel-text applies to CSV output only, not to {table}: omit it")
     if table is not None:
         from rbfrag.exchange.tables.files import table_path
 

@@ -221,7 +221,7 @@ def _all_known(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCo
     known = known_combinations(connection, wanted)
     for key in wanted:
         if key not in known:
-            raise InputError(f"there is no combination {key} in the database")
+            raise InputError(f"unknown combination {key}")
     return known
 
 

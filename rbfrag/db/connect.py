@@ -97,7 +97,7 @@ def _sqlite_engine(url: URL, path: Path, read_only: bool, foreign_keys: bool) ->
 
 def _server_engine(url: URL, read_only: bool) -> Engine:
     if importlib.util.find_spec("psycopg") is None:
-        raise MissingExtraError("PostgreSQL databases need psycopg", "postgres")
+        raise MissingExtraError("PostgreSQL databases require psycopg", "postgres")
     longest_s = LONGEST_WAIT_S.get()
     # A host that accepts and never answers would hold the caller for good.
     waits_s = CONNECT_TIMEOUT_S if longest_s is None else min(CONNECT_TIMEOUT_S, longest_s)
@@ -135,7 +135,7 @@ def sqlalchemy_url(place: Path | str) -> URL:
         url = make_url(place)
     except (exc.ArgumentError, ValueError):
         raise InputError(
-            "db: the URL cannot be read: write it as postgresql://user@host:5432/name",
+            "db: invalid URL: use the form postgresql://user@host:5432/name",
             fields=("db",),
         ) from None
     return url.set(drivername="postgresql+psycopg")

@@ -80,7 +80,7 @@ def _check_server_database(connection: Connection, label: str, *, read_only: boo
     revision = stated_revision(connection)
     if revision is None:
         raise NotADatabaseError(
-            f"{label} holds no rbfrag tables yet: add motions to it, by rbfrag motions add"
+            f"{label} has no rbfrag tables: add motions with  rbfrag motions add"
         )
     check_revision(revision, label, read_only=read_only)
 

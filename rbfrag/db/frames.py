@@ -32,7 +32,7 @@ def chosen_columns(
     """
     meaning = TABLES.get(table)
     if meaning is None:
-        raise InputError(f"there is no table {table!r}; there are: {', '.join(TABLES)}")
+        raise InputError(f"unknown table {table!r}; the tables are {', '.join(TABLES)}")
     if columns is None:
         return tuple(c for c in meaning.columns if arrays or c.type != "array")
     by_name = {column.name: column for column in meaning.columns}

@@ -173,7 +173,7 @@ def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:
         at = ", ".join(str(row[column.name]) for column in table.primary_key.columns)
         raise DatabaseError(
             f"row {at} of the table {table.name} is damaged (its digest differs) and is not "
-            "changed: run  rbfrag db check  and restore the database from a copy"
+            "changed: run  rbfrag db check  and restore the database from a backup"
         )
 
 

@@ -70,8 +70,8 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     if dialect != "sqlite":
         advice = "; its tables come over by docs/howto/import-a-table.md"
         raise InputError(
-            f"db {scheme}://…: rbfrag stores in SQLite (a path) or PostgreSQL (postgresql://…)"
-            f"{advice if dialect in ('mysql', 'mariadb') else ''}",
+            f"db {scheme}://…: supported are SQLite (a path) and PostgreSQL "
+            f"(postgresql://…){advice if dialect in ('mysql', 'mariadb') else ''}",
             fields=("db",),
         )
     name = rest.removeprefix("/")
@@ -114,8 +114,8 @@ def sole_revision(revisions: Sequence[str], where: str) -> str | None:
     """
     if len(revisions) > 1:
         raise SchemaVersionError(
-            f"{where}: the database states several schemas, {', '.join(sorted(revisions)[:4])}: it "
-            "was put together by hand or restored into another; restore it from a copy"
+            f"{where}: the database has several schema versions, "
+            f"{', '.join(sorted(revisions)[:4])}: restore it from a backup"
         )
     return revisions[0] if revisions else None
 
@@ -132,8 +132,8 @@ def check_revision(revision: str, where: str, *, read_only: bool = False) -> Non
         return
     if revision in REVISIONS:
         raise SchemaVersionError(
-            f"{where}: the database has schema {revision}, this rbfrag needs {SCHEMA_REVISION}: "
-            "upgrade it by rbfrag db upgrade"
+            f"{where}: the database has schema {revision}, this rbfrag requires "
+            f"{SCHEMA_REVISION}: run  rbfrag db upgrade"
         )
     raise SchemaVersionError(
         f"{where}: the database has schema {revision}, newer than {SCHEMA_REVISION} of this "

@@ -79,7 +79,7 @@ def refuse_taken(name: str, taken: Collection[str]) -> None:
     """Reject a name that a stored model has."""
     if name in taken:
         raise InputError(
-            f"there is a model {name!r} already: give it another name, or set replace",
+            f"the model {name!r} exists: choose another name, or set replace",
             fields=("replace",),
         )
 
@@ -101,13 +101,13 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
         raise InputError(f"model {row.name}: the covariance is not {n} by {n}")
     steps = row.leave_out_steps
     if steps is not None and any(len(line) != n for line in steps):
-        raise InputError(f"model {row.name}: a step of leaving an earthquake out has not {n} parts")
+        raise InputError(f"model {row.name}: a leave-one-earthquake-out step must have {n} parts")
     numbers = [*row.coefficients.values(), *(v for line in row.covariance for v in line)]
     numbers += [bound for pair in row.domain.values() for bound in pair]
     numbers += [v for line in steps or () for v in line]
     for number in numbers:
         if not math.isfinite(number):
-            raise InputError(f"model {row.name} holds {number}: such a fit cannot be stored")
+            raise InputError(f"model {row.name} has the value {number}: the fit cannot be stored")
     try:
         diagnostics = json.dumps(dict(row.diagnostics), allow_nan=False)
         dependence = None
@@ -159,7 +159,7 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
     except (ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise DatabaseError(
             f"model {by_name['name']} is damaged in the database ({error}): fit it again in its "
-            "place, or restore the database from a copy"
+            "place, or restore the database from a backup"
         ) from error
 
 

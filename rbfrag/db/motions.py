@@ -86,8 +86,7 @@ def add_motion(
     """
     if motion.dt_s is None:
         raise InputError(
-            f"{motion.label}: the database holds equally spaced samples only; "
-            "sample the motion first"
+            f"{motion.label}: equally spaced samples are required: resample the motion"
         )
     own_name = motion.sha256[:12]
     if motion.source_file:
@@ -173,13 +172,13 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
     row = _row_of(connection, query, motion_id)
     if row["samples"] is None:
         raise InputError(
-            f"motion {motion_id}: this database was written without samples; add the record's file"
+            f"motion {motion_id}: the database has no samples: add the file of the record"
         )
     blob = bytes(row["samples"])
     if hashlib.sha256(blob).hexdigest() != row["sha256"] or len(blob) != 8 * row["npts"]:
         raise DatabaseError(
             f"motion {motion_id}: the stored samples are damaged (their sha256 differs): restore "
-            "the database from a copy; rbfrag db check lists what else is wrong"
+            "the database from a backup; rbfrag db check lists what else is wrong"
         )
     return GroundMotion(
         np.frombuffer(blob, dtype="<f8").astype(np.float64),
@@ -268,8 +267,8 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
         if value is not None and not math.isfinite(value):
             raise InputError(
                 f"{motion.label}: {name} is {value}: samples of up to "
-                f"{np.max(np.abs(motion.acceleration_g)):g} g are no accelerogram; check "
-                "the units"
+                f"{np.max(np.abs(motion.acceleration_g)):g} g are not an accelerogram: check the "
+                "units"
             )
     return {
         **values,
@@ -371,9 +370,7 @@ def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMa
         result = connection.execute(query.where(schema.motion.c.id == motion_id))
         row = result.mappings().one_or_none()
     if row is None:
-        raise InputError(
-            f"there is no motion {motion_id} in the database: rbfrag motions list  shows the ids"
-        )
+        raise InputError(f"unknown motion {motion_id}: see  rbfrag motions list")
     return row
 
 
@@ -389,9 +386,7 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
             stands for an event of its own.
     """
     if info.magnitude is not None and not -5.0 < info.magnitude < 11.0:
-        raise InputError(
-            f"event {info.event_id}: {info.magnitude} is no magnitude of an earthquake"
-        )
+        raise InputError(f"event {info.event_id}: {info.magnitude} is not a valid magnitude")
     event_id = storable(info.event_id) or UNKNOWN_EVENT + recording
     guessed = info.guessed or not info.event_id
     known = {
@@ -435,5 +430,5 @@ def require_suite(connection: Connection, name: str) -> int:
     suite_id = connection.scalar(select(suite.c.id).where(suite.c.name == storable(name)))
     if suite_id is None:
         known = ", ".join(suite_names(connection)) or "none"
-        raise InputError(f"there is no suite {name!r}; the database holds: {known}")
+        raise InputError(f"unknown suite {name!r}; the suites are {known}")
     return int(suite_id)

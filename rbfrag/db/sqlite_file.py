@@ -43,33 +43,33 @@ def require_sqlite_file(path: Path) -> None:
         kind = path.stat().st_mode
         if stat.S_ISDIR(kind):
             raise NotADatabaseError(
-                f"{path} is a folder: db wants the database file", fields=("db",)
+                f"{path} is a folder: give the database file as db", fields=("db",)
             )
         if not stat.S_ISREG(kind):
             raise NotADatabaseError(
-                f"{path} is no ordinary file: db wants the database file", fields=("db",)
+                f"{path} is not a regular file: give the database file as db", fields=("db",)
             )
         with path.open("rb") as stream:
             head = stream.read(len(_MAGIC))
     except FileNotFoundError:
         raise DatabaseNotFoundError(
-            f"there is no database at {path}: name another with db, or make it by "
-            "rbfrag motions add",
+            f"no database at {path}: give another path as db, or create it with  rbfrag motions "
+            "add",
             fields=("db",),
         ) from None
     except NotADirectoryError:
         raise DatabaseNotFoundError(
-            f"there is no database at {path}: a part of that path is a file, not a folder"
+            f"no database at {path}: a part of the path is a file, not a folder"
         ) from None
     except OSError as error:
         raise DatabaseError(f"cannot read the database {path}: {error.strerror or error}") from None
     if not head:
         raise NotADatabaseError(
-            f"{path} is empty: delete it, or name another database with db", fields=("db",)
+            f"{path} is empty: delete it, or give another database as db", fields=("db",)
         )
     if head != _MAGIC:
         raise NotADatabaseError(
-            f"{path} is no database: its content is not SQLite's; name another with db",
+            f"{path} is not an SQLite database: give another file as db",
             fields=("db",),
         )
 
@@ -125,8 +125,8 @@ def _refuse_unreadable_log(path: Path) -> None:
     log = path.with_name(path.name + "-wal")
     if log.exists() and log.stat().st_size > 0:
         raise DatabaseReadOnlyError(
-            f"{path}: newer rows are still in {log.name}, which cannot be read in a folder that "
-            "cannot be written: copy both files to another folder"
+            f"{path}: newer rows are still in {log.name}, which is not usable in a read-only "
+            "folder: copy both files to another folder"
         )
 
 
@@ -136,7 +136,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_on
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         if application != APPLICATION_ID:
             raise NotADatabaseError(
-                f"{path} is an SQLite database, but not one of rbfrag's: name another with db",
+                f"{path} is an SQLite database, but not of rbfrag: give another database as db",
                 fields=("db",),
             )
         (tables,) = connection.execute(
@@ -152,7 +152,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_on
     revision = sole_revision([row[0] for row in rows], str(path))
     if revision is None:
         raise NotADatabaseError(
-            f"{path} is marked as rbfrag's but holds no schema: restore it from a copy"
+            f"{path} is marked as an rbfrag database but has no schema: restore it from a backup"
         )
     check_revision(revision, str(path), read_only=read_only)
 
@@ -164,7 +164,7 @@ def explained_sqlite_error(
     if isinstance(error, UnicodeDecodeError):
         return DatabaseError(
             f"{path} is damaged (a text in it is not UTF-8): run  rbfrag db check  and restore it "
-            "from a copy"
+            "from a backup"
         )
     code = _primary_code(error)
     if code in (_BUSY, _LOCKED):
@@ -193,7 +193,7 @@ def explained_sqlite_error(
         )
     if code == _CORRUPT:
         return DatabaseError(
-            f"{path} is damaged ({error}): run  rbfrag db check  and restore it from a copy"
+            f"{path} is damaged ({error}): run  rbfrag db check  and restore it from a backup"
         )
     if code == _IOERR:
         return DatabaseFailedError(

@@ -34,11 +34,11 @@ def stored_number(value: Any, where: str) -> Any:
     """Return a number of a column, or None; SQLite takes texts into columns of numbers."""
     if value is None or isinstance(value, int | float):
         return value
-    raise _damaged(where, f"{value!r} is no number")
+    raise _damaged(where, f"{value!r} is not a number")
 
 
 def _damaged(where: str, reason: str) -> DatabaseError:
     return DatabaseError(
         f"{where} of the database is damaged ({reason}): run  rbfrag db check  and restore the "
-        "database from a copy"
+        "database from a backup"
     )

@@ -54,7 +54,7 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
         with engine.connect() as connection:
             before = _revision_of_ours(connection)
         if before is None:
-            raise NotADatabaseError(f"{label} is not one of rbfrag's databases: name another")
+            raise NotADatabaseError(f"{label} is not an rbfrag database: give another")
         if before not in REVISIONS:
             check_revision(before, label)
         if before != SCHEMA_REVISION:
@@ -105,8 +105,8 @@ def _require_sound_references(connection: Connection) -> None:
     broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchone()
     if broken is not None:
         raise DatabaseError(
-            f"the upgrade was undone: table {broken[0]} would hold rows that point nowhere; "
-            "run  rbfrag db check  with the rbfrag that wrote the database"
+            f"the upgrade was undone: table {broken[0]} would have dangling references: run  "
+            "rbfrag db check  with the rbfrag that wrote the database"
         )
 
 
@@ -130,11 +130,11 @@ def create_if_missing(place: Path | str) -> None:
             return
         if not folder.is_dir():
             raise DatabaseNotFoundError(
-                f"cannot make the database {place}: there is no folder {folder}; make it first"
+                f"cannot create the database {place}: create the folder {folder} first"
             )
     except OSError as error:
         raise DatabaseError(
-            f"cannot make the database {place}: {error.strerror or error}"
+            f"cannot create the database {place}: {error.strerror or error}"
         ) from error
     draft = _draft_file(place, folder)
     try:
@@ -142,7 +142,7 @@ def create_if_missing(place: Path | str) -> None:
         _give_name(draft, place)
     except OSError as error:
         raise DatabaseError(
-            f"cannot make the database {place}: {error.strerror or error}"
+            f"cannot create the database {place}: {error.strerror or error}"
         ) from error
     finally:
         for tail in ("", "-wal", "-shm", "-journal"):
@@ -182,8 +182,8 @@ def _draft_file(place: Path, folder: Path) -> Path:
         )
     except OSError as error:
         raise DatabaseReadOnlyError(
-            f"cannot make the database {place}: {error.strerror or error}; name a folder that can "
-            "be written with db",
+            f"cannot create the database {place}: {error.strerror or error}; choose a writable "
+            "folder",
             fields=("db",),
         ) from error
     os.close(handle)

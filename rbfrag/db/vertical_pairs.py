@@ -60,7 +60,7 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
     """
     row = motion_row(connection, motion_id)
     if row.is_vertical:
-        raise InputError(f"motion {motion_id} is a vertical component: name a horizontal one")
+        raise InputError(f"motion {motion_id} is a vertical component: give a horizontal one")
     own = select(motion.c.recording_id).where(motion.c.id == motion_id).scalar_subquery()
     query = (
         select(motion.c.id)

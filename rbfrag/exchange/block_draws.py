@@ -38,7 +38,7 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
     drawn = {name: values for name, values in columns.items() if not np.isnan(values).all()}
     if not drawn:
         raise InputError(
-            f"{path}: no row says anything of a block: a table of draws has p2_1_s2 and kr, or the "
+            f"{path}: no block parameters: a table of draws must have p2_1_s2 and kr, or the "
             "columns of another kind"
         )
     size = next(iter(drawn.values())).size
@@ -49,6 +49,6 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
             raise InputError(f"{path}: draw {each.places[0] + 1}: {each.texts()[0]}")
         if len(blocks.groups) > 1:
             kinds = " and ".join(str(group.kind) for group in blocks.groups)
-            raise InputError(f"{path}: the draws of one block are of one kind, and these: {kinds}")
+            raise InputError(f"{path}: all draws of a block must have one kind, not {kinds}")
         drawn = {n: np.broadcast_to(v, (size,)) for n, v in blocks.groups[0].numbers.items()}
     return drawn, np.ones(size) if weight is None else weight

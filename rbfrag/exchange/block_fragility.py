@@ -162,7 +162,7 @@ def block_functions(
     if weak:
         raise InputError(
             f"{len(weak)} of {len(names)} blocks, first {weak[0]!r}, have no fragility: P stays "
-            f"below {FLOOR:g} up to {measure} = {top:g}; leave them out"
+            f"below {FLOOR:g} up to {measure} = {top:g}; omit them"
         )
     warnings = (
         (

@@ -238,7 +238,7 @@ def read_blocks(
     if of_place and "x" in table.stated.columns:
         _place_on_map(columns, crs, name)
     if ("lon" in columns) != ("lat" in columns):
-        raise InputError(f"{name}: lon and lat go together: give both columns, or neither")
+        raise InputError(f"{name}: lon and lat are required together: give both columns or neither")
     named = "block_id" in columns
     if not named:
         columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
@@ -286,22 +286,22 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
         MissingExtraError: pyproj is not installed.
     """
     if "y" not in columns:
-        raise InputError(f"{source}: x and y go together: give both columns, or neither")
+        raise InputError(f"{source}: x and y are required together: give both columns or neither")
     x, y = columns["x"], columns["y"]
     systems = np.array(columns.get("crs", np.full(x.size, "", dtype=object)), dtype=object)
     systems[systems == ""] = crs or ""
     placed = ~np.isnan(x) & ~np.isnan(y)
     if (placed & (systems == "")).any():
         raise InputError(
-            f"{source}: x and y need a coordinate reference system: add a column crs, or pass "
-            "crs EPSG:2056, for example",
+            f"{source}: x and y require a coordinate reference system: add a column crs, or use "
+            "crs, such as crs EPSG:2056",
             fields=("crs",),
         )
     try:
         from pyproj import Transformer
         from pyproj.exceptions import CRSError, ProjError
     except ImportError:
-        raise MissingExtraError("Coordinates in a projection need pyproj", "gis") from None
+        raise MissingExtraError("Projected coordinates require pyproj", "gis") from None
     lon, lat = (columns.setdefault(name, np.full(x.size, np.nan)) for name in PLACE)
     for system in dict.fromkeys(systems[placed].tolist()):
         rows = np.flatnonzero(placed & (systems == system) & np.isnan(lon))
@@ -310,7 +310,7 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
             lon[rows], lat[rows] = to_map.transform(x[rows], y[rows], errcheck=True)
         except (CRSError, ProjError):
             raise InputError(
-                f"{source}: crs {system[:40]!r} is not known or does not hold these coordinates: "
+                f"{source}: crs {system[:40]!r} is unknown or does not cover these coordinates: "
                 "give a code such as EPSG:2056",
                 fields=("crs",),
             ) from None

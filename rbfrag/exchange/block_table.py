@@ -255,7 +255,7 @@ class BlockTable:
         """Reject what is given for all blocks, and no answer depends on."""
         for name in given:
             if name in BLOCK and name not in read:
-                text = f"{name} does not go with the blocks of {self.name}: leave it out"
+                text = f"{name} cannot be combined with the blocks of {self.name}: omit it"
                 raise InputError(text, fields=(name,))
 
     @contextmanager

@@ -24,7 +24,7 @@ EXAMPLE = {"block_id": "example", "height_m": 2.4, "width_m": 0.5, "beta_deg": 3
 def write_template(path: str | os.PathLike[str]) -> Path:
     """Write a table of one example, whole or not at all, and return its path.
 
-    A workbook has a second sheet that tells what else a column may state.
+    A workbook has a second sheet that lists all columns.
 
     Args:
         path: file to write, ``.xlsx`` or ``.csv``.
@@ -39,7 +39,7 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     sheet.title, sheet.freeze_panes, others.freeze_panes = "blocks", "A2", "A2"
     sheet.append([*names])
     sheet.append(row)
-    others.append(["column", "what it states", "also called"])
+    others.append(["column", "description", "other names"])
     for name in quantities.COLUMNS:
         help = quantities.QUANTITIES[name].help(quantities.word_of)
         others.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])

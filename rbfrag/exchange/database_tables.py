@@ -91,18 +91,18 @@ def export_database(
         raise InputError(f"format {format}: choose one of {', '.join(FORMATS)}", fields=("format",))
     if arrays and format == "csv":
         raise InputError(
-            "arrays: a CSV cell holds no array; use format parquet", fields=("arrays", "format")
+            "arrays are not supported in CSV: use format parquet", fields=("arrays", "format")
         )
     if excel_text and format != "csv":
         raise InputError(
-            "excel_text: only CSV is computed by spreadsheets; use format csv",
+            "excel_text applies to CSV only: use format csv",
             fields=("excel_text", "format"),
         )
     if format == "parquet":
         pyarrow()
     names = list(dict.fromkeys(TABLES if tables is None else tables))
     if not names:
-        raise InputError("tables: name at least one table", fields=("tables",))
+        raise InputError("tables: give at least one table", fields=("tables",))
     chosen = {name: chosen_columns(name, arrays=arrays) for name in names}
     formulas: list[str] = []
     write: Callable[[Connection, str, Sequence[ColumnMeaning], Path], int] = (
@@ -136,11 +136,11 @@ def _draft_folder(folder: Path) -> Path:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(
-                f"out {folder}: it holds something already; name a new folder", fields=("out",)
+                f"out {folder}: the folder is not empty; give a new folder", fields=("out",)
             )
         if not folder.absolute().parent.is_dir():
             raise InputError(
-                f"out {folder}: there is no folder {folder.absolute().parent}: make it first",
+                f"out {folder}: create the folder {folder.absolute().parent} first",
                 fields=("out",),
             )
         draft = folder.absolute().with_name(f".{folder.name}.{secrets.token_hex(4)}.part")

@@ -110,7 +110,7 @@ def losses(
 
     Raises:
         InputError: a file that cannot be used, files of different jobs, an event that is unknown,
-            a row that is there twice, or no block that can be used; the message names the line.
+            a row that occurs twice, or no block that can be used; the message names the line.
         UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
@@ -165,8 +165,8 @@ def _by_one_measure(
     name, *more = events.measures
     if more and answering.get("model") is None:
         raise InputError(
-            "several measures are answered by a model that is named alone: one measure answers "
-            "better, PGV before SA(1.0)",
+            "several intensity measures require models by name: a single measure is better, PGV "
+            "before SA(1.0)",
             fields=("imt", "model"),
         )
     if more or name != "pga_g":
@@ -176,8 +176,8 @@ def _by_one_measure(
     magnitudes = read_magnitudes(job)
     if magnitudes is None:
         raise InputError(
-            f"{PGA_ALONE}; give PGV or SA(1.0), or the file of ruptures, whose magnitudes tell the "
-            "PGV, or name a model of PGA",
+            f"{PGA_ALONE}; give PGV or SA(1.0), the ruptures file with magnitudes, or a model of "
+            "PGA",
             fields=("imt", "model"),
         )
     velocity = velocity_of(events.measures[name], magnitudes[events.event])

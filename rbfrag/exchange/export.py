@@ -240,8 +240,8 @@ class _Request(NamedTuple):
             result = block_functions(*of, one_class=self.one_class, **self.how)
         elif self.facts.free_standing or {*TOPPLING_BLOCK.names} - {*self.numbers}:
             raise InputError(
-                "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
-                "shares or the kind out"
+                "shares require a rock mass, whose blocks are backed by rock: omit shares or the "
+                "kind"
             )
         else:
             p2, kr = (self.numbers[name] for name in TOPPLING_BLOCK.names)

@@ -85,15 +85,15 @@ def discrete_function(
     """Return a checked function of probabilities at levels."""
     if levels.size < 2 or levels.size != probability.size:
         raise InputError(
-            f"{where}: {levels.size} levels and {probability.size} probabilities: at least two of "
-            "each, as many of one as of the other, are wanted"
+            f"{where}: {levels.size} levels and {probability.size} probabilities: give at least "
+            "two of each, in equal numbers"
         )
     if not (np.isfinite(levels).all() and (levels >= 0.0).all() and (np.diff(levels) > 0).all()):
-        raise InputError(f"{where}: the levels must rise from zero or above")
+        raise InputError(f"{where}: the levels must increase from zero or above")
     if not ((probability >= 0.0) & (probability <= 1.0)).all():
         raise InputError(f"{where}: a probability lies outside 0 to 1")
     if (np.diff(probability) < 0.0).any():
-        raise InputError(f"{where}: the probability falls with rising level")
+        raise InputError(f"{where}: the probability decreases with increasing level")
     return FragilityFunction(
         name, limit_state, kind, None, None, levels, probability, no_damage_limit
     )
@@ -130,7 +130,7 @@ def chords(
         floor: the least P to which errors are relative.
     """
     if levels < 10:
-        raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
+        raise InputError(f"levels = {levels}: a discrete fragility function requires at least 10")
     every = np.arange(len(x))
     low, high = np.full(len(x), 1e-7), np.full(len(x), 1.0 / floor)
     for _ in range(_ROUNDS):
@@ -191,12 +191,12 @@ def renamed(
 def assets_of(functions: Sequence[FragilityFunction]) -> dict[str, list[FragilityFunction]]:
     """Return the functions of each asset, which stand one after the other; refuse what is amiss."""
     if not functions:
-        raise InputError("there is no fragility function to write")
+        raise InputError("no fragility function to write")
     assets: dict[str, list[FragilityFunction]] = {}
     for name, group in groupby(functions, key=lambda each: each.name):
         limit_states = list(group)
         if name in assets or len({each.limit_state for each in limit_states}) < len(limit_states):
-            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
+            raise InputError(f"block {name!r} occurs twice: give every block its own block_id")
         assets[name] = limit_states
     first, states = functions[0].name, [each.limit_state for each in assets[functions[0].name]]
     for name, limit_states in assets.items():

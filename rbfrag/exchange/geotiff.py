@@ -37,11 +37,11 @@ def write_geotiff(
     try:
         import rasterio
     except ImportError:
-        raise MissingExtraError("GeoTIFF files need rasterio", "gis") from None
+        raise MissingExtraError("GeoTIFF files require rasterio", "gis") from None
     column, width, west, dx = _cells(columns["lon"])
     row, height, north, dy = _cells(-columns["lat"])
     if np.unique(row * width + column).size != row.size:
-        raise InputError("two nodes of the map have one place: write .gpkg or .csv in its place")
+        raise InputError("two nodes of the map have the same coordinates: use .gpkg or .csv")
     bands = {
         name: values
         for name, values in columns.items()
@@ -76,7 +76,4 @@ def _cells(at: NDArray[np.float64]) -> tuple[NDArray[np.intp], int, float, float
         cell = np.rint((at - first) / step)
         if (np.abs(at - first - cell * step) <= _OFF * step).all():
             return cell.astype(np.intp), number + 1, first, step
-    raise InputError(
-        "a GeoTIFF file takes a regular grid of at least 2 x 2 nodes, which this map is not: write "
-        ".gpkg or .csv in its place"
-    )
+    raise InputError("GeoTIFF requires a regular grid of at least 2 x 2 nodes: use .gpkg or .csv")

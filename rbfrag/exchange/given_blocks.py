@@ -40,7 +40,7 @@ def given_blocks(
     kind = known.pop("kind", None)
     if blocks is not None:
         if known:
-            raise InputError(f"blocks says all of the blocks: leave {' and '.join(known)} out")
+            raise InputError(f"blocks describes the blocks: omit {' and '.join(known)}")
         return read_blocks(blocks, kind, reads=reads, one_kind=one_kind)
     if not has_shape(known) and not kinds_by_numbers(known):
         missing = next((name for name in TOPPLING_BLOCK.names if name not in known), "p2")

@@ -190,7 +190,7 @@ def shakemap(
     else:
         measures, std_ln, known = shaken.measures, shaken.std_ln, shaken.known
         if not known.any():
-            raise InputError(f"{grid}: no node has a number in each field that is read")
+            raise InputError(f"{grid}: no node has values in all required fields")
         lon, lat = shaken.lon[known], shaken.lat[known]
     measures, std_ln = (
         {name: values[known] for name, values in each.items()} for each in (measures, std_ln)

@@ -104,7 +104,7 @@ def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[st
     _turn_outwards(source, mesh, notes)
     if not mesh.volume > 1e-9 * float(np.ptp(vertices, axis=0).max()) ** 3:
         raise InputError(
-            f"{source}: the mesh encloses no volume: it must be the whole surface of a solid block"
+            f"{source}: the mesh encloses no volume: it must be the closed surface of a block"
         )
     return mesh, middle, notes
 
@@ -112,16 +112,20 @@ def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[st
 def _triangles(source: Path) -> Trimesh:
     """Return the triangles of a file as they are written there."""
     if source.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{source}: a mesh ends in {', '.join(SUFFIXES)}, not {source.suffix!r}")
+        raise InputError(
+            f"{source}: unsupported mesh: use {', '.join(SUFFIXES)}, not {source.suffix!r}"
+        )
     for library in ("trimesh", "networkx"):  # with the second, trimesh finds holes
         if find_spec(library) is None:
-            raise MissingExtraError(f"Meshes need {library}", "mesh")
+            raise MissingExtraError(f"Meshes require {library}", "mesh")
     from trimesh.exchange.load import load_mesh
 
     with reading(source, "a mesh"):
         content = bounded_bytes(source, MOST_BYTES)
     if content is None:
-        raise InputError(f"{source} has more than {MOST_BYTES} bytes: a block needs no such mesh")
+        raise InputError(
+            f"{source} has more than {MOST_BYTES} bytes: too large for a mesh of a block"
+        )
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it warns of is said here
     try:
         mesh = load_mesh(
@@ -132,8 +136,8 @@ def _triangles(source: Path) -> Trimesh:
         is_whole = faces.size == 0 or 0 <= faces.min() <= faces.max() < len(mesh.vertices)
     except Exception as error:  # noqa: BLE001  # a damaged file can raise anything in there
         raise InputError(
-            f"{source}: not a mesh that can be read ({type(error).__name__}: {str(error)[:120]}): "
-            "export it again"
+            f"{source}: not a valid mesh ({type(error).__name__}: {str(error)[:120]}): export it "
+            "again"
         ) from None
     if faces.size == 0 or not is_whole:
         reason = "has no triangles" if faces.size == 0 else "names vertices that it does not have"
@@ -180,18 +184,13 @@ def _close(source: Path, mesh: Trimesh, notes: list[str]) -> None:
         reason = f"not closed: {border} edges have a face on one side only"
     else:
         reason = f"no surface of one body: {shared} edges are shared by more than two faces"
-    raise InputError(
-        f"{source}: the mesh is {reason}; volume and centre of mass of an open surface mean "
-        f"nothing: {_CLOSE_IT}"
-    )
+    raise InputError(f"{source}: the mesh is {reason}; an open surface has no volume: {_CLOSE_IT}")
 
 
 def _refuse_several_bodies(source: Path, mesh: Trimesh) -> None:
     bodies = int(mesh.body_count)
     if bodies > 1:
-        raise InputError(
-            f"{source} holds {bodies} separate closed surfaces: a block is one; delete the others"
-        )
+        raise InputError(f"{source} has {bodies} separate closed surfaces: keep one")
 
 
 def _turn_outwards(source: Path, mesh: Trimesh, notes: list[str]) -> None:

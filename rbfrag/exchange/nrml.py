@@ -58,8 +58,8 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
         for state in curves:
             if state not in states:
                 raise InputError(
-                    f"{source}, line {asset.line}: limit state {state!r} of {name!r} is none of "
-                    f"{' '.join(states)}"
+                    f"{source}, line {asset.line}: limit state {state!r} of {name!r} is not one "
+                    f"of {' '.join(states)}"
                 )
         for state in states:
             where = f"{source}, line {asset.line}, {name!r}, {state}"
@@ -75,7 +75,7 @@ def _name_and_format(asset: Node, model: Node, source: str) -> tuple[str, str]:
         raise InputError(f"{source}, line {asset.line}: fragilityFunction has no id")
     form, shape = asset.attributes.get("format", ""), asset.attributes.get("shape", "logncdf")
     if form == "continuous" and shape != "logncdf":
-        raise InputError(f"{source}, line {asset.line}: shape {shape!r} is not known: logncdf is")
+        raise InputError(f"{source}, line {asset.line}: unsupported shape {shape!r}: use logncdf")
     return asset.attributes["id"], form
 
 
@@ -103,12 +103,12 @@ def _function(
     levels = next(asset.of("imls", "IML"), Node("", {}, 0))
     imt = levels.attributes.get("imt", levels.attributes.get("IMT"))
     if imt is None:
-        raise InputError(f"{where}: the intensity measure is not stated")
+        raise InputError(f"{where}: the intensity measure is missing")
     kind = openquake_type(imt, where)
     unit = levels.attributes.get("imlUnit")
     if unit is not None:
         if unit not in _UNITS or (unit == "g") != (kind.measure != "pgv_m_s"):
-            raise InputError(f"{where}: {imt} in {unit!r} is not known: g, or cm/s for PGV")
+            raise InputError(f"{where}: {imt} in {unit!r} is not supported: use g, or cm/s for PGV")
         kind = IntensityType(kind.measure, _UNITS[unit], kind.period_s)
     limit = levels.attributes.get("noDamageLimit")
     lowest = None if limit is None else kind.factor * number_at(limit, where)
@@ -122,7 +122,7 @@ def _function(
                 f"{where}: mean = {mean:g} and stddev = {sd:g}: both must be above zero"
             )
         if not sd / mean < 1e100:
-            raise InputError(f"{where}: stddev = {sd:g} is out of all bounds with mean {mean:g}")
+            raise InputError(f"{where}: stddev = {sd:g} is out of range for mean {mean:g}")
         spread = 1.0 + (sd / mean) ** 2
         median, beta = kind.factor * mean / math.sqrt(spread), math.sqrt(math.log(spread))
         return lognormal_function(name, state, kind, median, beta, where, lowest)

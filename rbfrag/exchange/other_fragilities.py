@@ -30,7 +30,9 @@ def of_measure(
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".xml", ".csv"):
-        raise InputError(f"{path}: fragilities are read from .xml (NRML) and .csv (pelicun)")
+        raise InputError(
+            f"{path}: unsupported file of fragility functions: use .xml (NRML) or .csv (pelicun)"
+        )
     functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path)
     curves: dict[str, Callable[[FloatArray], FloatArray]] = {
         f"{function.name}, {function.limit_state}": function.at
@@ -42,7 +44,7 @@ def of_measure(
         raise InputError(f"{path}: there is no fragility over {measure}; there are {have}")
     if len(curves) > MOST:
         raise InputError(
-            f"{path}: {len(curves)} fragilities are too many for one figure (at most {MOST}): make "
-            "a file of those to compare"
+            f"{path}: {len(curves)} fragilities exceed the maximum of {MOST} for a figure: reduce "
+            "the file"
         )
     return curves

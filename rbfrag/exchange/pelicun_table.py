@@ -162,7 +162,7 @@ def _kind(demand: str, unit: str, where: str) -> IntensityType | None:
         return None
     measure, units = _UNITS[name]
     if unit not in units:
-        raise InputError(f"{where}: {demand} in {unit!r} is not known: {', '.join(units)}")
+        raise InputError(f"{where}: {demand} in {unit!r} is not supported: use {', '.join(units)}")
     period_s = _number(period, where) if measure == "sa_g" else None
     return IntensityType(measure, units[unit], period_s)
 
@@ -183,7 +183,9 @@ def _function(
             raise InputError(f"{where}: Theta_0 is not 'levels|probabilities'")
         x, p = (np.array([_number(w, where) for w in part.split(",")]) for part in parts)
         return discrete_function(row["ID"], state, kind, kind.factor * x, p, where)
-    raise InputError(f"{where}: family {family!r} is not known: lognormal and multilinear_CDF are")
+    raise InputError(
+        f"{where}: family {family!r} is not supported: use lognormal or multilinear_CDF"
+    )
 
 
 def _number(text: str, where: str) -> float:

@@ -113,7 +113,7 @@ def pyogrio() -> Any:
     try:
         from pyogrio import raw
     except ImportError:
-        raise MissingExtraError("GeoPackage files need pyogrio", "gis") from None
+        raise MissingExtraError("GeoPackage files require pyogrio", "gis") from None
     return raw
 
 

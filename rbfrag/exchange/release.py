@@ -103,7 +103,7 @@ def _places(columns: Mapping[str, Any], of: Any) -> tuple[FloatArray, FloatArray
     crs = np.asarray(columns.get("crs", [""] * x.size), dtype=object)
     own = ~np.isnan(x) & ~np.isnan(y)
     if (own & (crs == "")).any():
-        raise InputError("x and y need crs, the system that they are in, such as EPSG:2056")
+        raise InputError("x and y require crs, such as EPSG:2056")
     on_map = ~own & ~np.isnan(lon) & ~np.isnan(lat)
     return (
         np.where(own, x, np.where(on_map, lon, np.nan)),

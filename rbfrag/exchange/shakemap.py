@@ -96,7 +96,7 @@ class GridReading:
             if not index.isdigit() or int(index) < 1:
                 raise InputError(f"{where}: grid_field index {index!r} is not a number from 1 on")
             if title in self.places:
-                raise InputError(f"{where}: field {title} is there twice")
+                raise InputError(f"{where}: field {title} occurs twice")
             self.places[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
         elif name == "grid_data":
             self.in_data, self.data_line = True, line
@@ -165,8 +165,8 @@ class GridReading:
         values = np.concatenate(self.blocks)
         if values.size % width:
             raise InputError(
-                f"{self.source}, line {self.data_line}: grid_data has {values.size} numbers, which "
-                f"is no multiple of the {width} fields: a row is cut or a field missing"
+                f"{self.source}, line {self.data_line}: grid_data has {values.size} numbers, not "
+                f"a multiple of the {width} fields: a row is truncated or a field is missing"
             )
         table = values.reshape(-1, width)
         columns, rows = (self._count(name) for name in ("nlon", "nlat"))
@@ -198,7 +198,7 @@ class GridReading:
     def _count(self, name: str) -> int:
         text = self.size.get(name, "")
         if not text.strip().isdigit() or int(text) < 1:
-            raise InputError(f"{self.source}: grid_specification {name} = {text!r} is no number")
+            raise InputError(f"{self.source}: grid_specification {name} = {text!r} is not a number")
         return int(text)
 
     def _degrees(self, table: FloatArray, title: str, limit: float) -> FloatArray:
@@ -207,8 +207,8 @@ class GridReading:
         if off.any():
             node = int(np.flatnonzero(off)[0])
             raise InputError(
-                f"{self.source}, node {node + 1} of grid_data: {title} = {values[node]:g} lies off "
-                f"the map (-{limit:g} to {limit:g})"
+                f"{self.source}, node {node + 1} of grid_data: {title} = {values[node]:g} must be "
+                f"between -{limit:g} and {limit:g}"
             )
         return values
 
@@ -222,7 +222,7 @@ class GridReading:
             unit = usual
         if unit not in units:
             raise InputError(
-                f"{self.source}, line {line}: {title} in {unit!r} is not known: use one of "
+                f"{self.source}, line {line}: {title} in {unit!r} is unknown: use one of "
                 f"{', '.join(units)}"
             )
         values = units[unit] * table[:, place]
@@ -317,8 +317,8 @@ def read_shakemap(
     """
     if os.fspath(path).lower().endswith((".hdf", ".hdf5", ".h5")):
         raise InputError(
-            f"{path} is HDF5 (shake_result.hdf), which is not read: take grid.xml of the same "
-            "ShakeMap, and uncertainty.xml with it"
+            f"{path} is HDF5 (shake_result.hdf), which is not supported: use grid.xml and "
+            "uncertainty.xml of the same ShakeMap"
         )
     event, fields, columns, rows, warnings = GridReading(str(path), tuple(_MEASURES)).read(
         allow_partial

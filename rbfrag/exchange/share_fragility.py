@@ -68,15 +68,14 @@ def share_functions(
     rising = all(a < b for a, b in pairwise(shares))
     if not shares or not rising or not all(0.0 < share <= 100.0 for share in shares):
         raise InputError(
-            f"shares {', '.join(f'{share:g}' for share in shares)}: give rising percentages above "
-            "0 and up to 100, such as 1,10,50"
+            f"shares {', '.join(f'{share:g}' for share in shares)}: give increasing percentages "
+            "above 0, up to 100, such as 1,10,50"
         )
     chosen = model_for(answering, ("p2", "kr", measure))
     if chosen.dependence is None:
         raise InputError(
-            f"model {chosen.name!r} does not know what the blocks of one earthquake share, so how "
-            "many of a rock mass fail together is not known: fit it on more earthquakes, or name "
-            "another model"
+            f"model {chosen.name!r} has no dependence model for the blocks of one earthquake: fit "
+            "it to more earthquakes, or choose another model"
         )
     numbers = {"p2": p2, "kr": kr}
     meaning = component_named(component)
@@ -99,9 +98,7 @@ def share_functions(
     ends = reached[np.isfinite(reached)]
     top = math.log(TOP[measure])
     if ends.size == 0 or ends.min() >= top:
-        raise InputError(
-            f"{name}: no share of its blocks fails up to {measure} = {math.exp(top):g}"
-        )
+        raise InputError(f"{name}: none of its blocks fails up to {measure} = {math.exp(top):g}")
     u = np.linspace(ends.min() - 1e-9, ends.max() + 1e-9, _FINE)
     ordered = np.sort(reached, axis=1)
     of_shares = [

@@ -101,9 +101,8 @@ def join_sites(
         remarks += _of_distances(columns["block_id"], rest[~far], distance[~far])
     elif count > 1:
         raise InputError(
-            f"there are {count} sites, and nothing tells at which of them "
-            f"{rest.size} of {n} blocks stand: give the blocks a column site_id with the names of "
-            "sites, or columns lon and lat where the sites have places, or files of one site",
+            f"there are {count} sites, and {rest.size} of {n} blocks have no site: add the column "
+            "site_id, or lon and lat if the sites have coordinates, or use files of one site",
             fields=("site_id", "lon", "lat"),
         )
     return SiteJoin(site, reasons, tuple(remarks))

@@ -100,7 +100,7 @@ def blocks_at_sites(
     join = join_sites(columns, [c.site for c in first], places, within_km=within_km)
     missing, own = join.reasons, np.flatnonzero(join.site >= 0)
     if not own.size and site_chosen:
-        raise InputError(f"no block stands at site {', '.join(c.place for c in first)}")
+        raise InputError(f"no block is at site {', '.join(c.place for c in first)}")
     if not own.size:
         raise InputError(f"no block can be used: {next(iter(missing.values()))}")
     remarks = [*join.remarks]

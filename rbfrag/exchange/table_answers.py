@@ -173,8 +173,8 @@ def predict_table(
 ) -> TableAnswer:
     """Answer every block of a table, and write the table with the answers or list these.
 
-    A row that cannot be answered, as one with a cell that is no number, keeps an empty probability
-    and says why; a row whose `mode` is another than that of the model's kind is not answered.
+    A row without an answer, such as one with an invalid number, has an empty probability and a
+    reason; a row whose `mode` is another than that of the model's kind is not answered.
 
     Args:
         source: table, ``.csv``, ``.xlsx``, ``.parquet`` or ``.geojson``, with columns that describe
@@ -196,13 +196,13 @@ def predict_table(
     """
     if question.get("sites") is not None:
         raise InputError(
-            "sites is of one block: rows of a table stand where their column site_id says",
+            "sites is for a single block: use the column site_id in a table",
             fields=("sites",),
         )
     origin = as_path(source, "source", "a table of blocks")
     goal = None if target is None else table_path(target)
     if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
-        raise InputError(f"out {goal} is the table itself: name another file", fields=("out",))
+        raise InputError(f"out {goal} is the input table: choose another file", fields=("out",))
     read = (*BLOCK, *SHAKING, *BY_ROW, "count")
     counts = np.zeros(3, dtype=np.int64)
     together: list[tuple[FloatArray, FloatArray, NDArray[np.object_], FloatArray]] = []
@@ -338,7 +338,7 @@ def _answer(
     count = values.pop("count", np.ones(len(part.lines)))
     whole = (count >= 1.0) & (count == np.rint(count))
     for i in np.flatnonzero(~whole).tolist():
-        faults.setdefault(i, f"count = {count[i]:g}: enter a whole number of blocks from 1 on")
+        faults.setdefault(i, f"count = {count[i]:g}: give a whole number of blocks, 1 or more")
     inputs: dict[str, Any] = dict(given)
     for name, column in values.items():
         if name not in table.filled and (name in given or name in _SHAKING):
@@ -415,7 +415,7 @@ def _written(
     """Return what writes parts and their answers to a file; enters what is to be said of it."""
     doubled = next((name for name in table.file.header if table.file.header.count(name) > 1), None)
     if doubled is not None:
-        raise InputError(f"{table.name}: the column {doubled} is there twice")
+        raise InputError(f"{table.name}: the column {doubled} occurs twice")
     written = (*ANSWERS, OF_UNCERTAIN, *OF_DRAINED)
     kept = [name for name in table.file.header if name not in written]
     write = table_writer(

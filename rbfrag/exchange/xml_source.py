@@ -44,8 +44,8 @@ def parse_xml(
 
     def refuse(*_: object) -> None:
         raise InputError(
-            f"{source}, line {line()}: the file has a document type definition, which is refused: "
-            f"{what} has none"
+            f"{source}, line {line()}: the file has a document type definition, which is not "
+            f"supported in {what}"
         )
 
     parser.StartDoctypeDeclHandler = refuse
@@ -57,7 +57,7 @@ def parse_xml(
         with reading(source, what), source.open("rb") as file:
             size = source.stat().st_size
             if size == 0:
-                raise InputError(f"{source} is empty: name {what}")
+                raise InputError(f"{source} is empty: give {what}")
             if size > MOST_BYTES:
                 raise InputError(f"{source} has {size} bytes, more than {MOST_BYTES}: not {what}")
             parser.ParseFile(file)

@@ -59,14 +59,14 @@ class Dependence:
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             if name.startswith("rho") and not 0.0 <= value <= 1.0:
-                raise InputError(f"{name} is a share between 0 and 1, not {value!r}")
+                raise InputError(f"{name} is a fraction between 0 and 1, not {value!r}")
             if name.startswith("l_") and not 0.0 < value < math.inf:
                 raise InputError(f"{name} is a length above 0 and finite, not {value!r}")
         total = self.rho_e + self.rho_s + self.rho_v + self.rho_o
         if abs(total - 1.0) > 1e-9:
             raise InputError(
-                f"rho_e + rho_s + rho_v + rho_o is {total:.10g} and must be 1: they are shares of "
-                "one variance"
+                f"rho_e + rho_s + rho_v + rho_o is {total:.10g} and must be 1: they are fractions "
+                "of one variance"
             )
 
     def of_pairs(

@@ -47,7 +47,7 @@ class Ratio:
         name: its name in the stored domain.
         symbol: its formula for people.
         unit: its unit, empty for none.
-        of: the values that it is made of; the first is the one that does not go with the others.
+        of: names of the values of the ratio; the first is inconsistent with the others.
         shipped: its range over the motions of the shipped reference, which judges where a model
             says nothing of it; None where models say it all.
     """
@@ -94,7 +94,7 @@ class Ratio:
         first, *others = (_with_unit(name, values[name]) for name in self.of)
         where, what = self._ranges(fitted)
         return (
-            f"{first} does not go with {' and '.join(others)}: {self.symbol} is "
+            f"{first} is inconsistent with {' and '.join(others)}: {self.symbol} is "
             f"{ratio:.2g}{self.unit}, {where}: {what}"
         )
 
@@ -102,7 +102,9 @@ class Ratio:
         """Return the sentence for many values; `fitted` as for :meth:`contradiction`."""
         first, *others = map(_name_of, self.of)
         where, what = self._ranges(fitted)
-        return f"{first} does not go with {' and '.join(others)}: {self.symbol} is {where}: {what}"
+        return (
+            f"{first} is inconsistent with {' and '.join(others)}: {self.symbol} is {where}: {what}"
+        )
 
 
 def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> Any:
@@ -249,7 +251,7 @@ def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
             raise ValueError
     except (KeyError, TypeError, ValueError, IndexError):
         raise ModelError(
-            f"model {name!r} does not say whole how its points scatter: fit it again"
+            f"model {name!r} has no complete dispersion of its data: fit it again"
         ) from None
     return Spread(names, centre, packed, radius * radius)
 

@@ -84,7 +84,9 @@ class Placement:
         try:
             parts = np.broadcast_arrays(*(np.atleast_1d(part) for part in (*real, *whole)))
         except ValueError as error:
-            raise InputError(f"blocks of a portfolio need columns of one length: {error}") from None
+            raise InputError(
+                f"blocks of a portfolio must have columns of one length: {error}"
+            ) from None
         return cls(*parts)
 
     @classmethod
@@ -102,16 +104,13 @@ class Placement:
         columns = vars(self)
         if len({part.shape for part in columns.values()}) != 1 or self.l.ndim != 1:
             shapes = ", ".join(f"{name} {part.shape}" for name, part in columns.items())
-            raise InputError(f"blocks of a portfolio need columns of one length, not {shapes}")
+            raise InputError(f"blocks of a portfolio must have columns of one length, not {shapes}")
         if not (np.isfinite(self.l).all() and np.isfinite(self.ln_y).all()):
             raise InputError("ln p and ln y of every block of a portfolio must be finite")
         if not np.isin(self.polarity, (-1, UNKNOWN, 1)).all():
-            raise InputError("a polarity is +1, -1, or 0 where the azimuth is not known")
+            raise InputError("a polarity is +1, -1, or 0 where the azimuth is unknown")
         if self.drawn.any() and not np.isin(self.component[~self.drawn], range(COMPONENTS)).all():
-            raise InputError(
-                "beside blocks of unknown azimuth the components are numbered 0 and 1: an unknown "
-                "azimuth is drawn from these two"
-            )
+            raise InputError("with blocks of unknown azimuth the components must be 0 and 1")
 
     @property
     def size(self) -> int:

@@ -150,15 +150,15 @@ def find_model(
         _check_criterion(chosen.kind, block, rotation_deg)
         if chosen.criterion != rotation_deg:
             raise InputError(
-                f"model {chosen.name!r} is of {_failure(chosen.criterion)}, asked is "
+                f"model {chosen.name!r} is for {_failure(chosen.criterion)}, not for "
                 f"{_failure(rotation_deg)}"
             )
     for name in chosen.term.inputs:
         if name not in given:
             raise InputError(
-                f"model {chosen.name!r} needs {' and '.join(chosen.term.inputs)} "
-                f"({chosen.term.title}); given is {_measures(given)}: give what it needs, or "
-                "choose a model of another term",
+                f"model {chosen.name!r} requires {' and '.join(chosen.term.inputs)} "
+                f"({chosen.term.title}), not {_measures(given)}: add it, or choose a model of "
+                "another term",
                 fields=INTENSITY,
             )
     return chosen
@@ -201,7 +201,7 @@ def _suited_in(
     possible = terms_from(given)
     if not possible:
         raise InputError(
-            f"{_measures(given)} is given: a prediction needs {_enough(TERMS)}, or a motion",
+            f"{_measures(given)} is given: a prediction requires {_enough(TERMS)}, or a motion",
             fields=INTENSITY,
         )
     block_of_question = block_of(given)
@@ -210,7 +210,7 @@ def _suited_in(
         raise UnknownModelError(unknown_model(None, [], store.place))
     of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
-        raise UnknownModelError(f"{store.place} holds no {kind} model: {_how_to_make(kind)}")
+        raise UnknownModelError(f"{store.place} has no {kind} model: {_how_to_make(kind)}")
     named = [row.name for row in of_kind if TERMS[row.term].by_name and not row.is_default]
     of_kind = [row for row in of_kind if row.name not in named]
     suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
@@ -234,7 +234,7 @@ def _suited_in(
             )
             raise UnknownModelError(
                 f"no stored {kind} model of {_failure(rotation_deg)} works with "
-                f"{_measures(given)}; stored are {have}"
+                f"{_measures(given)}; the stored models are for {have}"
             )
         raise InputError(
             f"no stored {kind} model works with {_measures(given)}: give "
@@ -301,7 +301,7 @@ def check_numbers(
     if others and len(missing) == len(block.names):
         who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
         raise InputError(
-            f"{who} reads {' and '.join(block.names)}, given is {' and '.join(others)}",
+            f"{who} uses {' and '.join(block.names)}, not {' and '.join(others)}",
             fields=(*block.names, *others),
         )
     if missing:
@@ -312,7 +312,7 @@ def check_numbers(
         )
     if others:
         raise InputError(
-            f"{others[0]} does not go with kind {kind}: leave it out", fields=(others[0],)
+            f"{others[0]} cannot be combined with kind {kind}: omit it", fields=(others[0],)
         )
 
 
@@ -321,7 +321,7 @@ def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | No
     if rotation_deg is None:
         return
     if block.criterion is None:
-        raise InputError(f"a rotation is no failure of a block of kind {kind}: leave it out")
+        raise InputError(f"rotation_deg is not a failure criterion of kind {kind}: omit it")
     if isinstance(rotation_deg, bool) or not isinstance(rotation_deg, int | float):
         raise InputError(f"rotation_deg = {rotation_deg!r} is not a number")
 

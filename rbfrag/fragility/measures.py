@@ -245,7 +245,7 @@ def spectral(sa_g: Mapping[float, T]) -> dict[str, T]:
     for period in sa_g:
         if period not in SPECTRAL:
             raise InputError(
-                f"sa_g has the period {period!r} s: SA may be given at "
+                f"sa_g has the period {period!r} s: SA is supported at "
                 f"{', '.join(f'{each:g}' for each in SPECTRAL)} s"
             )
     return {SPECTRAL[period]: value for period, value in sa_g.items()}

@@ -118,8 +118,8 @@ class FragilityModel:
         """
         if row.form < MODEL_FORM:
             raise ModelError(
-                f"model {row.name!r} was fitted by an older rbfrag, in a form that does not answer "
-                f"any more: fit it again with  {_fit_line(row)}"
+                f"model {row.name!r} was fitted by an older rbfrag, in an obsolete form: fit it "
+                f"again with  {_fit_line(row)}"
             )
         try:
             method: Method | None = method_named(row.method)
@@ -129,13 +129,14 @@ class FragilityModel:
         if method is None or form is None:
             if (successor := RETIRED.get(f"{row.method}-{row.term}")) is not None:
                 raise ModelError(
-                    f"model {row.name!r} is of a form that answers no more: use {successor}, "
-                    "which rbfrag fit makes of the same data"
+                    f"model {row.name!r} has an obsolete form: use {successor}, fitted by rbfrag "
+                    "fit to the same data"
                 )
             raise ModelError(
                 f"model {row.name!r} is of kind {row.kind}, term {row.term!r} and method "
-                f"{row.method!r}, which this rbfrag does not know (terms {', '.join(TERMS)}; "
-                f"methods {', '.join(method_names())}): update rbfrag or choose another model"
+                f"{row.method!r}, which is not supported by this version (terms "
+                f"{', '.join(TERMS)}; methods {', '.join(method_names())}): update rbfrag or "
+                "choose another model"
             )
         parameters = tuple(float(value) for value in row.coefficients.values())
         size = len(parameters)
@@ -154,7 +155,7 @@ class FragilityModel:
         steps = row.leave_out_steps or ()
         if len(steps) == 1 or any(len(step) != size for step in steps):
             raise ModelError(
-                f"model {row.name!r} has {size} coefficients but steps of leaving earthquakes out "
+                f"model {row.name!r} has {size} coefficients but leave-one-earthquake-out steps "
                 "of another size: fit it again"
             )
         term = TERMS[row.term]

@@ -304,7 +304,7 @@ def index_of(given: Mapping[str, Any]) -> pd.Index | None:
         if not series[name].index.equals(series[first].index):
             raise InputError(
                 f"{first} and {name} are Series of different index: join them first, or give "
-                "arrays (to_numpy()), which go together by their order"
+                "arrays (to_numpy()), which are matched by position"
             )
     index: pd.Index = series[first].index
     return index
@@ -440,7 +440,8 @@ def flat(given: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int,
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise InputError(
-            f"the arrays do not fit together: {shapes}; give shapes that numpy can broadcast"
+            f"the shapes of the arrays are not compatible: {shapes}; give shapes that numpy can "
+            "broadcast"
         ) from None
     flat = {
         name: array.reshape(1)

@@ -59,19 +59,19 @@ def predict_motion(
         text = "sites given beside a motion, which shakes one: give its measures instead"
         raise InputError(text, fields=("sites",))
     if weights is not None:
-        raise InputError(f"weights given beside a motion: {SIMULATED}")
+        raise InputError(f"weights cannot be combined with a motion: {SIMULATED}")
     motion = as_motion(motion)
     beside = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
     extra = [name for name in given if name in beside]
     if extra:
         raise InputError(
-            f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
+            f"{' and '.join(extra)} cannot be combined with a motion, which has them: omit them"
         )
     if polarity not in ("forward", "reverse", "both"):
         raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
     uncertain = [name for name in given if name.endswith("_sigma")]
     if uncertain:
-        raise InputError(f"{uncertain[0]} given beside a motion: {SIMULATED}")
+        raise InputError(f"{uncertain[0]} cannot be combined with a motion: {SIMULATED}")
     several = [name for name, value in given.items() if not is_single(value)]
     if several:
         raise InputError(

@@ -316,7 +316,7 @@ def drawn_model(
     block = model.method.block
     for name in given:
         if name in block.sigmas:
-            raise InputError(f"{name} does not go with draws, which say how they scatter")
+            raise InputError(f"{name} cannot be combined with draws, which give the dispersion")
     try:
         named = {name: np.asarray(value, dtype=np.float64) for name, value in given.items()}
         drawn = {name: value for name, value in named.items() if value.ndim}
@@ -326,9 +326,11 @@ def drawn_model(
     except (TypeError, ValueError) as error:
         raise InputError(f"the draws are not lists of numbers of one length: {error}") from None
     if any(name not in (*block.names, *block.options) for name in drawn) or weight.ndim != 1:
-        raise InputError("with weights the arrays are draws of one block: the motion is one, too")
+        raise InputError(
+            "with weights a single motion is required: the arrays are draws of one block"
+        )
     if not ((weight >= 0.0) & (weight < math.inf)).all() or not weight.sum() > 0.0:
-        raise InputError("the weights of draws are 0 or more, and not all of them 0")
+        raise InputError("the weights of draws must be 0 or more, not all 0")
     values = dict(zip(drawn, columns, strict=True))
     for finding in refusals(values, tuple(values), block.options):
         if np.any(finding.holds):
@@ -361,7 +363,7 @@ def uncertain_model(
         if not (value != 0.0).any():
             del rest[sigma]
         elif name not in rest:
-            raise InputError(f"{sigma} goes with {name}: give the value that it is about")
+            raise InputError(f"{sigma} requires {name}: give the median")
     own = [sigma for sigma in sigmas if sigma in rest]
     if not own:
         return model, rest

@@ -101,12 +101,12 @@ def refuse(
     if not why or len(places) == total:
         listed = in_list(places[:FIRST], reasons[:FIRST])
         if total == 1:
-            raise InputError(f"{source}: the block cannot be used: {listed}")
+            raise InputError(f"{source}: invalid block: {listed}")
         more = f", the first {FIRST}" if total > FIRST else ""
-        raise InputError(f"{source}: none of {total:,} blocks can be used{more}: {listed}")
+        raise InputError(f"{source}: none of {total:,} blocks is valid{more}: {listed}")
     raise InputError(
-        f"{source}: {len(places):,} of {total:,} blocks cannot be used, and {why}: "
-        f"{in_list(places, reasons)}: correct these rows or take them out"
+        f"{source}: {len(places):,} of {total:,} blocks are invalid, and {why}: "
+        f"{in_list(places, reasons)}: correct or remove these rows"
     )
 
 

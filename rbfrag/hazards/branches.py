@@ -85,7 +85,9 @@ def branch_weights(given: Weights | None, curves: Sequence[HazardCurve]) -> Floa
     values = np.array([math.nan if one is None else one for one in given], dtype=np.float64)
     known = values[~np.isnan(values)]
     if not ((known >= 0.0) & (known <= 1.0)).all():
-        raise InputError(f"weights {', '.join(f'{one:g}' for one in known)}: each is from 0 to 1")
+        raise InputError(
+            f"weights {', '.join(f'{one:g}' for one in known)}: each must be from 0 to 1"
+        )
     if abs(known.sum() - 1.0) > _ADDS_UP:
         raise InputError(
             f"the weights of {known.size} branches add up to {known.sum():.6g}, not 1: give the "
@@ -97,7 +99,7 @@ def branch_weights(given: Weights | None, curves: Sequence[HazardCurve]) -> Floa
 def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
     """Refuse no curve at all, and curves of several measures or sites."""
     if not curves:
-        raise InputError("there is no hazard curve: give one or more")
+        raise InputError("no hazard curve: give one or more")
     measures = list(dict.fromkeys(curve.imt for curve in curves))
     if len(measures) > 1:
         raise InputError(
@@ -108,8 +110,8 @@ def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
     places = list(dict.fromkeys(curve.place for curve in curves if curve.place))
     if len(places) > 1:
         raise InputError(
-            f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks "
-            "stand at one: choose it by its number or name"
+            f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks are "
+            "at one site: choose it by number or name"
         )
 
 
@@ -173,8 +175,8 @@ def realization_weights(
             weights[int(row["rlz_id"])] = float(row["weight"])
         except (KeyError, ValueError):
             raise InputError(
-                f"{path}: {','.join(cells)[:80]!r} is no realization: the columns rlz_id and "
-                "weight hold numbers"
+                f"{path}: {','.join(cells)[:80]!r} is not a realization: rlz_id and weight must "
+                "be numbers"
             ) from None
     branches = [_REALIZATION.fullmatch(curve.statistic) for curve in curves]
     if not any(branches):
@@ -185,5 +187,5 @@ def realization_weights(
     numbers = [None if match is None else int(match.group(1)) for match in branches]
     for number in numbers:
         if number is not None and number not in weights:
-            raise InputError(f"{path}: there is no rlz_id {number}, and a curve is of it")
+            raise InputError(f"{path}: there is no rlz_id {number}, but a curve has it")
     return [None if number is None else weights[number] for number in numbers]

@@ -175,10 +175,10 @@ def hazard_curve(
         InputError: levels or rates that make no hazard curve, with the offending value.
     """
     if measure not in MEASURES:
-        raise InputError(f"{source}: measure {measure!r} is none of {', '.join(MEASURES)}")
+        raise InputError(f"{source}: measure {measure!r} is not one of {', '.join(MEASURES)}")
     period_s = of.get("period_s")
     if measure == "sa_g" and (period_s is None or not period_s > 0.0):
-        raise InputError(f"{source}: a spectral acceleration needs its period above 0 s")
+        raise InputError(f"{source}: a spectral acceleration requires a period above 0 s")
     x = np.asarray(levels, dtype=np.float64)
     rate = np.asarray(annual_rate, dtype=np.float64)
     if x.ndim != 1 or x.shape != rate.shape:
@@ -204,8 +204,8 @@ def hazard_curve(
         x, rate = x[~nothing], rate[~nothing]
     if x.size < 2:
         raise InputError(
-            f"{source}: a curve needs at least two levels with a rate between zero and infinity, "
-            f"and has {x.size}"
+            f"{source}: a curve must have at least two levels with positive finite rates, not "
+            f"{x.size}"
         )
     # a curve may go on to levels that nothing reaches, at rates that say so
     reached = x[rate > _SELDOM]
@@ -223,15 +223,15 @@ def _refuse_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str)
             )
         if np.isnan(value) or value < 0.0:
             raise InputError(
-                f"{source}: the rate at level {i} ({measure} = {level:g}) is {value:g}: "
-                "rates are numbers, not below zero"
+                f"{source}: the rate at level {i} ({measure} = {level:g}) is {value:g}: rates "
+                "must be 0 or more"
             )
     for i in range(1, x.size):
         if x[i] <= x[i - 1]:
             what = "repeats" if x[i] == x[i - 1] else "falls"
             raise InputError(
                 f"{source}: level {i + 1} ({measure} = {x[i]:g}) {what} after {x[i - 1]:g}: "
-                "levels must rise"
+                "levels must increase"
             )
         if rate[i] > rate[i - 1]:
             raise InputError(

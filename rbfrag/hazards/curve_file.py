@@ -43,7 +43,7 @@ def as_curves(
         curves = suited_in(given, **meaning)
         if len(curves) > 1:
             raise InputError(
-                f"{given} has {len(curves)} sites, and the blocks stand at one: choose it by its "
+                f"{given} has {len(curves)} sites, and the blocks are at one site: choose it by "
                 "number or name"
             )
         return curves
@@ -95,7 +95,7 @@ def read_hazard_curves(
     """
     if str(path).lower().endswith(".npz"):
         raise InputError(
-            f"{path} holds arrays of numpy, which are not read: export the curves of that job as "
+            f"{path} has numpy arrays, which are not supported: export the curves of the job as "
             "text:  oq export hcurves CALC_ID -e csv"
         )
     return hazard_curves_in(source_text(path, "a hazard curve"), str(path), imt=imt, site=site)
@@ -194,7 +194,9 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     if not isinstance(document, dict) or not document:
-        raise InputError(f"{source}: a JSON object with one member a measure is wanted")
+        raise InputError(
+            f"{source}: a JSON object with one member per intensity measure is required"
+        )
     if "response" in document:
         try:
             return list(_service_curves(document, source))
@@ -234,7 +236,7 @@ def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCur
 def _curve(name: str, member: Any, where: str) -> HazardCurve:
     kind = _usgs_type(name, where)
     if not isinstance(member, dict):
-        raise InputError(f"{where}: an object with xs and ys is wanted")
+        raise InputError(f"{where}: an object with xs and ys is required")
     x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
     with np.errstate(over="ignore"):
         levels = kind.factor * np.exp(x)
@@ -298,7 +300,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
             places.append(place)
         elif name not in _SITE_COLUMNS:
             raise InputError(
-                f"{source}, line 2: column {name!r} is none of {', '.join(_SITE_COLUMNS)} and "
+                f"{source}, line 2: column {name!r} is not one of {', '.join(_SITE_COLUMNS)} and "
                 "poe-LEVEL"
             )
     if not places:
@@ -314,7 +316,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
         wrong = ~((poe >= 0.0) & (poe <= 1.0))
         if wrong.any():
             raise InputError(
-                f"{where}: {poe[wrong][0]:g} is no probability: poe lies between 0 and 1"
+                f"{where}: {poe[wrong][0]:g} is not a probability: poe must be between 0 and 1"
             )
         place_of = {name: row[i].strip() for i, name in enumerate(names)}
         with np.errstate(divide="ignore", over="ignore"):
@@ -354,7 +356,7 @@ def _stated(name: str, head: str, source: str, default: str | None = None) -> st
     if match is None:
         if default is not None:
             return default
-        raise InputError(f"{source}, line 1: {name} is not stated")
+        raise InputError(f"{source}, line 1: {name} is missing")
     return next(group for group in match.groups() if group is not None)
 
 
@@ -370,7 +372,7 @@ def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> f
         return None
     value = number_at(cells[name], where)
     if not abs(value) <= limit:
-        raise InputError(f"{where}: {name} = {value:g} lies off the map (-{limit:g} to {limit:g})")
+        raise InputError(f"{where}: {name} = {value:g} must be between -{limit:g} and {limit:g}")
     return value
 
 
@@ -440,14 +442,14 @@ def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardC
             ) from None
         if years is not None and not 0.0 <= values[-1] <= 1.0:
             raise InputError(
-                f"{source}, line {number}: {values[-1]:g} is no probability: {header[1]} lies "
-                "between 0 and 1"
+                f"{source}, line {number}: {values[-1]:g} is not a probability: {header[1]} must "
+                "be between 0 and 1"
             )
         if of_periods:
             if not values[-1] > 0.0:
                 raise InputError(
-                    f"{source}, line {number}: a return period of {values[-1]:g} years is none: "
-                    "give years above zero"
+                    f"{source}, line {number}: the return period {values[-1]:g} years must be "
+                    "above zero"
                 )
             values[-1] = 1.0 / values[-1]
     if len(levels) > 1 and all(high > low for high, low in pairwise(levels)):
@@ -529,7 +531,7 @@ def _levels(name: str, where: str, imt: str | None) -> tuple[str, float, float |
     match = _SPECTRAL_COLUMN.fullmatch(name)
     if match:
         return "sa_g", 1.0, float(match.group(1))
-    raise InputError(f"{where}: column {name!r} is not known: {HEADER_HELP}")
+    raise InputError(f"{where}: column {name!r} is unknown: {HEADER_HELP}")
 
 
 def _years(name: str, where: str) -> float | None:
@@ -538,7 +540,4 @@ def _years(name: str, where: str) -> float | None:
     match = _POE.fullmatch(name)
     if match and float(match.group(1)) > 0.0:
         return float(match.group(1))
-    raise InputError(
-        f"{where}: column {name!r} does not say whether it is a rate or a probability: "
-        + HEADER_HELP
-    )
+    raise InputError(f"{where}: column {name!r} must be a rate or a probability: " + HEADER_HELP)

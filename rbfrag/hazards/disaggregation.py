@@ -83,19 +83,19 @@ class Disaggregation:
             )
             if not (0.0 <= poe < 1.0 and 0.0 <= level < np.inf and 0.0 < magnitude < 11.0):
                 raise InputError(
-                    f"{where}: iml {level:g}, mag {magnitude:g}, {poe:g}: a level, a magnitude and "
-                    "a probability below 1 are wanted"
+                    f"{where}: iml {level:g}, mag {magnitude:g}, {poe:g}: a level, a magnitude "
+                    "and a probability below 1 are required"
                 )
             of = sums.setdefault(level, {})
             of[magnitude] = of.get(magnitude, 0.0) - math.log1p(-poe)
             whole[level] = whole.get(level, 0.0) + poe
         levels = sorted(x for x, own in sums.items() if x > 0.0 and any(own.values()))
         if not levels:
-            raise InputError(f"{path}: there is no disaggregation of PGA in it")
+            raise InputError(f"{path}: it has no disaggregation of PGA")
         if all(abs(whole[level] - 1.0) < 1e-3 for level in levels):
             raise InputError(
-                f"{path}: the values of each level sum to 1, which are no probabilities of "
-                "exceedance: export disagg-stats or disagg-rlzs, not the traditional one"
+                f"{path}: the values of each level sum to 1, not probabilities of exceedance: "
+                "export disagg-stats or disagg-rlzs, not the traditional one"
             )
         bins = sorted({m for own in sums.values() for m in own})
         rate = np.array([[sums[x].get(m, 0.0) for m in bins] for x in levels])
@@ -128,8 +128,8 @@ class Disaggregation:
         """
         if curve.measure != "pga_g" or meaning.get("convert") is not None:
             raise InputError(
-                f"{curve.source}: disaggregation = {self.source} makes PGV out of PGA, and the "
-                f"curve is of {curve.imt}: leave it out, or convert",
+                f"{curve.source}: disaggregation = {self.source} converts PGA to PGV, but the "
+                f"curve is of {curve.imt}: omit it, or convert",
                 fields=("disaggregation", "convert"),
             )
         for axis, own, other in (("lon", self.lon, curve.lon), ("lat", self.lat, curve.lat)):

@@ -53,8 +53,7 @@ def openquake_type(imt: str, where: str) -> IntensityType:
         if period > 0.0:
             return IntensityType("sa_g", 1.0, period)
     raise InputError(
-        f"{where}: intensity measure {imt!r} is not known: PGA [g], PGV [cm/s] and "
-        "SA(period) [g] are",
+        f"{where}: intensity measure {imt!r} is unknown; use PGA [g], PGV [cm/s] or SA(period) [g]",
         fields=("imt",),
     )
 

@@ -114,7 +114,7 @@ def _measure(
     if convert is None:
         if sigma is not None:
             both = ("convert_sigma", "convert")
-            raise InputError("convert_sigma belongs to convert: leave it out", fields=both)
+            raise InputError("convert_sigma requires convert: omit it", fields=both)
         if curve.known_as is None:
             raise InputError(_no_model(curve), fields=("convert",))
         return curve.known_as, 1.0, 0.0
@@ -135,7 +135,7 @@ def _measure(
     if not 0.0 < spread < math.inf:
         raise InputError(
             f"convert_sigma = {spread:g}: give the standard deviation of ln PGV about the "
-            "conversion, above zero; no conversion is without scatter",
+            "conversion, above zero",
             fields=("convert_sigma",),
         )
     warnings.append(

@@ -56,11 +56,9 @@ class Age:
             InputError: the age is not above 0, or its standard deviation is below 0.
         """
         if not (math.isfinite(mean) and mean > 0.0):
-            raise InputError(f"age = {mean:g} years: give how long the blocks have stood, above 0")
+            raise InputError(f"age = {mean:g} years: give the age of the blocks, above 0")
         if not (math.isfinite(sd) and sd >= 0.0):
-            raise InputError(
-                f"standard deviation of the age = {sd:g} years: give 0 for a known age, or more"
-            )
+            raise InputError(f"standard deviation of the age = {sd:g} years: give 0 or more")
         if sd == 0.0:
             return cls(np.array([mean]), np.ones(1))
         variance = math.log1p((sd / mean) ** 2)

@@ -153,14 +153,16 @@ class ModelBlocks:
             of = sigma.removesuffix("_sigma")
             # what a block has of itself is not known before its model is
             if of not in (*NUMBERS, *stated) and np.any(stated.pop(sigma)):
-                raise InputError(f"{sigma} goes with {of}: give its mean, too")
+                raise InputError(f"{sigma} requires {of}: give its mean")
         if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
         parts, remarks, reason = parts_by_model(stated, shaking, answering)
         refuse_elements(reason, ALL_STAND, BLOCK)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)
-            raise InputError(f"the blocks are of kinds {kinds}: ask of each kind by itself")
+            raise InputError(
+                f"the blocks are of kinds {kinds}: give the blocks of each kind separately"
+            )
         (part,) = parts
         size, block = reason.size, part.model.method.block
         order = np.argsort(part.places)
@@ -168,7 +170,7 @@ class ModelBlocks:
         for name in stated:
             if name.endswith("_sigma") and name not in block.sigmas and np.any(stated[name]):
                 kind = part.model.row.kind
-                raise InputError(f"{name} does not go with kind {kind}: leave it out")
+                raise InputError(f"{name} cannot be combined with kind {kind}: omit it")
         numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
         medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
         scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}

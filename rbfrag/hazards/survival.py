@@ -322,7 +322,7 @@ def survival(
         count = np.atleast_2d(fragility(each[0].levels)).shape[0]
         blocks = FragilityBlocks(fragility, count)
     else:
-        raise InputError("fragility says all of the blocks: leave p2 and kr out")
+        raise InputError("fragility describes the blocks: omit p2 and kr")
     rates = [blocks.rate(curve) for curve in each]
     result = _Survival(rates, blocks.weight, age, weight)
     bands = rates[0].annual_rate.shape[2]

@@ -96,10 +96,11 @@ def members_of(archive: Path) -> list[Path]:
         records = records_among(archive / name for name in members)
     if total > LARGEST_FILE_BYTES:
         raise MotionFileError(
-            archive, f"its members are {total} bytes long: name one, or make smaller zips"
+            archive,
+            f"its members are {total} bytes long: give one of them, or use smaller archives",
         )
     if not records:
-        raise MotionFileError(archive, "the zip holds no record")
+        raise MotionFileError(archive, "the zip archive has no record")
     return records
 
 
@@ -111,20 +112,20 @@ def member_bytes(archive: Path, path: Path) -> bytes:
         if info is None:
             some = ", ".join(sorted(members)[:5])
             raise MotionFileError(
-                path, f"the zip has no such member; it holds, for example, {some}"
+                path, f"no such member in the zip archive; members are, for example, {some}"
             )
         if info.file_size > LARGEST_FILE_BYTES:
             raise MotionFileError(path, f"{info.file_size} bytes are too large for an accelerogram")
         if info.file_size > LARGEST_RATIO * max(info.compress_size, 1):
             raise MotionFileError(
-                path, f"it was shrunk by more than {LARGEST_RATIO} times, as no record can be"
+                path, f"its compression ratio exceeds {LARGEST_RATIO}: not a record"
             )
         if info.flag_bits & 1 or info.compress_type not in {
             zipfile.ZIP_STORED,
             zipfile.ZIP_DEFLATED,
         }:
             raise MotionFileError(
-                path, "it is encrypted or packed by another method than deflate: unpack the zip"
+                path, "encrypted or not compressed with deflate: unpack the zip archive"
             )
         with members.zip.open(info) as file:
             return file.read(info.file_size)
@@ -148,9 +149,9 @@ def _opened(archive: Path) -> Iterator[_Members]:
                     continue
                 name, shown = PurePosixPath(info.filename), repr(info.filename[:60])
                 if name.is_absolute() or ".." in name.parts or ":" in info.filename:
-                    raise MotionFileError(archive, f"its member {shown} leads out of it")
+                    raise MotionFileError(archive, f"its member {shown} points outside the archive")
                 if name.as_posix() in members:
-                    raise MotionFileError(archive, f"it holds {shown} twice")
+                    raise MotionFileError(archive, f"it has {shown} twice")
                 members[name.as_posix()] = info
             yield members
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, struct.error,
@@ -158,7 +159,7 @@ def _opened(archive: Path) -> Iterator[_Members]:
         if isinstance(error, MotionFileError):
             raise
         words = " ".join(str(error).split())[:150]
-        raise MotionFileError(archive, f"the zip is damaged ({words}): fetch it again") from None
+        raise MotionFileError(archive, f"the zip is damaged ({words}): download it again") from None
 
 
 def _check_directory(archive: Path, file: BinaryIO) -> None:
@@ -169,4 +170,4 @@ def _check_directory(archive: Path, file: BinaryIO) -> None:
     end = tail[at : at + struct.calcsize(_END_FORMAT)]
     size = struct.unpack(_END_FORMAT, end)[5]
     if tail[max(at - 20, 0) : at].startswith(_END_64) or size > LARGEST_DIRECTORY_BYTES:
-        raise MotionFileError(archive, "it lists too many members: unpack it")
+        raise MotionFileError(archive, "too many members: unpack it")

@@ -221,7 +221,7 @@ def companion(horizontal: GroundMotion, vertical: GroundMotion) -> GroundMotion:
         lead_in_samples=(lead_in_samples(horizontal), lead_in_samples(vertical)),
     )
     if reason:
-        raise InputError(f"{vertical.label} cannot go with {horizontal.label}: {reason}")
+        raise InputError(f"{vertical.label} cannot be combined with {horizontal.label}: {reason}")
     return upward(vertical)
 
 

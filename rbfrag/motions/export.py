@@ -36,14 +36,13 @@ def export_motions(
     chosen = (file_format or target.suffix.lstrip(".")).lower()
     if chosen not in FORMATS:
         raise InputError(
-            f"{target.name}: the format {chosen!r} is none of {', '.join(FORMATS)}: end the name "
-            "with .csv or .at2, or give format",
+            f"{target.name}: unsupported format {chosen!r}: use the suffix .csv or .at2, or format",
             fields=("format",),
         )
     if not motions:
-        raise InputError("there is no motion to export: name at least one")
+        raise InputError("no motion to export: give at least one")
     if chosen == "at2" and len(motions) > 1:
-        raise InputError(f"an AT2 file holds one motion, not {len(motions)}: export a CSV")
+        raise InputError(f"an AT2 file has one motion, not {len(motions)}: use .csv")
     lines = peer_at2.write(motions[0]) if chosen == "at2" else rbfrag_csv.write(motions)
     with written_whole(target) as draft, draft.open("w", newline="\n", encoding="utf-8") as file:
         file.writelines(f"{line}\n" for line in lines)

@@ -101,7 +101,7 @@ class GroundMotion:
         if falls.size:
             i = int(falls[0])
             raise InputError(
-                f"node times must not fall: node {i + 1} at {times[i + 1]:g} s follows "
+                f"node times must not decrease: node {i + 1} at {times[i + 1]:g} s follows "
                 f"{times[i]:g} s"
             )
         object.__setattr__(self, "node_time_s", times)
@@ -231,11 +231,11 @@ def _finite_vector(values: ArrayLike, what: str, unit: str) -> FloatArray:
     try:
         vector = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"cannot read the {what}s as numbers: {error}") from None
+        raise InputError(f"the {what}s must be numbers: {error}") from None
     if vector.ndim != 1:
         raise InputError(f"{what}s must be one-dimensional, not of shape {vector.shape}")
     if vector.size == 0:
-        raise InputError(f"there is no {what}: a motion needs at least one")
+        raise InputError(f"no {what}: at least one is required")
     bad = np.flatnonzero(~np.isfinite(vector))
     if bad.size:
         i = int(bad[0])

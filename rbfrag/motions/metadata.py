@@ -144,15 +144,15 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         if others and None in (row.trace_index, others[0].trace_index):
             raise MotionFileError(
                 table,
-                f"{_named(row)} and {_named(others[0])} (line {others[0].line}) are described: "
-                "give one row without trace_index for the whole file, or one with it for each "
-                "trace, from 0",
+                f"{_named(row)} and {_named(others[0])} (line {others[0].line}) are both given: "
+                "use one row without trace_index for the file, or one row with trace_index for "
+                "each trace, from 0",
                 line=line,
             )
         rows.append(row)
         by_file.setdefault(place, []).append(row)
     if header is None:
-        raise MotionFileError(table, "the table is empty: its first row names the columns")
+        raise MotionFileError(table, "the table is empty: give a header")
     by_place = {
         place: tuple(sorted(traces, key=lambda row: row.trace_index or 0))
         for place, traces in by_file.items()
@@ -169,7 +169,7 @@ def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:
                 yield reader.line_num, cells
     except csv.Error as error:
         raise MotionFileError(
-            table, f"this is no CSV: {error}; repair the quotes", line=reader.line_num
+            table, f"not CSV: {error}; repair the quotes", line=reader.line_num
         ) from None
 
 
@@ -186,7 +186,7 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
         )
     for name in COLUMNS:
         if header.count(name) > 1:
-            raise MotionFileError(table, f"the column {name!r} is there twice", line=line)
+            raise MotionFileError(table, f"the column {name!r} occurs twice", line=line)
     for text in header:
         if text in COLUMNS or sum(map(str.isalpha, text)) < _FEWEST_LETTERS:
             continue
@@ -194,8 +194,7 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
             if _edits(text, name) <= _MOST_EDITS:
                 raise MotionFileError(
                     table,
-                    f"{text[:60]}: did you mean {name}? Rename the column: one that is not read "
-                    "must have a name of its own",
+                    f"{text[:60]}: did you mean {name}? Rename the column",
                     line=line,
                 )
     return header
@@ -234,7 +233,9 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
         return value
 
     if not text("file"):
-        raise MotionFileError(table, "the cell 'file' is empty: name the record's file", line=line)
+        raise MotionFileError(
+            table, "the cell 'file' is empty: give the file of the record", line=line
+        )
     index = text("trace_index")
     if index and not (index.isascii() and index.isdigit() and len(index) < 10):
         raise MotionFileError(

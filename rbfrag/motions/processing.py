@@ -93,15 +93,14 @@ def says_corrected(words: str) -> bool | None:
         return None
     if leading.partition(" ")[0] == _SPECTRA:
         raise InputError(
-            f"processing {words[:60]!r}: volume 3 holds spectra, no accelerations; take the record "
-            "of volume 2"
+            f"processing {words[:60]!r}: volume 3 has spectra: use the record of volume 2"
         )
     for phrase, corrected in STATED.items():
         if leading.startswith(phrase) and not leading[len(phrase) :][:1].isalnum():
             return corrected
     raise InputError(
-        f"processing {words[:60]!r} does not tell whether the record is corrected: begin with one "
-        f"of {', '.join(STATED)}; what follows is a remark"
+        f"processing {words[:60]!r} must begin with one of {', '.join(STATED)}; further text is a "
+        "comment"
     )
 
 
@@ -123,8 +122,8 @@ def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str
     by_table, by_caller = says_corrected(stated), says_corrected(confirmed)
     if by_table is not None and by_caller is not None and by_table != by_caller:
         raise InputError(
-            f"the metadata say {stated[:60]!r} of its processing, and processing = "
-            f"{confirmed[:60]!r} is given: correct one of them",
+            f"the metadata have processing {stated[:60]!r}, but processing = {confirmed[:60]!r} "
+            "is given: correct one of them",
             fields=("processing",),
         )
     corrected = by_caller if by_table is None else by_table
@@ -133,8 +132,8 @@ def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str
     if by_caller is None and motion.is_corrected not in (None, corrected):
         format_says = "corrected" if motion.is_corrected else "uncorrected"
         raise InputError(
-            f"by its header or format the record is {format_says}, and the metadata say "
-            f"{stated[:60]!r}: correct the metadata, or say so again by processing",
+            f"by its header or format the record is {format_says}, but the metadata have "
+            f"{stated[:60]!r}: correct the metadata, or confirm it with processing",
             fields=("processing",),
         )
     return not corrected
@@ -161,7 +160,7 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
     if motion.dt_s is None:
         raise InputError(f"{motion.label}: only equally spaced samples can be filtered")
     if motion.processing_applied:
-        raise InputError(f"{motion.label}: the record was processed before; read its file again")
+        raise InputError(f"{motion.label}: the record is already processed: use the original file")
     nyquist_hz = 0.5 / motion.dt_s
     if high_pass.corner_hz >= nyquist_hz:
         raise InputError(

@@ -40,7 +40,7 @@ def _sine_lobe(duration_s: float, dt_s: float) -> tuple[NDArray[np.float64], flo
     duration, dt = _positive("duration", duration_s), _positive("dt", dt_s)
     if not duration / dt <= MOST_SAMPLES:
         raise InputError(
-            f"a lobe of {duration:g} s sampled at {dt:g} s has more than {MOST_SAMPLES} samples: "
+            f"a pulse of {duration:g} s sampled at {dt:g} s has more than {MOST_SAMPLES} samples: "
             "give a longer dt"
         )
     half = max(1, round(0.5 * duration / dt))

@@ -89,7 +89,7 @@ def read_motions(
         path: a file in any of the formats of :data:`READERS`; a member of a zip, as
             ``records.zip/chan001.v2``; or a zip, for the traces of all its records.
         units: unit of acceleration, for text files that do not state it: ``g``, ``m/s2``,
-            ``cm/s2`` or ``mm/s2``. Refused where the file states another, unless the file
+            ``cm/s2`` or ``mm/s2``. Refused where the file has another, unless the file
             contradicts itself and agrees with this.
         dt_s: sampling interval [s], for text files that hold accelerations only; likewise.
         allow_partial: True to read a file whose header states another number of samples than
@@ -164,8 +164,8 @@ def _read_whole(record: RecordFile) -> list[GroundMotion]:
     try:
         if word := cut_number(text):
             raise record.error(
-                f"the file ends within the number {word!r}: it is truncated; export the record "
-                "again, or read what there is with allow_partial",
+                f"the file is truncated within the number {word!r}: export the record again, or "
+                "use allow_partial",
                 line=text.count("\n") + 1,
                 fields=("allow_partial",),
             )
@@ -194,7 +194,7 @@ def _read(record: RecordFile) -> list[GroundMotion]:
     reader = _reader(file, record.text)
     if record.gain is not None and reader is not miniseed:
         raise record.error(
-            f"the file is {reader.FORMAT}, which is not in counts: leave gain out",
+            f"the file is {reader.FORMAT}, which is not in counts: omit gain",
             fields=("gain",),
         )
     try:
@@ -246,9 +246,7 @@ def _reader(file: Path, text: str) -> ModuleType:
         if reader.recognises(head):
             return reader
     formats = ", ".join(reader.FORMAT for reader in READERS)
-    raise UnknownFormatError(
-        file, f"no known format of accelerogram: known are {formats}; convert the record to one"
-    )
+    raise UnknownFormatError(file, f"unknown format; supported are {formats}")
 
 
 def read_motion(
@@ -273,7 +271,9 @@ def read_motion(
     if is_archive(file := Path(name)):
         members = members_of(file)
         listed = ", ".join(str(each.relative_to(file.parent)) for each in members[:5])
-        raise MotionFileError(file, f"the zip holds {len(members)} records: name one, as {listed}")
+        raise MotionFileError(
+            file, f"the zip archive has {len(members)} records: give one, such as {listed}"
+        )
     motions = read_motions(name, units=units, dt_s=dt_s, allow_partial=allow_partial, gain=gain)
     if index is None and len(motions) == 1:
         return motions[0]
@@ -281,9 +281,7 @@ def read_motion(
         return motions[index]
     listed = ", ".join(f"#{motion.trace_index} {motion.component}" for motion in motions)
     trouble = f"holds {len(motions)} traces" if index is None else f"has no trace #{index}"
-    raise MotionFileError(
-        name, f"the file {trouble}: name one of  {listed}  as {name}#0, for example"
-    )
+    raise MotionFileError(name, f"the file {trouble}: give one of  {listed}, for example {name}#0")
 
 
 def as_motion(given: MotionLike, name: str = "motion") -> GroundMotion:

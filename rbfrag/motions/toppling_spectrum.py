@@ -92,7 +92,7 @@ def _positive(p2: ArrayLike) -> FloatArray:
     try:
         sizes = np.asarray(p2, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"cannot read p2 as numbers: {error}") from None
+        raise InputError(f"p2 must be numbers: {error}") from None
     bad = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
     if bad.size:
         which = f" number {int(bad[0]) + 1}" if sizes.ndim else ""

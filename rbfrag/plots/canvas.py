@@ -68,7 +68,7 @@ def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MissingExtraError("Plots need matplotlib", "plot") from None
+        raise MissingExtraError("Plots require matplotlib", "plot") from None
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 

@@ -99,10 +99,7 @@ def plot_sensitivity(
     ratio = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))
     shown = (table.status == "found") & np.isfinite(ratio) & np.isfinite(table.kr_over_pga)
     if not shown.any():
-        raise InputError(
-            "there is no critical value of a motion with a mean period to draw: run  "
-            "rbfrag simulate"
-        )
+        raise InputError("no critical values of motions with a mean period: run  rbfrag simulate")
     x, y = ratio[shown], table.kr_over_pga[shown]
     censored = np.isin(table.status.astype(str), ("below_limit", "no_motion"))
     below = int(censored.sum())
@@ -198,8 +195,8 @@ def plot_vertical(pairs: VerticalPairs, path: canvas.Out) -> canvas.Picture:
     canvas.plot_path(path)
     if not pairs.ln_ratio.size:
         raise InputError(
-            "no critical value is known both with and without vertical motion: simulate "
-            "both, by rbfrag simulate"
+            "no critical values both with and without vertical motion: run  rbfrag simulate  for "
+            "both"
         )
     figure = canvas.new_figure(9.2, 4.6)
     axes, beside = figure.subplots(1, 2, width_ratios=[1.15, 1.0])

@@ -95,20 +95,19 @@ def plot_curve(
     varied = model.term.inputs[0] if over is None else over
     if varied not in model.term.inputs or varied not in AXIS:
         raise InputError(
-            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: no curve of it runs "
-            f"over {varied}"
+            f"model {model.name!r} uses {' and '.join(model.term.inputs)}, not {varied}"
         )
     others = [name for name in model.term.inputs if name != varied]
     missing = [name for name in others if name not in (fixed or {})]
     if missing:
         raise InputError(
-            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: give "
+            f"model {model.name!r} uses {' and '.join(model.term.inputs)}: give "
             f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in others}
     if len(beside or {}) > MOST_BESIDE:
         raise InputError(
-            f"{len(beside or {})} fragilities to compare with: a figure shows at most {MOST_BESIDE}"
+            f"{len(beside or {})} fragility functions for comparison: the maximum is {MOST_BESIDE}"
         )
     lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in beside or {}), default=0)
     figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(beside or {}) / 2))

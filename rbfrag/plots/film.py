@@ -67,7 +67,7 @@ def film(
         raise InputError(f"exaggerate = {exaggerate:g}: give a factor above 0; 1 is true scale")
     history = response.history
     if history is None:
-        raise InputError("this response holds no history: ask for it with history=True")
+        raise InputError("this response has no history: use history=True")
     figure = canvas.new_figure(width_in=6.4, height_in=6.0)
     from matplotlib.animation import FuncAnimation
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -107,7 +107,7 @@ def film(
     except subprocess.CalledProcessError as error:
         raise InputError(
             f"film {target}: ffmpeg failed (exit status {error.returncode}), perhaps because it "
-            "was built without H.264; name the film .gif or .html, which do without ffmpeg"
+            "was built without H.264; use .gif or .html, which do not require ffmpeg"
         ) from error
     return target
 
@@ -117,9 +117,9 @@ def film_path(path: str | os.PathLike[str]) -> Path:
     target = output_path(path, SUFFIXES, "film")
     if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(
-            f"film {target}: an .mp4 needs the program ffmpeg, which is not on the PATH: install "
-            "it (apt install ffmpeg, brew install ffmpeg, conda install ffmpeg), or name the film "
-            ".gif or .html, which do without it"
+            f"film {target}: an .mp4 requires the program ffmpeg, which is not on the PATH: "
+            "install it (apt install ffmpeg, brew install ffmpeg, conda install ffmpeg), or use "
+            ".gif or .html, which do not require it"
         )
     return target
 

@@ -60,8 +60,8 @@ def plot_fit(
     term, block = model.term, model.method.block
     if block.names != TOPPLING_BLOCK.names:
         raise InputError(
-            f"model {model.name} is of blocks known by {' and '.join(block.names)}: the figure is "
-            f"that of blocks known by {' and '.join(TOPPLING_BLOCK.names)}"
+            f"model {model.name} is for blocks with {' and '.join(block.names)}: the figure is "
+            f"for blocks with {' and '.join(TOPPLING_BLOCK.names)}"
         )
     if table.status.size and (table.status == "not_searched").all():
         raise InputError(
@@ -81,7 +81,7 @@ def plot_fit(
     shown = (table.status == "found") & np.isfinite(x) & np.isfinite(table.y_m_s)
     if not shown.any():
         raise InputError(
-            f"there is no critical value with the term {term.name} to draw: run  rbfrag simulate"
+            f"no critical values with the term {term.name} to draw: run  rbfrag simulate"
         )
     fitted = model.method.fitted_variance if alone else None
     binned = fitted is not None

@@ -53,8 +53,8 @@ def plot_kind_chart(
     for name, value in stated.items():
         if name not in held and name not in others:
             raise InputError(
-                f"{name} = {value:g} changes nothing: model {model.name!r} does not read it, or "
-                "draws it; leave it out",
+                f"{name} = {value:g} has no effect: model {model.name!r} does not use it, or it "
+                "is an axis; omit it",
                 fields=(name,),
             )
         if not 0.0 < value < math.inf:
@@ -129,7 +129,7 @@ def _in_proportion(
         of = middle(name) / math.prod(domain["pgv_m_s"])
         return of * pgv**2, f"Arias/PGV² = {of:.3g} s/m"
     raise InputError(
-        f"model {model.name!r} reads {' and '.join(model.term.inputs)}, and {name} is not in "
-        f"proportion to {first}: state it, or draw another model",
+        f"model {model.name!r} uses {' and '.join(model.term.inputs)}, and {name} is not "
+        f"proportional to {first}: give it, or choose another model",
         fields=(name,),
     )

@@ -38,7 +38,7 @@ def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     if answer.has_losses:
         panels.append(("loss", answer.loss_exceedance))
     if not any(answer.exceedance.values()):
-        raise InputError("there is no curve to draw: no block fails in a sample, or none was drawn")
+        raise InputError("no curve to draw: no failures in any sample, or no samples")
     figure = canvas.new_figure(5.2 * len(panels), 4.4)
     all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
     scenario = answer.events.is_scenario

@@ -101,8 +101,8 @@ def held_measures(
     name = model.term.name
     if name not in (*ONE_NUMBER_TERMS, *MORE_TERMS):
         raise InputError(
-            f"model {model.name!r} reads {' and '.join(model.term.inputs)}, and one intensity "
-            "cannot stand for them: this figure draws models of "
+            f"model {model.name!r} uses {' and '.join(model.term.inputs)}, not a single "
+            "intensity: this figure is for models of "
             f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
         )
     more, of_size = name in MORE_TERMS, depends_on_size(model)
@@ -112,8 +112,8 @@ def held_measures(
             continue
         if not read[held]:
             raise InputError(
-                f"{held} = {value:g} changes nothing: the lines of model {model.name!r} do not "
-                "depend on it; leave it out",
+                f"{held} = {value:g} has no effect: the lines of model {model.name!r} do not "
+                "depend on it; omit it",
                 fields=(held,),
             )
         if not 0.0 < value < math.inf:
@@ -157,7 +157,7 @@ def _middle(model: FragilityModel, name: str) -> float:
         low, high = model.row.domain[name]
     except KeyError:
         raise InputError(
-            f"model {model.name!r} does not say what range of {name} it was fitted to: fit it again"
+            f"model {model.name!r} has no fitted range of {name}: fit it again"
         ) from None
     return math.sqrt(float(low) * float(high))
 

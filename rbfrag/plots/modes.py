@@ -173,8 +173,8 @@ def _judged(
     ending = strength.keys() - {"density_kg_m3"}
     if ending and "s1_m" not in on_base:
         raise InputError(
-            f"{min(ending)} needs s1_m, the spacing of the base fractures of the blocks of the "
-            "chart: its effect is that of a stress over the weight", fields=("s1_m",),
+            f"{min(ending)} requires s1_m, the spacing of the base fractures: its effect depends "
+            "on the weight of the block", fields=("s1_m",),
         )  # fmt: skip
     if "water_m" in strength:
         strength["water_m"] = water_held_m(

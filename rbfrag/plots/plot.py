@@ -141,7 +141,7 @@ def chart(
         )
     if displacement_m is not None:
         raise InputError(
-            f"displacement_m is of slides: model {chosen.name!r} does not read it",
+            f"displacement_m is for sliding: model {chosen.name!r} does not use it",
             fields=("displacement_m",),
         )
     held = held_measures(chosen, p2=p2, pga_g=pga_g, tm_s=tm_s)
@@ -225,7 +225,7 @@ def curve(
     (group,) = blocks.groups
     varied = None if over is None else VARIED.get(over)
     if over is not None and varied is None:
-        raise InputError(f"over = {over}: a curve runs over {', '.join(VARIED)}")
+        raise InputError(f"over = {over}: use {', '.join(VARIED)}")
     if "model" in answering:
         chosen = model_for(answering, (*group.numbers, *MEASURES), group.kind)
         varied = varied or chosen.term.inputs[0]
@@ -233,10 +233,7 @@ def curve(
         varied = varied or "pgv_m_s"
         chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
     if varied in held:
-        raise InputError(
-            f"{varied} is what the curve runs over: leave its value out, or say what else it runs "
-            "over"
-        )
+        raise InputError(f"{varied} is the axis of the curve: omit its value, or give another axis")
     others = {} if beside is None else beside(varied)
     picture = plot_curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,

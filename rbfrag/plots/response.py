@@ -50,7 +50,7 @@ def plot_response(
     """
     history = response.history
     if history is None:
-        raise InputError("this response holds no history: ask for it with history=True")
+        raise InputError("this response has no history: use history=True")
     assert response.critical_angle_deg is not None
     theta_c = math.radians(response.critical_angle_deg)
     ratio = history.theta_rad / theta_c
@@ -152,7 +152,7 @@ def plot_motion(
     """
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
-        raise InputError("this response holds no displacements in time: ask for its history")
+        raise InputError("this response holds no displacements in time: use history=True")
     known = np.isfinite(history.strength_g)
     label = f"strength of the block{'' if known.all() else ', while its contacts hold'}"
     figure, upper, lower = _panels(
@@ -228,7 +228,7 @@ def plot_rocking(
     """
     history = response.history
     if history is None or history.impact_s is None:
-        raise InputError("this response holds no impacts in time: ask for its history")
+        raise InputError("this response holds no impacts in time: use history=True")
     assert response.critical_angle_deg is not None
     assert response.critical_backward_deg is not None
     toe, heel = map(math.radians, (response.critical_angle_deg, response.critical_backward_deg))

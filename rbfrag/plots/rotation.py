@@ -136,7 +136,7 @@ def _curves(
             f"that of {' or '.join(map(words_of_mode, BY_MODE))}, against a back plane"
         )
     if not 1 <= len(shares) <= len(_LINES):
-        raise InputError(f"{len(shares)} shares of the rotation: give 1 to {len(_LINES)}")
+        raise InputError(f"{len(shares)} fractions of the rotation: give 1 to {len(_LINES)}")
     law = BY_MODE[judged.mode]
     curves = []
     for share in shares:

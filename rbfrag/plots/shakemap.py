@@ -45,7 +45,7 @@ def plot_shakemap(
     """
     canvas.plot_path(path)
     if not np.isfinite(probability).any():
-        raise InputError("there is no probability to draw")
+        raise InputError("no probability to draw")
     if shape is None:
         lon, lat, probability = (each[np.isfinite(probability)] for each in (lon, lat, probability))
     west, east, south, north = _frame(lon, lat, probability, epicentre)

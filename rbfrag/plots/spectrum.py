@@ -80,7 +80,7 @@ def plot_spectrum(
         axes.axhline(motion.pgv_m_s, color=colour, lw=0.9, ls=":")
         highest = max(highest, motion.pgv_m_s)
     if highest <= 0.0:
-        raise InputError("these motions topple no block of any size: there is nothing to draw")
+        raise InputError("no block topples under these motions: nothing to draw")
     canvas.logarithmic(axes, (1.0, 3.0), (1.0, 2.0, 5.0))
     axes.set_xlim(low, high)
     drawn = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])

@@ -135,7 +135,7 @@ def _refuse_unread(blocks: Blocks, names: Collection[str]) -> None:
     if unread and blocks.groups:
         kinds = " or ".join(dict.fromkeys(str(group.kind) for group in blocks.groups))
         raise InputError(
-            f"{unread[0]} does not go with kind {kinds}: leave it out", fields=(unread[0],)
+            f"{unread[0]} cannot be combined with kind {kinds}: omit it", fields=(unread[0],)
         )
 
 
@@ -189,8 +189,8 @@ def _of_draws(
         first = next((f": {each.texts()[0]}" for each in blocks.refused), "")
         kinds = " and ".join(str(group.kind) for group in whole) or "none"
         raise InputError(
-            f"the draws of one block are of one kind, and these are of {kinds}"
-            + (f", {at_rest} fall at rest" if at_rest else "")
+            f"all draws of a block must have one kind, not {kinds}"
+            + (f", {at_rest} are unstable at rest" if at_rest else "")
             + first
         )
     (group,) = whole

@@ -175,8 +175,7 @@ def _listed_numbers(value: Any) -> list[float]:
 
 
 FREE_NEEDS_NONE = (
-    "; a rectangle that stands free needs none to rock and overturn: predict and respond answer "
-    "with kind rocking"
+    "; for a free-standing rectangular block no friction angle is required with kind rocking"
 )
 
 
@@ -233,7 +232,10 @@ def shape_of(given: Mapping[str, Any]) -> Shape | None:
     check_lengths(sides, listener)
     block = getattr(Block, SHAPES[names])(*sides.values()) if names else given["block"]
     if not isinstance(block, Block):
-        raise InputError(f"block = {block!r:.60}: make one with Block.rectangle or its siblings")
+        raise InputError(
+            f"block = {block!r:.60}: use Block.rectangle, .from_angles, .from_fractures or "
+            ".from_polygon"
+        )
     is_rectangle = block.is_parallelogram and block.tan_alpha1 == -block.tan_alpha3
     if is_rectangle:
         planes.setdefault("beta_deg", 0.0)
@@ -277,7 +279,7 @@ def on_planes(given: Mapping[str, Any]) -> Shape:
     """
     shape = shape_of(given)
     if shape is None:
-        raise InputError(f"no block: describe it by {WAYS}", fields=SIDES_AND_PLANES)
+        raise InputError(f"no block is given: give {WAYS}", fields=SIDES_AND_PLANES)
     return shape.known()
 
 
@@ -289,8 +291,8 @@ def without_kv(given: Mapping[str, Any]) -> dict[str, Any]:
     """
     if given.get("kv", 0.0) != 0.0:
         raise InputError(
-            "kv does not belong in a block that is to be shaken: the vertical acceleration comes "
-            "with the motion; leave it out",
+            "kv is not supported for a block subjected to shaking: the motion has the vertical "
+            "acceleration; omit kv",
             fields=("kv",),
         )
     return {name: value for name, value in given.items() if name != "kv"}
@@ -375,8 +377,8 @@ def one_block(
 
     if numbers := [name for name in NUMBERS if name in given]:
         raise InputError(
-            f"{numbers[0]} does not go with {(shape_among(given) or ('a shape',))[0]}: a block is "
-            "described once",
+            f"{numbers[0]} cannot be combined with {(shape_among(given) or ('a geometry',))[0]}: "
+            "give one description of the block",
             fields=(numbers[0], *SIDES_AND_PLANES),
         )
     others = {name: value for name, value in given.items() if name not in IS_SHAPE}

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 BESIDE_A_MOTION = (
-    "the motion is the shaking at its site: omit rjb_km, vs30_m_s, amplification, mechanism, gmm "
+    "the motion is the shaking at the site: omit rjb_km, vs30_m_s, amplification, mechanism, gmm "
     "and component"
 )
 

@@ -39,7 +39,7 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
         each for each in csv_rows(source_text(path, _WHAT), path) if any(map(str.strip, each[1]))
     ]
     if not rows:
-        raise InputError(f"{path} is empty: name columns such as pgv_m_s and pgv_sigma")
+        raise InputError(f"{path} is empty: give columns such as pgv_m_s and pgv_sigma")
     (_, header), *rest = rows
     wanted = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
     table = {}
@@ -58,11 +58,11 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
             values.append(column.factor * value)
         table[name] = np.array(values)
     if not rest or SIGMAS.keys().isdisjoint(table):
-        raise InputError(f"{path} states no median: name columns such as pgv_m_s and pgv_sigma")
+        raise InputError(f"{path} has no median: add columns such as pgv_m_s and pgv_sigma")
     if "rjb_km" not in table and len(rest) > 1:
-        raise InputError(f"{path} has several rows and no column rjb_km: name their distances")
+        raise InputError(f"{path} has several rows: add the column rjb_km")
     if "rjb_km" in table and (np.diff(np.maximum(table["rjb_km"], _NEAREST_KM)) <= 0.0).any():
-        raise InputError(f"{path}: rjb_km must rise from row to row")
+        raise InputError(f"{path}: rjb_km must increase from row to row")
     return table
 
 
@@ -82,13 +82,14 @@ def of_table(path: str | PathLike[str], rjb_km: Any, names: Collection[str]) -> 
     if distances.size > 1 and rjb_km is None:
         raise InputError(f"{path} has several distances: give rjb_km", fields=("rjb_km",))
     if not distances.size and rjb_km is not None:
-        raise InputError(f"{path} has no column rjb_km: leave the distance out", fields=("rjb_km",))
+        raise InputError(f"{path} has no column rjb_km: omit the distance", fields=("rjb_km",))
     at = np.asarray(distances[0] if rjb_km is None and distances.size else rjb_km, np.float64)
     if distances.size:
         low, high = distances[0] * (1.0 - 1e-9), distances[-1] * (1.0 + 1e-9)
         if ((at < low) | (at > high)).any():
             raise InputError(
-                f"rjb_km is outside of {path}, which has {distances[0]:g} to {distances[-1]:g} km",
+                f"rjb_km is outside the range of {path}, which has {distances[0]:g} to "
+                f"{distances[-1]:g} km",
                 fields=("rjb_km",),
             )
 
@@ -105,7 +106,7 @@ def of_table(path: str | PathLike[str], rjb_km: Any, names: Collection[str]) -> 
             continue
         for column in (name, SIGMAS[name]):
             if column not in table:
-                raise InputError(f"{path} has no column {column}, which the model reads")
+                raise InputError(f"{path} has no column {column}, which the model uses")
         sigma, tau = between(table[SIGMAS[name]]), 0.0
         if name == "pgv_m_s" and "pgv_tau" in table:
             tau = between(table["pgv_tau"])

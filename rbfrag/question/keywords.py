@@ -36,7 +36,7 @@ def parts_of(
         keywords = by_field_name(keywords, known)
     first = dict(zip(("p2", "kr"), numbers, strict=False))
     if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
-        raise InputError("p2 and kr come first, or by their names: give each once")
+        raise InputError("p2 and kr are given twice, by position and by name: give each once")
     whole = {name: value for name, value in {**first, **keywords}.items() if value is not None}
     return [{n: v for n, v in whole.items() if n in part} for part in parts]
 

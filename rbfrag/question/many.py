@@ -233,7 +233,7 @@ class _Sorted:
         for (kind, mode, code, backed), places in whys.items():
             here = np.array(places)
             if kind and kind not in KINDS:
-                text = f"kind = {kind[:40]!r} is none of {', '.join(KINDS)}"
+                text = f"kind = {kind[:40]!r} is unknown; use {', '.join(KINDS)}"
                 _Some(self, here).refuse(True, "{why}", why=text)
                 continue
             if kind:
@@ -247,8 +247,7 @@ class _Sorted:
             if mode and (own is None or own.mode != mode):
                 model = "any" if own is None else f"the {own.kind}"
                 text = (
-                    f"the block's mode is {words_of_mode(mode[:40])}: {model} model says nothing "
-                    "about it"
+                    f"the block's mode is {words_of_mode(mode[:40])}: {model} model does not apply"
                 )
                 _Some(self, here).refuse(True, "{why}", why=text)
 
@@ -274,7 +273,8 @@ class _Sorted:
         shape = shape_among({*self.given, *without_back})
         if shape is not None and (numbers := [name for name in NUMBERS if name in self.given]):
             raise InputError(
-                f"{numbers[0]} does not go with {shape[0]}: a block is described once",
+                f"{numbers[0]} cannot be combined with {shape[0]}: give one description of the "
+                "block",
                 fields=(numbers[0], *shape),
             )
         return [] if shape is None else [shape]

@@ -115,7 +115,7 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     if kr is not None:
         given["kr"] = kr
     if not question.keys().isdisjoint(given):
-        raise InputError("p2 and kr come first, or by their names: give each once")
+        raise InputError("p2 and kr are given twice, by position and by name: give each once")
     options: dict[str, Any] = {}
     kind, polarity, motion = None, "both", None
     for name, value in question.items():
@@ -226,7 +226,7 @@ def _keywords_in_words() -> str:
     for name in QUESTION:
         help = QUANTITIES[name].help("``{}``".format)
         if INPUTS[name].type is bool:
-            help = f"False where {help[:1].lower()}{help[1:]}"
+            help = f"False for {help[:1].lower()}{help[1:]}"
         text = f"- ``{name}``: {help}"
         lines += wrap(text, 92, initial_indent="    ", subsequent_indent="      ")
     return "\n".join(lines)
@@ -278,7 +278,7 @@ def unknown_field(name: str, known: Collection[str]) -> UnknownFieldError:
     match = field_of(name)
     near = [match.field] if match else get_close_matches(name, known, 1)
     near = [field for field in near if field in known]
-    hint = f"; did you mean {near[0]!r}?" if near else "; help(rbfrag.predict) lists them"
+    hint = f"; did you mean {near[0]!r}?" if near else "; see help(rbfrag.predict)"
     return UnknownFieldError(f"unknown field {name[:60]!r}{hint}")
 
 
@@ -342,7 +342,7 @@ def _answer_motion(
     for name in ("mechanism", "gmm", "component"):
         if options.pop(name, None) is not None:
             raise InputError(
-                f"{name} does not go with a motion, which is the shaking itself: omit it",
+                f"{name} cannot be combined with a motion: omit it",
                 fields=(name,),
             )
     defaults: dict[str, Any] = {"rotation_deg": None, "model": None, "level": 0.95, "db": None}
@@ -441,7 +441,7 @@ def ask(
             remarks = (*blocks.remarks, *unused_measures(chosen, own))
             return with_remarks(answer, remarks, _assumed(component, answer))
     if "block" in given:
-        raise InputError("block is one block: give the fields of many as arrays")
+        raise InputError("block must be a single block: give several blocks as arrays of fields")
     # Kept apart so that a single block does not load numpy.
     from rbfrag.question.answers import ask_many
 

@@ -79,7 +79,8 @@ def shaken(
     if source != Source() or not question.keys().isdisjoint(SITE):
         if component is not None:
             raise InputError(
-                "component does not go with a scenario, whose ground-motion model predicts RotD50",
+                "component cannot be combined with a scenario, whose ground-motion model "
+                "predicts RotD50",
                 fields=("component",),
             )
         names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
@@ -125,8 +126,8 @@ def scenario(
     stated = [n for n in given if (n in INTENSITY or n in _SIGMAS.values()) and n != "magnitude"]
     if stated:
         raise InputError(
-            f"{stated[0]} does not go with a scenario, which says how strong the shaking is: leave "
-            "one of them out",
+            f"{stated[0]} cannot be combined with a scenario (magnitude and rjb_km): omit one of "
+            "them",
             fields=(stated[0],),
         )
     if source.gmm is not None:
@@ -268,9 +269,9 @@ def _checked(name: str, value: Any, mechanism: Any, ns: Numbers) -> Any:
         outside, worst = bool(out.any()), np.atleast_1d(value)[int(np.argmax(out))]
     if outside:
         raise InputError(
-            f"{name} = {worst:g} is outside of what the ground-motion model (Boore et al. 2014) is "
-            f"for, {low:g} to {high:g}{' of normal faults' if high == _MOST_OF_NORMAL else ''}: "
-            "give medians and sigmas of another model (gmm)",
+            f"{name} = {worst:g} is outside the range of the ground-motion model (Boore et al. "
+            f"2014), {low:g} to {high:g}{' of normal faults' if high == _MOST_OF_NORMAL else ''}: "
+            "use another model (gmm)",
             fields=(name, "gmm"),
         )
     return value

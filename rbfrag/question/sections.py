@@ -35,21 +35,23 @@ def in_section(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Diagnost
     """
     own = {name: value for name, value in given.items() if name not in SPACE}
     if "block" not in own and not any(name in own for names in SHAPES for name in names):
-        raise InputError(f"planes in space go with the shape of a block, by {WAYS}", fields=SPACE)
+        raise InputError(
+            f"base, back and face require the geometry of a block: give {WAYS}", fields=SPACE
+        )
     for name in ("base", "face"):
         if name not in given:
-            raise InputError(f"{name} is missing: planes in space are base and face", fields=SPACE)
+            raise InputError(f"{name} is missing: give base and face together", fields=SPACE)
     for plane, angle in ANGLES.items():
         if plane in given and angle in own:
             raise InputError(
-                f"{angle} does not go with {plane}: both say how the plane dips",
+                f"{angle} cannot be combined with {plane}: both give the dip of the plane",
                 fields=(angle, plane),
             )
     spaced = any(name in own for name in _SPACINGS)
     if spaced != ("back" in given):
         raise InputError(
-            "back, s1_m and s2_m go together with base and face: give all, or a shape of other "
-            "sides without back",
+            "back requires base, face, s1_m and s2_m: give all of them, or another geometry "
+            "without back",
             fields=("back", *_SPACINGS),
         )
     face, base = plane_of(given["face"], "face"), plane_of(given["base"], "base")

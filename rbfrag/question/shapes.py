@@ -61,11 +61,10 @@ DRAINED_NOTE = Diagnostic(IS_DRAINED, "drained")
 COHESION_NOTE = Diagnostic(NO_EFFECT_OF_COHESION, "cohesion_without_effect")
 
 DRAINS_NOTHING = (
-    "drainage goes with water_m, the height of the water in the back fracture: give both, or "
-    "neither"
+    "drainage requires water_m, the height of the water in the back fracture: give both or neither"
 )
 
-FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
+FRICTION_MISSING = "phi_deg is missing: the failure mode depends on dip and friction"
 
 UNSTABLE_AT_REST = (
     "the block is unstable at rest in {mode} (yield {k:.4g} g): it fails without an earthquake"
@@ -81,38 +80,36 @@ LEANS_AT_REST = (
     "angle of its heel is {alpha1:.4g} deg: it fails without an earthquake"
 )
 
-LOCKED_AT_REST = "the block is locked in {mode}: no earthquake decides about it"
+LOCKED_AT_REST = "the block is locked in {mode}: it cannot fail in this mode"
 
 NO_MODEL = "there is no fragility model of kind {kind}"
 
-NO_MODEL_OF_MODE = "its mode is {mode} (yield {k:.4g} g), of which there is no fragility model"
+NO_MODEL_OF_MODE = "there is no fragility model for its failure mode, {mode} (yield {k:.4g} g)"
 
 OTHER_MODE = (
-    "its mode is {mode} (yield {k:.4g} g), and the {kind} model says nothing about it{instead}"
+    "the {kind} model does not apply: the failure mode is {mode} (yield {k:.4g} g){instead}"
 )
 
-SLIDES = (
-    "the block slides (yield {k:.2g} g): state displacement_m, the displacement that is too far"
-)
+SLIDES = "the block slides (yield {k:.2g} g): give displacement_m, the displacement limit"
 
 COHESIVE = (
-    "cohesion_pa does not go with {kind}: the first motion breaks a bond, which the model does not "
-    f"describe: {STATE_RESIDUAL}"
+    "cohesion_pa cannot be combined with {kind}: cohesion is lost at the first slip, which the "
+    f"model does not describe: {STATE_RESIDUAL}"
 )
 
 NO_UNIQUE_MOTION = (
-    "rigid bodies of this shape and friction have no unique motion: when the block starts is "
-    "known, and not how it moves"
+    "the motion of a rigid block with this geometry and friction is not unique: only its yield "
+    "acceleration is defined"
 )
 
 STEEP = (
     "a block rocks about a corner whose critical angle is below 90 degrees: alpha3 - beta and "
-    "beta - alpha1 are to be less"
+    "beta - alpha1 must be smaller"
 )
 
 TAKEN_TO_TOPPLE = Diagnostic(
-    "no friction angle is given: the rectangle is assumed to topple, backed by a slope; with phi "
-    "its mode is checked",
+    "no friction angle is given: the rectangle is assumed to topple, backed by a rock face; with "
+    "phi the failure mode is checked",
     "friction_not_given",
 )
 
@@ -132,9 +129,9 @@ _WEAKER = (
 _NOT_SLIDING = "displacement_m is ignored: the block is of kind {kind}"
 
 _INSTEAD = {
-    "slide": "; with displacement_m, kind sliding tells how likely it slides so many metres",
-    "slump": "; kind slumping tells how likely it slumps",
-    "confined_topple": "; kind confined_toppling tells how likely it falls",
+    "slide": "; use kind sliding with displacement_m",
+    "slump": "; use kind slumping",
+    "confined_topple": "; use kind confined_toppling",
 }
 
 _RADIANS = "{name} = {{value:g}}° is unusually small: is it in radians? Angles are in degrees"
@@ -212,26 +209,27 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
         # of a file or an outline the angle of the back plane may be stated
         if others := [name for names in begun for name in names if name in given]:
             raise InputError(
-                f"{others[0]} does not go with block: a block is described once",
+                f"{others[0]} cannot be combined with block: give one description of the block",
                 fields=(others[0],),
             )
         return ()
     if not begun:
         if planes := [name for name in PLANES_OF_A_SHAPE if name in given]:
             raise InputError(
-                f"{planes[0]} goes with the shape of a block, by {WAYS}", fields=SIDES_AND_PLANES
+                f"{planes[0]} requires the geometry of a block: give {WAYS}",
+                fields=SIDES_AND_PLANES,
             )
         return None
     first = begun[0]
     if len(begun) > 1:
         one, other = (next(name for name in names if name in given) for names in begun[:2])
         raise InputError(
-            f"{other} does not go with {one}: a block is described once, by {WAYS}",
+            f"{other} cannot be combined with {one}: give one description of the block, {WAYS}",
             fields=SIDES_AND_PLANES,
         )
     if missing := [name for name in first if name not in given]:
         raise InputError(
-            f"{missing[0]} is missing: {', '.join(first)} together are the shape of a block",
+            f"{missing[0]} is missing: {', '.join(first)} together are the geometry of a block",
             fields=first,
         )
     return first
@@ -465,8 +463,8 @@ def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:
         trigonometry = np
     elif slumps and body.lowest_on_back != body.heel:
         raise InputError(
-            "slumping in time is known for blocks whose heel lies on the back plane: the corner at "
-            "the heel of this outline is missing"
+            "slumping in time requires a block whose heel lies on the back plane: this outline "
+            "has no corner at the heel"
         )
     elif not body.is_parallelogram:  # its centroid does not lie between heel and toe
         from rbfrag.solver.mechanism import shaken_mechanism

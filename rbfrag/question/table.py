@@ -334,8 +334,8 @@ class Header(NamedTuple):
         for text, multiplier in self.unused.items():
             if multiplier in MULTIPLIERS:
                 raise InputError(
-                    f"{source}: the column {text!r} is not used by this answer: take it out, or "
-                    f"pass ignore_columns {text!r}",
+                    f"{source}: the column {text!r} is not used by this answer: remove it, or use "
+                    f"ignore_columns {text!r}",
                     fields=("ignore_columns",),
                 )
         for text in self.unknown:
@@ -344,9 +344,8 @@ class Header(NamedTuple):
                 continue
             what = "back fracture" if field == "back_fracture" else QUANTITIES[field].noun
             raise InputError(
-                f"{source}: the column {text[:60]!r} is not understood and may be the "
-                f"{what}: call it {column_of(field)!r}, or pass "
-                f"ignore_columns {text[:60]!r}",
+                f"{source}: the column {text[:60]!r} is unknown; for the {what} use "
+                f"{column_of(field)!r}, else use ignore_columns {text[:60]!r}",
                 fields=("ignore_columns",),
             )
 
@@ -385,7 +384,7 @@ def columns_in(
     for text in ignore_columns:
         if text not in header:
             have = ", ".join(header)
-            raise InputError(f"{source}: there is no column {text!r} to ignore; there are {have}")
+            raise InputError(f"{source}: unknown column {text!r} to ignore; the columns are {have}")
     columns: dict[str, Column] = {}
     unknown, warnings = [], []
     unused: dict[str, str] = {}
@@ -414,11 +413,11 @@ def columns_in(
         if name in columns:
             other = columns[name].header
             twice = (
-                f"the column {text} is there twice"
+                f"the column {text} occurs twice"
                 if text == other
                 else f"the columns {other} and {text} are both the {field.noun}"
             )
-            raise InputError(f"{source}: {twice}: leave one of them out")
+            raise InputError(f"{source}: {twice}: remove one of them")
         factor = 1.0 if unit is None else unit_factor(field.unit, unit)
         if factor is None and name in ("loss", "weight"):
             factor = 1.0  # losses are in any currency, weights of anything
@@ -426,7 +425,7 @@ def columns_in(
             units = " or ".join(word or "no unit" for word in FACTORS.get(field.unit, ("",)))
             raise InputError(
                 f"{source}: the column {text} is in {unit!r}, and the {field.noun} is expected in "
-                f"{units}: convert it, or name another unit"
+                f"{units}: convert it, or change the unit"
             )
         if factor != 1.0:
             warnings.append(

@@ -77,8 +77,8 @@ class Distribution:
         name = keys.pop("distribution", None)
         if not isinstance(name, str) or name not in LAWS:
             if name is None:
-                raise InputError(f"the key distribution is missing: name one of {', '.join(LAWS)}")
-            raise InputError(f"distribution = {name!r} is not known: use one of {', '.join(LAWS)}")
+                raise InputError(f"the key distribution is missing: use one of {', '.join(LAWS)}")
+            raise InputError(f"distribution = {name!r} is unknown: use one of {', '.join(LAWS)}")
         law: Law = name
         if law == "von_mises" and not angle:
             raise InputError(
@@ -89,7 +89,7 @@ class Distribution:
         for key in LAWS[law]:
             if key not in keys:
                 raise InputError(
-                    f"the key {key} is missing: a {law} distribution needs {_and(LAWS[law])}"
+                    f"the key {key} is missing: a {law} distribution requires {_and(LAWS[law])}"
                 )
         for key in keys:
             if key not in (*LAWS[law], *ends):
@@ -166,8 +166,7 @@ class Distribution:
         centre, spread = LAWS[self.law]
         if not self.scale > 0.0:
             raise InputError(
-                f"{spread} = {self.scale:g} is not above zero: for a variable that does not "
-                "scatter give a plain number"
+                f"{spread} = {self.scale:g} is not above zero: for a constant give a number"
             )
         if self.law == "lognormal" and self.location <= 0.0:
             raise InputError(f"median = {self.location:g} is not above zero")

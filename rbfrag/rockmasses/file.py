@@ -68,7 +68,7 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
     source = Path(path)
     suffix = source.suffix.lower()
     if suffix not in (".toml", ".csv"):
-        raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
+        raise InputError(f"{source}: unsupported rock mass file: use .toml or .csv, not {suffix!r}")
     text = source_text(source, "a rock mass", _LARGEST_BYTES)
     try:
         described = _from_csv(text) if suffix == ".csv" else _flat(toml_document(text))
@@ -141,7 +141,7 @@ def _from_csv(text: str) -> dict[str, object]:
         keys = {name: cell for name, cell in zip(header, row, strict=False) if cell}
         variable = keys.pop("variable", "")
         if variable in description:
-            raise InputError(f"line {line}: {variable} is stated twice")
+            raise InputError(f"line {line}: {variable} is given twice")
         description[variable] = _row(keys, variable, line)
     return description
 
@@ -173,7 +173,7 @@ def _row(keys: dict[str, str], variable: str, line: int) -> object:
             numbers[name] = _number(text, where)
     if law is None:
         if set(numbers) != {"value"}:
-            raise InputError(f"line {line}: {variable}: without a distribution only a value counts")
+            raise InputError(f"line {line}: {variable}: without a distribution give value only")
         return numbers["value"]
     return {"distribution": law, **numbers}
 

@@ -163,7 +163,7 @@ class RockMass:
         for key in description:
             if key not in VARIABLES and key not in _SETTINGS:
                 known = ", ".join((*VARIABLES, *_SETTINGS))
-                raise InputError(f"unknown key {key}: a rock mass knows {known}")
+                raise InputError(f"unknown key {key}: the keys of a rock mass are {known}")
         variables: dict[str, Distribution] = {}
         for key, variable in VARIABLES.items():
             if key in description:
@@ -179,7 +179,7 @@ class RockMass:
             remarks = (*remarks, ASSUMED_DENSITY)
         drainage = description.get(DRAINAGE)
         if drainage is not None and _WATER not in variables:
-            raise InputError(f"{DRAINAGE} goes with {_WATER}, the water that drains or does not")
+            raise InputError(f"{DRAINAGE} requires {_WATER}")
         drains = is_drained(drainage)
         refuse_half(*(variables.get(key) for key in _ROUGHNESS))
         back_fracture = description.get("block.back_fracture", True)
@@ -403,8 +403,8 @@ class Realisations:
         """Refuse a rock mass that states a vertical acceleration, which comes with a motion."""
         if np.any(self.kv != 0.0):
             raise InputError(
-                "block.kv does not belong in a rock mass that is to be shaken: the vertical "
-                "acceleration comes with the motion; leave the key out"
+                "block.kv is not supported with a motion, which has the vertical acceleration: "
+                "omit the key"
             )
 
     @property

@@ -66,7 +66,7 @@ def orientation_set(planes: Sequence[Plane]) -> OrientationSet:
         InputError: fewer than three planes, or all alike.
     """
     if len(planes) < 3:
-        raise InputError(f"a set of {len(planes)} planes has no scatter: measure three or more")
+        raise InputError(f"a set of {len(planes)} planes has no dispersion: give three or more")
     poles: FloatArray = np.array([plane.pole for plane in planes])
     axis = np.linalg.eigh(poles.T @ poles)[1][:, -1]
     poles[poles @ axis < 0.0] *= -1.0
@@ -74,7 +74,7 @@ def orientation_set(planes: Sequence[Plane]) -> OrientationSet:
     total = -total if total[2] < 0.0 else total
     length, count = float(np.linalg.norm(total)), len(planes)
     if count - length < 1e-9:
-        raise InputError("all planes of the set are alike: give one plane")
+        raise InputError("all planes of the set are identical: give one plane")
     east, north, up = (total / length).tolist()
     mean = Plane(
         math.degrees(math.acos(min(up, 1.0))), math.degrees(math.atan2(east, north)) % 360.0
@@ -147,7 +147,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
     factors = {"base": section.base_factor, "back": section.back_factor}
     for name, dip in dips.items():
         if f"{name}.dip_deg" in own:
-            raise InputError(f"{name}.dip_deg and {name}.plane both say how it dips: give one")
+            raise InputError(f"{name}.dip_deg and {name}.plane both give the dip: give one of them")
         own[f"{name}.dip_deg"] = dip
         spacing = f"{name}.spacing_m"
         if spacing in own:

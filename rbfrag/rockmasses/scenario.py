@@ -38,7 +38,7 @@ UNCOVERED = "no fragility model for this mode"
 BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
 ENDS = "roughness: it ends with the first slip; friction.phi_residual_deg gives an answer"
 SLIPS_ON = "after its first slip it does not stand on friction.phi_residual_deg"
-LOCKED = "locked: no horizontal acceleration moves it in this mode"
+LOCKED = "locked: it does not move under any horizontal acceleration in this mode"
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def scenario(
         if refusal.holds:
             raise InputError(refusal.about(refusal.value), fields=(refusal.name,))
     if not measures:
-        raise InputError("a scenario needs a measure of the motion: give pgv_m_s, or others")
+        raise InputError("a scenario requires an intensity measure, such as pgv_m_s")
     checked_level(level)
     realisations.refuse_vertical()
     stability = realisations.stability

@@ -374,7 +374,7 @@ def plan_shaking(
     if realisations.n * len(shaking.scales) > MOST_OUTCOMES:
         raise InputError(
             f"{realisations.n} realisations at {len(shaking.scales)} scales are more than "
-            f"{MOST_OUTCOMES} blocks to keep: ask for fewer of either"
+            f"{MOST_OUTCOMES} blocks: reduce either number"
         )
     stability = realisations.stability
     k = stability.yield_acceleration

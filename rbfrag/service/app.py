@@ -107,7 +107,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
 
     @app.get(
         "/v1/models",
-        summary="The fitted models",
+        summary="Fitted models",
         response_model=list[ModelListed],
         responses=documented(401, 503),
     )
@@ -120,7 +120,7 @@ def make_app(settings: ServiceSettings) -> FastAPI:
         # read anew each time, and from a server if there is one
         return model_list(await work.in_thread(settings.time_limit, stored_rows, settings.db))
 
-    @app.get("/v1/healthz", summary="Whether the service answers", response_model=Health)
+    @app.get("/v1/healthz", summary="State of the service", response_model=Health)
     async def healthz() -> Any:
         """Return the version; this operation asks for no token."""
         return {"status": "ok", "version": __version__}

@@ -23,7 +23,7 @@ def add_routes(routes: APIRouter) -> None:
 
     @routes.get(
         "/v1/block",
-        summary="Failure mode, yield accelerations and size parameter of a block",
+        summary="Failure mode, yield accelerations and p2 of a block",
         response_model=BlockAnswer,
         responses=READ,
     )
@@ -42,7 +42,7 @@ def add_routes(routes: APIRouter) -> None:
 
     @routes.get(
         "/v1/drawing",
-        summary="The lines of a drawing of a block on its planes",
+        summary="Lines of a drawing of a block on its planes",
         response_model=DrawingAnswer,
         responses=READ,
     )
@@ -88,8 +88,8 @@ def _drawn(
         others = [name for name in given if name not in (*numbers, "back_fracture")]
         if others:
             raise InputError(
-                f"{others[0]} does not go with p2 and kr: a block is these two numbers, or a shape "
-                "with its dip and friction",
+                f"{others[0]} cannot be combined with p2 and kr: give p2 and kr, or a geometry "
+                "with dip and friction",
                 fields=(others[0],),
             )
         body, result = level_rectangle(**numbers)

@@ -148,7 +148,7 @@ class ModelAnswer(_Document):
 
 @keys_of(Prediction, omitted=("inputs", "alternatives"))
 class PredictAnswer(_Answer):
-    """Probability that one block fails: what `rbfrag predict` prints as JSON.
+    """Probability of failure of a block: what `rbfrag predict` prints as JSON.
 
     `probability` is the mean over all earthquakes and sites with these intensity measures, `ci_low`
     and `ci_high` its confidence interval. `event_low` and `event_high` are the prediction interval

@@ -79,19 +79,19 @@ class Guard:
         if sum(len(name) + len(value) + 4 for name, value in scope["headers"]) > HEADERS_BYTES:
             return problem(431, "headers", f"the headers are longer than {HEADERS_BYTES} bytes")
         if sum(name == b"host" for name, _ in scope["headers"]) > 1:
-            return problem(400, "host", "the header Host is there twice: send one")
+            return problem(400, "host", "the header Host occurs twice: send one")
         if not self._is_own(scope["method"], given):
             return problem(
                 403,
                 "origin",
-                "a page of another origin may not send to this service: start it with "
+                "requests from pages of other origins are not allowed: start it with "
                 "--allow-origin ORIGIN",
             )
         if self._hosts and _name(given.get(b"host", b"")) not in self._hosts:
             return problem(
                 421,
                 "host",
-                "this service is not asked by that name: start it with --allow-host NAME",
+                "this host name is not allowed: start the service with --allow-host NAME",
             )
         if self._token is None or not scope["path"].startswith("/v1/"):
             return None
@@ -103,7 +103,7 @@ class Guard:
         return problem(
             401,
             "token",
-            "this service asks for its token: send the header  Authorization: Bearer TOKEN",
+            "a token is required: send the header  Authorization: Bearer TOKEN",
             {"www-authenticate": 'Bearer realm="rbfrag"'},
         )
 

@@ -210,7 +210,7 @@ class SpectrumQuery(Reading):
         """Return the values of p² [1/s²]."""
         sizes = [float(each) for each in self.p2.split(",")]
         if len(sizes) > MOST_SIZES:
-            raise InputError(f"p2 has {len(sizes)} values; one request may ask for {MOST_SIZES}")
+            raise InputError(f"p2 has {len(sizes)} values; the maximum per request is {MOST_SIZES}")
         return sizes
 
 

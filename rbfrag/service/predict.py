@@ -62,7 +62,7 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     for name, length in lengths.items():
         if length > row_limit:
             raise InputError(
-                f"{name} has {length} elements; one request may hold {row_limit}: split it"
+                f"{name} has {length} elements; the maximum per request is {row_limit}: split it"
             )
     if len({*lengths.values()} - {1}) > 1:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
@@ -94,7 +94,7 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
     from rbfrag.exchange.table_answers import predict_table
 
     if not body.strip():
-        raise InputError("the table is empty: give the names of the columns and a row a block")
+        raise InputError("the table is empty: give a header and one row per block")
     inputs, how = query.question()
     kind = how.pop("kind", None)
     ignored = query.ignore_columns.split(",") if query.ignore_columns else ()
@@ -113,7 +113,8 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
             raise InputError(str(error).replace(f"{source}", "the table")) from None
         if answer.rows > row_limit:
             raise InputError(
-                f"the table has {answer.rows:,} rows; one request may hold {row_limit:,}: split it"
+                f"the table has {answer.rows:,} rows; the maximum per request is {row_limit:,}: "
+                "split it"
             )
         answers = target.read_text(encoding="utf-8-sig")
         answers += notes_below(answer.warnings, dialect_of(target).delimiter)
@@ -135,7 +136,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
 
     @routes.get(
         "/v1/predict",
-        summary="Probability that one block fails",
+        summary="Probability of failure of a block",
         response_model=PredictAnswer,
         responses=READ,
     )
@@ -148,7 +149,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
 
     @routes.post(
         "/v1/table",
-        summary="Probability that each block of a table fails",
+        summary="Probabilities of failure of the blocks of a table",
         response_model=TableAnswers,
         responses=SENT,
         openapi_extra=sent_as(
@@ -168,7 +169,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
 
     @routes.post(
         "/v1/predict",
-        summary="Probability that each of many blocks fails",
+        summary="Probabilities of failure of many blocks",
         response_model=PredictArrays | PredictAnswer,
         responses=SENT,
         openapi_extra=sent_as({"application/json": {"schema": PredictRows.model_json_schema()}}),

@@ -56,18 +56,18 @@ class RequestRefusedError(HTTPException):
         self.kind = kind
 
 
-BUSY = 503, "busy", "other requests are being worked on: ask again", {"retry-after": "5"}
-GONE = 400, "gone", "the connection was closed within the body"
+BUSY = 503, "busy", "the service is busy: try again", {"retry-after": "5"}
+GONE = 400, "gone", "the connection was closed before the end of the body"
 """Nobody reads this: the client has gone."""
 
 _MEANING = {
-    400: "The request cannot be read.",
+    400: "Malformed request.",
     401: "The bearer token is missing or wrong.",
-    408: "The body came too slowly.",
-    413: "The body is longer than this service takes.",
-    415: "The body is of another type.",
-    422: "A value cannot be used; the detail says which and what to do.",
-    503: "The database cannot be read, or the service is busy.",
+    408: "Timeout of the request body.",
+    413: "The body exceeds the size limit.",
+    415: "Unsupported type of body.",
+    422: "Invalid value; the detail names it and the remedy.",
+    503: "The database is not available, or the service is busy.",
 }
 
 
@@ -126,7 +126,7 @@ def answer_error(request: Request, error: Exception, settings: ServiceSettings) 
     if isinstance(error, DatabaseError):
         # its words may name files, hosts and users
         logging.getLogger(__name__).warning("%s", error)
-        words = "the database cannot be read; the log of the service says why"
+        words = "the database is not available: see the log of the service"
         return problem(503, "database", words)
     if isinstance(error, RbfragError):
         text = error.spelled(parameter_of) if isinstance(error, InputError) else str(error)
@@ -137,14 +137,14 @@ def answer_error(request: Request, error: Exception, settings: ServiceSettings) 
             return problem(422, "several-traces", detail, traces=error.traces)
         kind = "unknown-model" if isinstance(error, UnknownModelError) else "input"
         return problem(422, kind, detail)
-    words = "a mistake in rbfrag itself; what happened is in the log of the service"
+    words = "internal error of rbfrag: see the log of the service"
     return problem(500, "mistake", words)
 
 
 def _by_the_framework(request: Request, error: HTTPException) -> Response:
     status = error.status_code
     if status == 400:
-        return problem(400, "malformed", f"the form cannot be read: {error.detail}")
+        return problem(400, "malformed", f"invalid form: {error.detail}")
     words = HTTPStatus(status).phrase.lower()
     headers = {**(error.headers or {}), **({"allow": _allowed(request)} if status == 405 else {})}
     return problem(
@@ -180,7 +180,7 @@ def refusal(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]
     # a name that is unknown explains one that is missing
     first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
     if not first["loc"]:
-        return InputError('the body is a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}')
+        return InputError('the body must be a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}')
     # where a field may be a number or a list, the deepest of its errors is that of what was meant
     worst = max(
         (each for each in errors if each["loc"][0] == first["loc"][0]),
@@ -189,7 +189,7 @@ def refusal(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]
     name = str(first["loc"][0])
     if worst["type"] == "extra_forbidden":
         known = ", ".join(fields)
-        return InputError(f"there is no parameter {name[:60]!r}; known are {known}")
+        return InputError(f"unknown parameter {name[:60]!r}; the parameters are {known}")
     indices = "".join(f"[{each}]" for each in worst["loc"][1:] if isinstance(each, int))
     return InputError(_sentence(name + indices, worst, fields[name].description or ""))
 
@@ -200,8 +200,8 @@ _SENTENCES = {
     "string_too_short": "{name} is empty: {words}",
     "string_too_long": "{name} is longer than {max_length} characters: {words}",
     "too_short": "{name} is an empty list: give a number or a list of numbers",
-    "literal_error": "{name} is {shown}: write {expected}",
-    "bool_parsing": "{name} = {shown}: write true or false",
+    "literal_error": "{name} = {shown}: it must be {expected}",
+    "bool_parsing": "{name} = {shown}: it must be true or false",
     "float_parsing": _NO_NUMBER,
     "float_type": _NO_NUMBER,
     "int_parsing": "{name} = {shown} is not a whole number: {words}",
@@ -215,7 +215,7 @@ _SENTENCES = {
 """What is wrong with a value and what to do, by the type of pydantic's error."""
 
 _SEPARATED = re.compile(r"[+-]?\d[\d.,'\u2019\s]*")
-_ONE_POINT = "write decimals after a point and nothing between thousands, as in 1234.5"
+_ONE_POINT = "use a decimal point and no thousands separator, such as 1234.5"
 
 
 def _sentence(name: str, error: Mapping[str, Any], words: str) -> str:

@@ -150,7 +150,7 @@ class _Lingering:
         return getattr(self._protocol.transport, name)
 
     def close(self) -> None:
-        """Close the connection, at once if nothing more is to come."""
+        """Close the connection, at once if nothing more is to receive."""
         if self._cycle.more_body and not self._protocol.transport.is_closing():
             self._protocol.linger()
         else:

@@ -66,7 +66,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 class Bodies:
     """Reads bodies, and bounds how many are worked on and what all of them hold.
 
-    The framework can bound the size of a body, but neither the time that one takes to come nor
+    The framework can bound the size of a body, but neither the time that one takes to receive nor
     the memory of many at once.
     """
 
@@ -125,14 +125,14 @@ class Bodies:
                     late = min(late + came / LEAST_RATE, now() + PAUSE_S)
                     patience.reschedule(min(late, end))
         except TimeoutError:
-            words = f"the body took longer than {self._settings.body_time:g} s to come"
+            words = f"the body took longer than {self._settings.body_time:g} s to receive"
             if late < end:
-                words = f"the body came slower than {LEAST_RATE:g} bytes/s for {PAUSE_S:g} s"
+                words = f"the body is slower than {LEAST_RATE:g} bytes/s for {PAUSE_S:g} s"
             raise RequestRefusedError(408, "too-slow", words, _CLOSE) from None
 
     def _too_long(self) -> RequestRefusedError:
         limit = self._settings.body_limit_bytes
-        words = f"the body is longer than the {limit} bytes that this service takes"
+        words = f"the body is longer than the {limit} bytes allowed by this service"
         return RequestRefusedError(413, "too-long", words, _CLOSE)
 
 
@@ -153,12 +153,12 @@ def check_json(body: bytes, row_limit: int) -> None:
     """
     if body.count(b"[") + body.count(b"{") > MOST_BRACKETS or body.count(b":") > MOST_BRACKETS:
         raise MalformedError(
-            "the body is nested too deeply, or holds more than "
-            f"{MOST_BRACKETS} lists, objects or names"
+            f"the body is nested too deeply, or has more than {MOST_BRACKETS} lists, objects or "
+            "names"
         )
     most = MOST_NAMES * row_limit
     if body.count(b",") > most:
-        raise InputError(f"the body holds more than {most} elements: split the request")
+        raise InputError(f"the body has more than {most} elements: split the request")
 
 
 def json_of(body: bytes) -> Any:
@@ -168,7 +168,7 @@ def json_of(body: bytes) -> Any:
         MalformedError: it is not JSON.
     """
     if not body:
-        raise MalformedError("the body is empty, and not JSON")
+        raise MalformedError("the body is empty, not JSON")
     try:
         return json.loads(body, object_pairs_hook=unique_keys, parse_constant=_no_number)
     except json.JSONDecodeError as error:
@@ -185,7 +185,9 @@ def json_of(body: bytes) -> Any:
 
 
 def _no_number(word: str) -> NoReturn:
-    raise InputError(f"{word} is no JSON number: give a finite one, or null for a missing one")
+    raise InputError(
+        f"{word} is not a JSON number: give a finite number, or null for a missing value"
+    )
 
 
 def by_parameter(values: dict[str, Any], known: Collection[str]) -> dict[str, Any]:
@@ -308,8 +310,8 @@ async def sent_file(request: Request) -> bytes:
         async with request.form(max_files=1, max_fields=1) as form:
             files = [each for _, each in form.multi_items() if not isinstance(each, str)]
             if len(files) != 1 or len(form.multi_items()) != 1:
-                raise MalformedError("the form does not hold one file and nothing else")
+                raise MalformedError("the form must have exactly one file")
             return await files[0].read()
     # which starlette passed on before 1.8
     except FormParserError as error:
-        raise MalformedError(f"the form cannot be read: {error}") from None
+        raise MalformedError(f"invalid form: {error}") from None

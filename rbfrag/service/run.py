@@ -106,5 +106,7 @@ def _settings() -> ServiceSettings:
     try:
         chosen = ServiceSettings(**json.loads(os.environ.get(VARIABLE, "{}")))
     except (ValueError, TypeError) as error:
-        raise InputError(f"{VARIABLE} cannot be read ({error}): start with  rbfrag serve") from None
+        raise InputError(
+            f"invalid {VARIABLE} ({error}): start the service with  rbfrag serve"
+        ) from None
     return chosen.checked()

@@ -53,13 +53,12 @@ class ServiceSettings:
         token = read_token(self.token_file)
         if token is None and not is_loopback(self.host):
             raise InputError(
-                f"host {self.host}: other computers can ask there, so the service needs a token: "
-                f"put one into the environment variable {VARIABLE}, or into a file named by "
-                "token_file",
+                f"host {self.host}: a token is required for addresses other than loopback: set "
+                f"the environment variable {VARIABLE}, or use token_file",
                 fields=("host", "token_file"),
             )
         if self.workers < 1:
-            raise _refused("workers", self.workers, "at least one process answers")
+            raise _refused("workers", self.workers, "it must be 1 or more")
         if not 0 <= self.port <= 65535:
             raise _refused("port", self.port, "give a number from 0 to 65535")
         for name in ("body_limit_mb", "body_time", "row_limit", "time_limit", "jobs"):
@@ -106,8 +105,8 @@ def read_token(file: str | None) -> str | None:
             raise _refused("token_file", file, f"cannot be read: {reason}") from None
     if not _TOKEN.fullmatch(token):
         raise InputError(
-            f"the token in {source} is not 16 to 512 letters, digits or any of ._~+/=-: make one "
-            "with  python -c 'import secrets; print(secrets.token_urlsafe(32))'"
+            f"the token in {source} must have 16 to 512 letters, digits or characters ._~+/=-: "
+            "create one with  python -c 'import secrets; print(secrets.token_urlsafe(32))'"
         )
     return token
 

@@ -77,7 +77,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
 
     @routes.post(
         "/v1/critical",
-        summary="The strongest block that an accelerogram topples",
+        summary="Critical strength of an accelerogram",
         response_model=CriticalAnswer,
         responses=SENT,
         openapi_extra=_ACCELEROGRAM,
@@ -92,7 +92,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
 
     @routes.post(
         "/v1/hazard",
-        summary="Annual rate at which a block topples",
+        summary="Annual rate of failure of a block",
         response_model=HazardDocument,
         responses=SENT,
         openapi_extra=sent_as(
@@ -137,7 +137,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
             raise RequestRefusedError(
                 415,
                 "media-type",
-                f"a rock mass comes as {', '.join(_FORMS)}: say which by the header Content-Type",
+                f"unsupported Content-Type of a rock mass: use {', '.join(_FORMS)}",
             )
         given = await request.body(), form, query, settings.row_limit, settings.db
         return await pool.run(request, work.rock_mass, *given)

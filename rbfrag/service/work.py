@@ -67,21 +67,22 @@ def rock_mass(
     if form == "json":
         document = json_of(body)
         if not isinstance(document, dict):
-            raise InputError("the body is a JSON object with the tables base, back and friction")
+            raise InputError(
+                "the body must be a JSON object with the tables base, back and friction"
+            )
         described = rock_mass_of_tables(document)
     else:
         described = (rock_mass_of_toml if form == "toml" else rock_mass_of_csv)(_text(body))
     wanted = described.realisations if query.n is None else query.n
     if wanted > row_limit:
         raise InputError(
-            f"{wanted} realisations are more than the {row_limit} of one request: ask for fewer "
-            "with n"
+            f"{wanted} realisations exceed the maximum of {row_limit} per request: reduce n"
         )
     measures, how = query.question()
     if how and not measures:
         raise InputError(
-            f"{next(iter(how))} goes with a measure of the motion: give pgv, pga or sa10_g, or pgd "
-            "and tm, too"
+            f"{next(iter(how))} requires an intensity measure: give pgv, pga or sa10_g, or pgd "
+            "and tm"
         )
     question: dict[str, Any] = {**measures, **how, "db": db}
     answer = rockmass(described, n=query.n, seed=query.seed, **question)
@@ -174,7 +175,7 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
     listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(traces))
     trouble = f"holds {len(traces)} traces" if trace is None else f"has no trace {trace}"
     raise SeveralTracesError(
-        f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example",
+        f"{FILE} {trouble}: give one of  {listed}  with trace, for example trace=0",
         [each.component for each in traces],
     )
 
@@ -231,9 +232,8 @@ class WorkerPool:
             raise RequestRefusedError(
                 422,
                 "time-limit",
-                f"the answer takes longer than the {self._limit_s:g} s that this service works on "
-                "one request: ask for less, ask the command line, or let the service be started "
-                "with a longer --time-limit",
+                f"the answer takes longer than the limit of {self._limit_s:g} s: reduce the "
+                "request, use the command line, or start the service with a longer --time-limit",
             )
         except ProcessExpired:
             raise RequestRefusedError(*BUSY) from None

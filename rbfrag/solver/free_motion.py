@@ -325,7 +325,7 @@ def _run(
             return run, rows[:, : run.filled]
         size *= 4
         if size > 1e8:
-            raise InputError("the record is too long to follow the block in steps: cut it")
+            raise InputError("the record is too long: shorten it")
 
 
 def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:

@@ -171,13 +171,13 @@ class Kind(KindFacts):
             InputError: there is no search, or an option is that of another kind.
         """
         why = f": {self.no_search}" if self.no_search else ""
-        raise InputError(f"there is no search for the critical value of kind {self.kind}{why}")
+        raise InputError(f"no critical values of kind {self.kind} are computed{why}")
 
     def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
         """Refuse an option that is not among the kind's own."""
         foreign = sorted(set(given) - set(own))
         if foreign:
             raise InputError(
-                f"{foreign[0]} does not go with {self.kind}, which knows "
-                f"{' and '.join(own) or 'no such option'}"
+                f"{foreign[0]} cannot be combined with {self.kind}, whose options are "
+                f"{' and '.join(own) or 'none'}"
             )

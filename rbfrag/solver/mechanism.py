@@ -69,9 +69,9 @@ class MechanismKind(Kind):
     def _without_cohesion(self, site: BlockOnPlanes) -> Mechanism:
         if site.cohesive:
             raise InputError(
-                f"cohesion_pa does not go with {self.kind} in time: a bond is broken by the first "
-                "slip, which the model does not describe; its effect on the yield is an answer of "
-                "rbfrag block"
+                f"cohesion_pa cannot be combined with {self.kind} in time: cohesion is lost at "
+                "the first slip, which the model does not describe; see rbfrag block for its "
+                "effect on the yield"
             )
         return self.mechanism(site)
 
@@ -124,7 +124,7 @@ def shaken_mechanism(
         InputError: another kind; a block of another mode, or one that no earthquake decides about.
     """
     if not isinstance(model, MechanismKind):
-        raise InputError(f"kind {model.kind!r} is not one whose records are scaled")
+        raise InputError(f"records are not scaled for kind {model.kind!r}")
     judged = stability(
         block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg, **water
     )

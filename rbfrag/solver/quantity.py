@@ -69,8 +69,8 @@ def vertical_g(value: object) -> float:
     result = number(value, "kv", "the vertical acceleration of the ground in g, up positive")
     if result <= -1.0:
         raise InputError(
-            f"kv = {result:g}: at -1 g or below the ground falls away under the block (a jump), "
-            "which the model of a block in contact does not cover: give a value above -1"
+            f"kv = {result:g}: below -1 g the block loses contact with the ground: give a value "
+            "above -1"
         )
     return result
 

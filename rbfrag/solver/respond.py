@@ -82,8 +82,8 @@ def respond(
             first place.
         two_way: sliding up the base too, where the ground drives the block that way.
         horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
-        restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
-            None for what angular momentum leaves at each corner.
+        restitution: coefficient of restitution of rocking, above 0 and up to 1; None for that of
+            conservation of angular momentum at each corner.
         history: keep the motion in time.
         of_kind: further settings of a kind, as its line in `rbfrag.solver.kinds` names them; of a
             shape also ``water_m`` with ``drainage`` (``undrained``, the default: the water
@@ -123,7 +123,7 @@ def respond(
         for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
             if value is not None:
                 raise InputError(
-                    f"{name} does not go with a block that is given by its shape", fields=(name,)
+                    f"{name} cannot be combined with the geometry of a block", fields=(name,)
                 )
         if beta_deg is None or (phi_deg is None and not free_standing):
             name = "beta_deg" if beta_deg is None else "phi_deg"
@@ -174,12 +174,12 @@ def known_by_numbers(
     if "ky" in given:
         if "p2" in given or "kr" in given:
             raise InputError(
-                "ky belongs to sliding, p2 and kr to toppling: give one or the other",
+                "ky is for sliding, p2 and kr for toppling: give one or the other",
                 fields=("ky", "p2", "kr"),
             )
         if extra := [name for name in given if name not in ("ky", "beta_deg")]:
             raise InputError(
-                f"{extra[0]} does not go with ky: it follows from ky and beta_deg",
+                f"{extra[0]} cannot be combined with ky: it follows from ky and beta_deg",
                 fields=(extra[0], "ky", "beta_deg"),
             )
         model = _by_numbers(kind, "slide", ("ky",))
@@ -188,13 +188,13 @@ def known_by_numbers(
     for name in ("p2", "kr"):
         if name not in given:
             raise InputError(
-                f"{name} is missing: give p2 and kr, or ky, or the shape of a block with beta_deg "
-                "and phi_deg",
+                f"{name} is missing: give p2 and kr, or ky, or the geometry of a block with "
+                "beta_deg and phi_deg",
                 fields=("p2", "kr", "ky", "beta_deg", "phi_deg"),
             )
     if extra := [name for name in given if name not in ("p2", "kr")]:
         raise InputError(
-            f"{extra[0]} does not go with p2 and kr, which say all about the block",
+            f"{extra[0]} cannot be combined with p2 and kr, which describe the block completely",
             fields=(extra[0], "p2", "kr"),
         )
     model = _by_numbers(kind, "topple", ("p2", "kr"))
@@ -218,7 +218,7 @@ class _Shaken:
     ) -> Response:  # fmt: skip
         """Return what a model answers about a block of a failure mode; None for the model's."""
         if self.start is not None and not model.carries_state:
-            raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")
+            raise InputError(f"start cannot be combined with {model.kind}: {STARTS_ANEW}")
 
         def run(
             motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
@@ -231,14 +231,14 @@ class _Shaken:
 
         if not isinstance(self.motion, list | tuple):
             if self.gap_s is not None:
-                raise InputError("gap_s goes with a list of motions: it is the rest between them")
+                raise InputError("gap_s requires a list of motions: it is the time between them")
             if isinstance(self.vertical, list | tuple):
-                raise InputError("vertical is a list: one motion has one vertical motion")
+                raise InputError("vertical is a list: give one vertical motion for one motion")
             return run(
                 as_motion(cast("MotionLike", self.motion)), _vertical(self.vertical), self.start
             )
         if not (self.vertical is None or isinstance(self.vertical, list | tuple)):
-            raise InputError("vertical is one motion: of a list of motions it is a list, too")
+            raise InputError("vertical is one motion: give a list for a list of motions")
         motions = Motions(
             [as_motion(each) for each in self.motion],
             [_vertical(each) for each in self.vertical or ()],
@@ -291,7 +291,7 @@ def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> Block
     phi_rad = math.radians(beta_deg) + math.atan(ky)
     if not 0.0 <= phi_rad < 0.5 * math.pi:
         raise InputError(
-            f"ky = {ky:g} on a plane of beta_deg = {beta_deg:g} means a friction angle of "
+            f"ky = {ky:g} and beta_deg = {beta_deg:g} give a friction angle of "
             f"{math.degrees(phi_rad):.4g} degrees: it must be from 0 to below 90"
         )
     beta_rad = math.radians(beta_deg)
@@ -307,8 +307,8 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     model = model_of_kind(kind)
     if not set(numbers) <= {*model.parameters}:
         raise InputError(
-            f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
-            f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}",
+            f"{kind} requires the geometry of the block: give a block with beta_deg and phi_deg "
+            f"instead of {' and '.join(numbers)}, which are for {model_of_mode(mode).kind}",
             fields=(*numbers, "beta_deg", "phi_deg"),
         )
     return model
@@ -320,7 +320,7 @@ def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
     if unknown:
         understood = " and ".join(model.settings) or "no such option"
         raise InputError(
-            f"{unknown[0]} does not go with {model.kind}, the model of this block, which knows "
+            f"{unknown[0]} cannot be combined with kind {model.kind}, whose options are "
             f"{understood}",
             fields=(unknown[0],),
         )

@@ -130,8 +130,8 @@ def respond_draws(
         kr: rocking acceleration coefficient k_r, likewise.
         ky: yield acceleration coefficient of sliding, likewise.
         beta_deg: with ky: dip of the base [deg].
-        restitution: rocking: speed after an impact over that before it, its mean or draws; None
-            for what angular momentum leaves of each drawn block.
+        restitution: coefficient of restitution of rocking, its mean or draws; None for that of
+            conservation of angular momentum of each drawn block.
         p2_sigma: standard deviation of ln p².
         kr_sigma: standard deviation of ln k_r.
         ky_sigma: standard deviation of ln k_y.
@@ -177,9 +177,10 @@ def respond_draws(
             model, site = known_by_numbers(kind, numbers, own)
             if (_FAILS_BY in model.parameters) is not (limit_m is not None):
                 raise InputError(
-                    f"{_FAILS_BY} is missing: a block of kind {model.kind} fails by sliding further"
+                    f"{_FAILS_BY} is missing: a block of kind {model.kind} requires a "
+                    "displacement limit"
                     if limit_m is None
-                    else f"{_FAILS_BY} does not go with kind {model.kind}"
+                    else f"{_FAILS_BY} cannot be combined with kind {model.kind}"
                 )
             end = model.runner(site)(excited[i % len(excited)])
         except InputError as error:
@@ -252,7 +253,7 @@ def _drawn(
             positive(values[name].min(), name, _POSITIVE[name])
     for name, sigma in scatter.items():
         if sigma > 0.0 and name not in values:
-            raise InputError(f"{name}_sigma goes with {name}: give the value that it is about")
+            raise InputError(f"{name}_sigma requires {name}: give the median")
     if weights is None and not any(value.ndim for value in values.values()):
         result = {}
         for name, value in values.items():
@@ -261,7 +262,9 @@ def _drawn(
             result[name] = law(z, value, scatter.get(name, 0.0)) + np.zeros(count)
         return result
     if any(scatter.values()):
-        raise InputError("a standard deviation does not go with draws, which say how they scatter")
+        raise InputError(
+            "a standard deviation cannot be combined with draws, which give the dispersion"
+        )
     return _picked(values, weights, count, generator)
 
 
@@ -280,7 +283,7 @@ def _picked(
     if weight.ndim != 1 or weight.size == 0:
         raise InputError("the draws of a block are lists of numbers of one length")
     if not ((weight >= 0.0) & (weight < math.inf)).all() or not weight.sum() > 0.0:
-        raise InputError("the weights of draws are 0 or more, and not all of them 0")
+        raise InputError("the weights of draws must be 0 or more, not all 0")
     picked = generator.choice(weight.size, size=count, p=weight / weight.sum())
     return {name: column[picked] for name, column in zip(values, columns, strict=True)}
 

@@ -70,8 +70,8 @@ class Motions:
             raise InputError("no motion: give one accelerogram or more")
         if self.vertical and len(self.vertical) != len(self.horizontal):
             raise InputError(
-                f"{len(self.horizontal)} motions and {len(self.vertical)} vertical ones: give one "
-                "vertical motion for each (None where there is none), or leave them out"
+                f"{len(self.horizontal)} motions and {len(self.vertical)} vertical motions: give "
+                "one for each motion (or None), or none"
             )
         if self.gap_s is not None:
             not_negative(self.gap_s, "gap_s", "s")

@@ -1,4 +1,4 @@
-"""The quantities, each declared once, in groups in the order of the help, and what they are called.
+"""The quantities, each declared once, in groups in the order of the help, and their names.
 
 One module, and plain classes, because each start of the program loads and makes all of it.
 """
@@ -65,30 +65,32 @@ ANY, POSITIVE, NOT_NEGATIVE = Limits(), Limits(above=0.0), Limits(least=0.0)
 
 
 class Input:
-    """How a quantity is given.
+    """Names, type and help of a quantity that is an input.
 
     Args:
-        detail: what its help adds to the label; names in braces stand for their spelling in an
+        detail: addition to the label in the help; names in braces stand for their spelling in an
             interface.
         aliases: further names of its column, in small letters and without a unit.
+        default: value or rule where it is not given, for the help.
         column: its column in tables that are written; empty for its name.
-        word: what people call it; empty for its name without the unit.
-        type: float, str, or bool for a truth value that is true unless it is given.
+        word: its name in options and requests; empty for its name without the unit.
+        type: float, str, or bool for a truth value that is true by default.
     """
 
-    __slots__ = ("aliases", "column", "detail", "type", "word")
+    __slots__ = ("aliases", "column", "default", "detail", "type", "word")
 
     def __init__(
         self,
         detail: str = "",
         aliases: tuple[str, ...] = (),
         *,
+        default: str = "",
         column: str = "",
         word: str = "",
         type: type = float,
     ) -> None:
-        self.detail, self.aliases, self.column = detail, aliases, column
-        self.word, self.type = word, type
+        self.detail, self.aliases, self.default = detail, aliases, default
+        self.column, self.word, self.type = column, word, type
 
 
 class Measure:
@@ -136,13 +138,13 @@ class Quantity:
 
     Args:
         name: name in Python, JSON and the database, with its unit.
-        label: what it is.
+        label: noun phrase that begins its help and its description.
         unit: its unit; empty for a pure number or a text.
         symbol: its symbol in formulas.
         range: the values that it may have.
-        input: how it is given; None where it is not.
-        credible: least and greatest credible value, and what is said of others.
-        prompt: what is to be given in place of a wrong value; empty for what label and unit say.
+        input: its names as an input; None where it is not one.
+        credible: minimum and maximum credible value, and the warning about others.
+        prompt: description of a valid value, for errors; empty for one of label, unit and range.
         measure: what makes it an intensity measure; None where it is none.
         stored: its meaning as a column of the database; empty where it is none.
     """
@@ -172,7 +174,7 @@ class Quantity:
 
     @property
     def noun(self) -> str:
-        """What it is, in a few words that continue a sentence: "dip of the base"."""
+        """The label as a part of a sentence: "dip of the base"."""
         text = self.label
         for mark in ",;(":
             text = text.partition(mark)[0]
@@ -181,20 +183,23 @@ class Quantity:
 
     @property
     def prompt(self) -> str:
-        """What is to be given in place of a wrong value."""
+        """Description of a valid value, for errors."""
         limit = "0 or more" if self.range.above is None else f"above {self.range.above:g}"
         return self._prompt or f"the {self.noun} in {self.unit}, {limit}"
 
     def description(self, spell: Callable[[str], str]) -> str:
-        """Return label and details, with the names of inputs as an interface spells them."""
-        detail = "" if self.input is None else self.input.detail
-        text = f"{self.label}{', ' if detail and detail[0] not in ';:( ' else ''}{detail}"
+        """Return label, details and default, with inputs as an interface spells them."""
+        text = self.label
+        if self.input is not None:
+            detail, default = self.input.detail, self.input.default
+            text += f"{', ' if detail and detail[0] not in ';:( ' else ''}{detail}"
+            text += f" [default: {default}]" if default else ""
         return text.format_map(_Spelling(spell))
 
     def help(self, spell: Callable[[str], str]) -> str:
-        """Return the description with the unit: a sentence."""
-        text = self.description(spell)
-        return f"{text} [{self.unit}]." if self.unit else f"{text}."
+        """Return the description with the unit, which precedes the default."""
+        text, mark, default = self.description(spell).partition(" [default: ")
+        return f"{text}{f' [{self.unit}]' if self.unit else ''}{mark}{default}"
 
 
 class _Spelling(dict[str, str]):
@@ -216,14 +221,14 @@ _SAMPLES = "missing where the database was upgraded without the samples"
 
 def _block_scatter(name: str, logarithm: str) -> Quantity:
     return Quantity(
-        name, f"Standard deviation of {logarithm} of what the block may be", range=NOT_NEGATIVE,
+        name, f"Standard deviation of {logarithm} (block uncertainty)", range=NOT_NEGATIVE,
         input=Input(),
         prompt=f"the standard deviation of ln {name.removesuffix('_sigma')}, 0 or more",
     )  # fmt: skip
 
 
 def _deviation(name: str, measure: str) -> Quantity:
-    detail = Input("of which the median is stated")
+    detail = Input("about its median")
     label = f"Standard deviation of ln {measure}"
     return Quantity(name, label, range=NOT_NEGATIVE, input=detail, prompt=_SIGMA)
 
@@ -256,32 +261,32 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             Input(" of the block", ("p²", "p^2"), column="p2_1_s2"),
             prompt="p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m",
             stored="frequency parameter p² of the block, m g r3 over the inertia about the toe"),
-        Quantity("kr", "Rocking acceleration coefficient k_r", "", "k_r",
+        Quantity("kr", "Uplift acceleration coefficient k_r", "", "k_r",
             input=Input(" = tan(critical angle), with {p2}", ("k_r",)),
             credible=(
                 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees",
             ),
-            prompt="the block's yield acceleration coefficient at rest, tan(critical angle) (a "
-            "block with k_r <= 0 falls without an earthquake)",
+            prompt="the uplift acceleration coefficient of the block, tan(critical angle) (a block "
+            "with k_r <= 0 topples at rest)",
             stored="rocking acceleration coefficient k_r = tan(critical angle)"),
-        Quantity("ky", "Sliding: yield acceleration coefficient tan(phi - beta)", "", "k_y",
+        Quantity("ky", "Yield acceleration coefficient of sliding k_y, tan(phi - beta)", "", "k_y",
             input=Input("with {beta_deg}", ("k_y",)), credible=(0.0, 5.0, _STEEP),
-            prompt="the block's yield acceleration coefficient of sliding, tan(phi - beta) (a "
-            "block with k_y <= 0 slides without an earthquake)"),
-        Quantity("ks", "Slumping: yield acceleration coefficient k_s", "", "k_s",
+            prompt="the yield acceleration coefficient of sliding, tan(phi - beta) (a block with "
+            "k_y <= 0 slides at rest)"),
+        Quantity("ks", "Yield acceleration coefficient of slumping k_s", "", "k_s",
             input=Input("with {ps2}", ("k_s",)), credible=(0.0, 5.0, _STEEP),
-            prompt="the block's yield acceleration coefficient of slumping (a block with k_s <= "
-            "0 slumps without an earthquake)"),
-        Quantity("ps2", "Slumping: frequency parameter p_s² at rest", "1/s²", "p_s²", POSITIVE,
+            prompt="the yield acceleration coefficient of slumping (a block with k_s <= 0 slumps "
+            "at rest)"),
+        Quantity("ps2", "Frequency parameter of slumping p_s² at rest", "1/s²", "p_s²", POSITIVE,
             Input(column="ps2_1_s2"),
-            prompt="p_s², the squared frequency parameter of slumping at rest"),
-        Quantity("kct", "Confined toppling: yield acceleration coefficient k_ct", "", "k_ct",
+            prompt="the frequency parameter of slumping p_s² at rest in 1/s², above 0"),
+        Quantity("kct", "Yield acceleration coefficient of confined toppling k_ct", "", "k_ct",
             input=Input("with {pct2}", ("k_ct",)), credible=(0.0, 5.0, _STEEP),
-            prompt="the block's yield acceleration coefficient of confined toppling (a block "
-            "with k_ct <= 0 topples without an earthquake)"),
-        Quantity("pct2", "Confined toppling: frequency parameter p_ct² at rest", "1/s²", "p_ct²",
-            POSITIVE, Input(column="pct2_1_s2"), prompt="p_ct², the squared frequency parameter "
-            "of confined toppling at rest"),
+            prompt="the yield acceleration coefficient of confined toppling (a block with k_ct <= "
+            "0 topples at rest)"),
+        Quantity("pct2", "Frequency parameter of confined toppling p_ct² at rest", "1/s²", "p_ct²",
+            POSITIVE, Input(column="pct2_1_s2"), prompt="the frequency parameter of confined "
+            "toppling p_ct² at rest in 1/s², above 0"),
     ),
     "failure": (
         Quantity("displacement_m", "Displacement limit", "m", range=POSITIVE,
@@ -289,8 +294,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             prompt="the displacement limit in m, above 0"),
         Quantity("restitution", "Coefficient of restitution", "", "e",
             Limits(above=0.0, most=1.0),
-            Input(" of a rocking block, above 0 and up to 1; default: from conservation of "
-            "angular momentum"),
+            Input(" of a rocking block, 0–1", default="from conservation of angular momentum"),
             prompt="the coefficient of restitution, above 0 and up to 1"),
     ),
     "shape": (
@@ -316,14 +320,15 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     ),
     "planes": (
         Quantity("beta_deg", "Dip of the base", "deg", "β", _SLOPE,
-            Input("out of the slope positive; a rectangle's is 0 if not given",
-            ("beta", "dip", "dip_deg", "dip_angle", "β", "base_dip"), column="dip_deg"),
+            Input("positive out of the slope",
+            ("beta", "dip", "dip_deg", "dip_angle", "β", "base_dip"), column="dip_deg",
+            default="0 for a rectangle"),
             prompt="the dip of the base in degrees, out of the slope positive"),
         Quantity("phi_deg", "Friction angle of the base", "deg", "φ", _FRICTION,
-            Input("; only a rectangle is assumed to topple without",
+            Input("required except for a rectangle, which is assumed to topple",
             ("phi", "φ", "friction", "friction_angle"))),
         Quantity("phi_back_deg", "Friction angle of the back plane", "deg", range=_FRICTION,
-            input=Input("; default: that of the base", ("phi_back",))),
+            input=Input(aliases=("phi_back",), default="that of the base")),
     ),
     "joint": (
         Quantity("water_m", "Height of the water", "m", range=NOT_NEGATIVE,
@@ -331,15 +336,18 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
             ("water", "water_level"))),
         Quantity(
             "jrc", "Joint roughness coefficient of the base", range=Limits(least=0.0, most=20.0),
-            input=Input("of samples of 10 cm, with {jcs_mpa} and {density_kg_m3}; {phi_deg} is "
+            input=Input("for a joint length of 10 cm, with {jcs_mpa} and {density_kg_m3}; "
+            "{phi_deg} is "
             "then the residual friction angle")),
         Quantity("jcs_mpa", "Compressive strength of the walls of the base", "MPa", range=POSITIVE,
-            input=Input("of samples of 10 cm", ("jcs",), word="jcs")),
-        Quantity("joint_length_m", "Length of the joint that shears as one", "m", range=POSITIVE,
-            input=Input("; default: that of the base", ("joint_length",))),
-        Quantity("phi_residual_deg", "Friction angle of base and back that is left after the first "
-            "slip", "deg", range=_FRICTION,
-            input=Input("which ends cohesion and roughness", ("phi_residual",))),
+            input=Input("for a joint length of 10 cm", ("jcs",), word="jcs")),
+        Quantity("joint_length_m", "Joint length for the scale effect of roughness", "m",
+            range=POSITIVE,
+            input=Input(aliases=("joint_length",), default="that of the base")),
+        Quantity("phi_residual_deg", "Residual friction angle of base and back plane", "deg",
+            range=_FRICTION,
+            input=Input("after the first slip, which ends cohesion and roughness",
+            ("phi_residual",))),
     ),
     "block scatter": (
         _block_scatter("p2_sigma", "ln p²"),
@@ -350,36 +358,34 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         _block_scatter("kct_sigma", "ln k_ct"),
         _block_scatter("pct2_sigma", "ln p_ct²"),
         Quantity(
-            "restitution_sigma", "Standard deviation of the restitution of what the block may be",
-            range=NOT_NEGATIVE, input=Input(),
-            prompt="the standard deviation of the restitution, 0 or more"),
+            "restitution_sigma", "Standard deviation of the coefficient of restitution (block "
+            "uncertainty)", range=NOT_NEGATIVE, input=Input(),
+            prompt="the standard deviation of the coefficient of restitution, 0 or more"),
     ),
     "space": (
-        Quantity("base", "Plane of the base as dip/dip direction in deg",
-            input=Input("25/102, with {face}, instead of {beta_deg}", type=str)),
-        Quantity(
-            "back", "Plane of the back likewise", input=Input("with {s1_m} and {s2_m} along the "
-            "normals of the planes, instead of {gamma_deg}", type=str)),
-        Quantity("face", "Plane of the slope's face likewise: its dip direction is the section",
-            input=Input(type=str)),
+        Quantity("base", "Orientation of the base as dip/dip direction in degrees",
+            input=Input("such as 25/102, with {face}, instead of {beta_deg}", type=str)),
+        Quantity("back", "Orientation of the back plane as dip/dip direction in degrees",
+            input=Input("with {s1_m} and {s2_m} along the normals of the planes, instead of "
+            "{gamma_deg}", type=str)),
+        Quantity("face", "Orientation of the slope face as dip/dip direction in degrees",
+            input=Input("whose dip direction is the direction of the section", type=str)),
     ),
     "whole": (
-        Quantity("block", "A block by its corners", input=Input("a rbfrag.Block")),
-        Quantity("back_fracture", "There is no fracture behind the block",
+        Quantity("block", "Geometry of the block", input=Input("a rbfrag.Block")),
+        Quantity("back_fracture", "No fracture behind the block",
             input=Input(word="no_back", type=bool)),
         Quantity("drainage", "Drainage of the water in the back fracture",
-            input=Input(
-                "with {water_m}: undrained (its pressure keeps acting while the block moves) or "
-                "drained (it vanishes); default: undrained", type=str,
-            )),
+            input=Input(": undrained (water pressure acts while the block moves) or drained (water "
+            "pressure vanishes), with {water_m}", default="undrained", type=str)),
         Quantity("cohesion_pa", "Cohesion of the base", "Pa", range=NOT_NEGATIVE,
             input=Input("with {density_kg_m3}")),
         Quantity("density_kg_m3", "Density of the rock", "kg/m³", range=POSITIVE,
-            input=Input("; default: 2650", ("density",))),
+            input=Input(aliases=("density",), default="2650")),
         Quantity(
-            "kind", "How the blocks fail: toppling", input=Input(" (backed by a slope), rocking "
-            "(free-standing), slumping, confined_toppling or sliding; default: what they are "
-            "given by", type=str)),
+            "kind", "Kind of failure", input=Input(": toppling (backed by a rock face), rocking "
+            "(free-standing), slumping, confined_toppling or sliding",
+            default="from the geometry or the parameters of the block", type=str)),
     ),
     "measures": (
         Quantity("pgv_m_s", "Peak ground velocity", "m/s", "PGV", NOT_NEGATIVE,
@@ -411,7 +417,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         _spectral("sa10_g", 1.0, credible=10.0, rank=2),
         _spectral("sa30_g", 3.0, credible=5.0),
         Quantity(
-            "arias_m_s", "Arias intensity", "m/s", "I_a", NOT_NEGATIVE, Input("π/2g times ∫a² dt",
+            "arias_m_s", "Arias intensity", "m/s", "I_a", NOT_NEGATIVE, Input("π/(2g) ∫a² dt",
             ("arias", "ia", "arias_intensity")),
             credible=(0.0, 50.0, "larger than ever recorded (it is in m/s): is it in cm/s?"),
             prompt="the Arias intensity in m/s, 0 or more",
@@ -429,95 +435,103 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         _deviation("sa03_sigma", "SA(0.3)"),
         _deviation("sa10_sigma", "SA(1.0)"),
         _deviation("sa30_sigma", "SA(3.0)"),
-        Quantity("pgv_tau", "Part of {pgv_sigma} that all sites of one earthquake share",
-            range=NOT_NEGATIVE, input=Input("for the range with {sites}"),
+        Quantity("pgv_tau", "Between-event standard deviation of ln PGV",
+            range=NOT_NEGATIVE,
+            input=Input("part of {pgv_sigma}, for the prediction interval of {sites}"),
             prompt=_SIGMA),
-        Quantity("rjb_km", "Distance from the surface projection of the rupture", "km",
+        Quantity("rjb_km", "Distance R_JB to the surface projection of the rupture", "km",
             "R_JB", range=NOT_NEGATIVE,
-            input=Input("instead of measures, with {magnitude} and {vs30_m_s}",
+            input=Input("with {magnitude} and {vs30_m_s}, instead of intensity measures",
             ("rjb", "r_jb", "joyner_boore_distance"))),
         Quantity(
-            "vs30_m_s", "Mean velocity of shear waves in the upper 30 m", "m/s", "Vs30",
-            range=POSITIVE,
-            input=Input(aliases=("vs30",))),
+            "vs30_m_s", "Time-averaged shear-wave velocity in the upper 30 m", "m/s",
+            "Vs30", range=POSITIVE, input=Input(aliases=("vs30",))),
         Quantity(
-            "amplification", "Factor on all measures for the shape of the ground", range=POSITIVE,
-            input=Input()),
+            "amplification", "Topographic amplification factor of all intensity measures",
+            range=POSITIVE, input=Input()),
         Quantity(
-            "amplification_sigma", "Standard deviation of ln {amplification}", range=NOT_NEGATIVE,
-            input=Input(), prompt=_SIGMA),
+            "amplification_sigma", "Standard deviation of the logarithm of {amplification}",
+            range=NOT_NEGATIVE, input=Input(), prompt=_SIGMA),
     ),
     "record": (
-        Quantity("sa_g", "Spectral accelerations by their period in s", "g",
-            input=Input("as in {{1.0: 0.4}}")),
-        Quantity("motion", "The accelerogram itself or its file",
-            input=Input("instead of its measures")),
+        Quantity("sa_g", "Spectral accelerations by oscillator period in s", "g",
+            input=Input("such as {{1.0: 0.4}}")),
+        Quantity("motion", "Accelerogram or its file",
+            input=Input("instead of intensity measures")),
         Quantity(
-            "polarity", "forward or reverse where it is known how the motion points at the slope",
-            input=Input("; both gives the mean of the two, which stand beside it (motion only)",
-            type=str)),
+            "polarity", "Polarity of the accelerogram relative to the slope",
+            input=Input(": forward, reverse or both (mean of the two)", type=str)),
     ),
     "answering": (
         Quantity(
-            "model", "Fitted model", input=Input("by its name; default: the database's default if "
-            "the given measures suffice for it, else the best that they suffice for", type=str)),
+            "model", "Fitted model", input=Input("by name", default="the default model of the "
+            "database if the intensity measures suffice for it, else the best model that they "
+            "suffice for", type=str)),
         Quantity("level", "Confidence level", range=Limits(above=0.0, below=1.0),
-            input=Input("and level of the prediction interval of one earthquake; default: 0.95")),
-        Quantity("db", "Database: a path or an SQLAlchemy URL",
-            input=Input("; default: RBFRAG_DB, else rbfrag.db in the current folder, else the "
+            input=Input("also that of the prediction interval for a single earthquake",
+            default="0.95")),
+        Quantity("db", "Database path or SQLAlchemy URL",
+            input=Input(default="RBFRAG_DB, else rbfrag.db in the current folder, else the "
             "built-in data set", type=str)),
     ),
     "sites": (
         Quantity("sites", "Number of sites", range=Limits(least=1.0, most=10_000.0),
             input=Input(" with such shaking in one earthquake: adds the prediction interval of "
-            "the fraction of blocks that fail, facing all sides; default: one block")),
+            "the fraction of blocks that fail, facing all directions", default="1")),
     ),
     "source": (
-        Quantity(
-            "mechanism", "How the fault moves", input=Input("with {rjb_km}: strike-slip, normal, "
-            "reverse or unspecified; default: unspecified", type=str)),
-        Quantity("gmm", "CSV table of medians and sigmas of another ground-motion model: rjb_km",
-            input=Input("pgv_m_s, pgv_sigma, pgv_tau and the like, a row a distance", type=str)),
+        Quantity("mechanism", "Fault mechanism",
+            input=Input(": strike-slip, normal, reverse or unspecified, with {rjb_km}",
+            default="unspecified", type=str)),
+        Quantity("gmm", "CSV table of medians and sigmas of another ground-motion model",
+            input=Input("with columns rjb_km, pgv_m_s, pgv_sigma, pgv_tau etc., one row per "
+            "distance", type=str)),
     ),
     "component": (
-        Quantity("component", "Horizontal component of the measures of shaking: single",
-            input=Input("geometric_mean, rotd50, rotd100 or larger; default: single", type=str)),
+        Quantity("component", "Horizontal component of the intensity measures",
+            input=Input(": single, geometric_mean, rotd50, rotd100 or larger", default="single",
+            type=str)),
     ),
     "request": (
-        Quantity("rotation_deg", "Slumping: rotation that counts as failure", "deg",
-            input=Input("of which there must be a model; default: failure past recovery")),
+        Quantity("rotation_deg", "Rotation limit of slumping", "deg",
+            input=Input("one for which a fragility model exists",
+            default="failure past recovery")),
     ),
     "arrays": (
-        Quantity("nan", "propagate answers NaN with its reason where the input cannot be used",
-            input=Input("raise refuses such arrays", type=str)),
-        Quantity("interval", "False leaves interval and range out",
-            input=Input(" (their ends are then NaN), which takes less time")),
-        Quantity("weights", "Makes the arrays that describe the block draws of one block",
-            input=Input("of these weights (1: all the same): one answer, over all of them")),
+        Quantity("nan", "Handling of invalid elements of arrays",
+            input=Input(": propagate (NaN with its reason) or raise (the arrays are rejected)",
+            default="propagate", type=str)),
+        Quantity("interval", "Computation of confidence and prediction intervals",
+            input=Input(": False leaves their limits NaN and takes less time", default="True")),
+        Quantity("weights", "Weights of the draws of one uncertain block",
+            input=Input("1 for equal weights; the arrays of the block are then its draws, with one "
+            "answer for all")),
     ),
     "at rest": (
-        Quantity("kv", "Vertical acceleration of the ground", "g", range=Limits(above=-1.0),
-            input=Input("up positive")),
+        Quantity("kv", "Vertical ground acceleration", "g", range=Limits(above=-1.0),
+            input=Input("positive upward")),
     ),
     "names": (
         Quantity("block_id", "Name of the block",
             input=Input(aliases=("block", "name", "id"), type=str)),
-        Quantity("site_id", "Name of its site", input=Input(aliases=("site",), type=str)),
+        Quantity("site_id", "Name of the site of the block",
+            input=Input(aliases=("site",), type=str)),
     ),
     "rows": (
-        Quantity("mode", "Its failure mode", input=Input(aliases=("failure_mode",), type=str)),
+        Quantity("mode", "Failure mode of the block",
+            input=Input(aliases=("failure_mode",), type=str)),
         Quantity("lon", "Longitude", "deg", input=Input(aliases=("longitude",))),
         Quantity("lat", "Latitude", "deg", input=Input(aliases=("latitude",))),
         Quantity(
-            "x", "Place of the block in {crs}", input=Input("to the east", ("easting", "x_m"))),
-        Quantity("y", "Place likewise", input=Input("to the north", ("northing", "y_m"))),
-        Quantity("z", "Height of the place in {crs}", input=Input(aliases=("elevation", "z_m"))),
-        Quantity("crs", "Coordinate reference system", input=Input("as EPSG:2056", type=str)),
-        Quantity("strike_length_m", "Length of the block along the slope", "m", range=POSITIVE,
+            "x", "Easting of the block in {crs}", input=Input(aliases=("easting", "x_m"))),
+        Quantity("y", "Northing of the block in {crs}", input=Input(aliases=("northing", "y_m"))),
+        Quantity("z", "Elevation of the block in {crs}", input=Input(aliases=("elevation", "z_m"))),
+        Quantity("crs", "Coordinate reference system", input=Input("such as EPSG:2056", type=str)),
+        Quantity("strike_length_m", "Length of the block along strike", "m", range=POSITIVE,
             input=Input("for its volume", ("strike_length",))),
-        Quantity("count", "Number of like blocks", input=Input()),
-        Quantity("weight", "What a failure counts", input=Input()),
-        Quantity("loss", "What a failure costs", input=Input()),
+        Quantity("count", "Number of identical blocks", input=Input()),
+        Quantity("weight", "Weight of a failure", input=Input()),
+        Quantity("loss", "Loss if the block fails", input=Input()),
         Quantity("loss_sigma", "Standard deviation of the logarithm of the loss", input=Input()),
     ),
     "stored measures": (
@@ -536,7 +550,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
         Quantity("intensity_m_s", "Intensity of the shaking", "m/s"),
         Quantity("y_m_s", "Toppling velocity k_r g/p", "m/s", "y",
             stored="critical toppling velocity k_r g/p; missing unless found"),
-        Quantity("k_over_pga", "Strength over peak ground acceleration"),
+        Quantity("k_over_pga", "Yield acceleration over peak ground acceleration"),
         Quantity("pgv_over_pga_s", "Peak ground velocity over peak ground acceleration", "s",
             credible=(
                 0.005, 2.0, "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies "
@@ -601,16 +615,16 @@ COLUMNS = tuple(
 """What may be a column of a table."""
 
 PANELS = {
-    "First": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
-    "A block by its numbers": (*NUMBERS, *FAILURE),
-    "A block by its shape": ("block", *SHAPE),
-    "Planes and joints": (*PLANES, *JOINT, *WHOLE, *AT_REST),
-    "What the block may be": SCATTER,
-    "More of the shaking": (*INTENSITY, *COMPONENT, *RECORD),
-    "Earthquake, site and scatter of the shaking": (*SCENE, *SOURCE),
-    "What is asked": REQUEST,
+    "Block and shaking": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
+    "Block parameters": (*NUMBERS, *FAILURE),
+    "Block geometry": ("block", *SHAPE, *SPACE),
+    "Joint properties": (*PLANES, *JOINT, *WHOLE, *AT_REST),
+    "Block uncertainty": SCATTER,
+    "Other intensity measures": (*INTENSITY, *COMPONENT, *RECORD),
+    "Scenario and ground-motion uncertainty": (*SCENE, *SOURCE),
+    "Model and confidence level": REQUEST,
 }
-"""Inputs by what they are about, a beginner's first; each belongs where it is found first."""
+"""Inputs by the headings of the help; an input belongs to the first group that holds it."""
 
 SPECTRAL = {
     measure.period_s: name
@@ -674,7 +688,7 @@ def inputs_from(words: Mapping[str, Any]) -> dict[str, Any]:
             continue
         if name in inputs:
             raise InputError(
-                f"{word} does not go with {words_of[name]}: both say the same",
+                f"{word} cannot be combined with {words_of[name]}: both give the same input",
                 fields=(word, words_of[name]),
             )
         words_of[name] = word

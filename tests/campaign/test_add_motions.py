@@ -90,7 +90,7 @@ def test_units_of_the_metadata_are_a_statement_too(tmp_path: Path, db: Path) -> 
 
 def test_units_that_contradict_the_only_file(tmp_path: Path, db: Path) -> None:
     (bad,) = add_motions([mixed(tmp_path) / "metres.txt"], db=db, units="g").failed
-    assert "m/s² is stated for it, not g: leave units out" in bad.reason
+    assert "its unit is m/s², not g: omit units" in bad.reason
 
 
 def test_a_row_without_an_index_is_about_the_whole_file(tmp_path: Path, db: Path) -> None:

@@ -139,15 +139,15 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
         ({"restitution_factors": (1.1,)}, "would gain speed"),
         ({"restitution_factors": (0.0,)}, "restitution_factor"),
         ({"p2": (-1.0,)}, "p2"),
-        ({"rotations_deg": (1.0,)}, "rotations_deg goes with kind slumping, not with rocking"),
-        ({"full_map": True}, "full_map goes with"),
-        ({"grid": 5}, "grid goes with kind toppling"),
+        ({"rotations_deg": (1.0,)}, "rotations_deg requires kind slumping"),
+        ({"full_map": True}, "full_map requires"),
+        ({"grid": 5}, "grid requires kind toppling"),
     ],
 )
 def test_what_cannot_be_run_is_refused(database: Path, asked: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         run(database, **asked)
-    with pytest.raises(InputError, match="restitution_factors goes with kind rocking"):
+    with pytest.raises(InputError, match="restitution_factors requires kind rocking"):
         simulate(database, restitution_factors=FACTORS)
 
 
@@ -222,5 +222,5 @@ def test_a_campaign_is_fitted_and_its_model_knows_restitution(tmp_path: Path) ->
     assert row.domain["p2"] == (0.1, 10.0)
     # less speed after each impact is safer
     assert row.coefficients["b_s"] < 0.0
-    with pytest.raises(InputError, match="overturning does not go with the term xp"):
+    with pytest.raises(InputError, match="overturning cannot be combined with the term xp"):
         fit(place, kind=KIND, term="xp")

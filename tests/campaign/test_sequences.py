@@ -209,10 +209,10 @@ def test_damage_is_found(database: Path, values: dict[str, str], problem: str) -
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"kind": "toppling"}, f"sequence does not go with kind toppling: {STARTS_ANEW}"),
-        ({"kind": "rocking"}, f"sequence does not go with kind rocking: {STARTS_ANEW}"),
-        ({"vertical": "both"}, "vertical does not go with sequence"),
-        ({"p2": (3.0,)}, "p2 goes with kind rocking or toppling"),
+        ({"kind": "toppling"}, f"sequence cannot be combined with kind toppling: {STARTS_ANEW}"),
+        ({"kind": "rocking"}, f"sequence cannot be combined with kind rocking: {STARTS_ANEW}"),
+        ({"vertical": "both"}, "vertical cannot be combined with sequence"),
+        ({"p2": (3.0,)}, "p2 requires kind rocking or toppling"),
         ({"draws": 0}, "draws must be at least 1, not 0"),
     ],
 )

@@ -168,10 +168,13 @@ def test_suspicious_dt_is_answered_with_a_warning(shell: Shell, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (("predict", "--p2", "abc"), "--p2': 'abc' cannot be used: give a number, with a point"),
-        (("predict", "--p2", "1,234"), "'1,234' cannot be used: give a number, with a point"),
-        (("db", "check", "--sample", "1.5"), "'1.5' cannot be used: give a whole number"),
-        (("db", "check", "--sample", "-3"), "'-3' cannot be used: give 0 or more"),
+        (
+            ("predict", "--p2", "abc"),
+            "--p2': invalid value 'abc': give a number with a decimal point",
+        ),
+        (("predict", "--p2", "1,234"), "'1,234': give a number with a decimal point"),
+        (("db", "check", "--sample", "1.5"), "'1.5': give a whole number"),
+        (("db", "check", "--sample", "-3"), "'-3': give 0 or more"),
     ],
 )
 def test_values_of_another_type_in_our_words(

@@ -109,10 +109,10 @@ def test_table_for_people(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (PLANES, "--phi goes with the shape of a block, by --height --width, or"),
+        (PLANES, "--phi requires the geometry of a block: give --height --width, or"),
         ((*ANGLES[:4], *PLANES), "--r3 is missing"),
         ((*ANGLES, "--s1", "1", *PLANES), "--s1"),
-        ((*ANGLES, "--polygon", "b.toml", *PLANES), "does not go with --polygon"),
+        ((*ANGLES, "--polygon", "b.toml", *PLANES), "cannot be combined with --polygon"),
         ((*ANGLES, "--phi", "35"), "--beta is missing"),
         ((*ANGLES, "--beta", "5"), "--phi is missing"),
         ((*ANGLES, "--beta", "5", "--phi", "90"), "--phi = 90"),

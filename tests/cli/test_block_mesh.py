@@ -67,12 +67,12 @@ def test_the_page_lists_the_columns_of_the_table(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--s1", "1"), "--mesh does not go with --s1: a block is described once"),
-        (("--block", "b.toml"), "--mesh does not go with --block"),
-        (("--beta", "5"), "--beta does not go with --mesh"),
-        (("--no-back",), "--no-back does not go with --mesh"),
-        (("--kv", "0.1"), "--kv does not go with --mesh"),
-        (("--cohesion", "1"), "--cohesion does not go with --mesh"),
+        (("--s1", "1"), "--mesh cannot be combined with --s1: give one description of the block"),
+        (("--block", "b.toml"), "--mesh cannot be combined with --block"),
+        (("--beta", "5"), "--beta cannot be combined with --mesh"),
+        (("--no-back",), "--no-back cannot be combined with --mesh"),
+        (("--kv", "0.1"), "--kv cannot be combined with --mesh"),
+        (("--cohesion", "1"), "--cohesion cannot be combined with --mesh"),
         (("--up", "w"), "up = 'w'"),
         (("--up", "y"), "not its resting pose"),
         (("--contact-mm", "0"), "contact_mm = 0 is not above zero"),
@@ -88,7 +88,7 @@ def test_refused(refuses: Refuses, options: tuple[str, ...], words: str) -> None
 @pytest.mark.parametrize("option", [("--up", "y"), ("--contact-mm", "5"), ("--out", "a.csv")])
 def test_options_of_a_mesh_need_one(refuses: Refuses, option: tuple[str, str]) -> None:
     message = refuses("block", "--height", "2", "--width", "1", *option)
-    assert f"{option[0]} goes with --mesh" in message
+    assert f"{option[0]} requires --mesh" in message
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])

@@ -128,19 +128,22 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
     [
         (("--height", "2"), "--width is missing: --height, --width together"),
         ((*SIDES, "--width", "0"), "--width = 0 is not above 0 m"),
-        ((*SIDES, "--dip", "3", "--beta", "3"), "--beta does not go with --dip"),
+        ((*SIDES, "--dip", "3", "--beta", "3"), "--beta cannot be combined with --dip"),
         (("--dip", "3"), "or by its shape, such as --height and --width"),
         ((*ALPHA1, "--dip", "3"), "--phi is missing"),
-        ((*SIDES, "--p2", "3"), "--p2 does not go with --height"),
-        ((*SIDES, *ALPHA1), "--alpha1 does not go with --height"),
-        ((*SIDES, "--block", "b.toml"), "--height does not go with --block"),
-        (("--polygon", "a.csv", "--block", "b.toml"), "--polygon does not go with --block"),
+        ((*SIDES, "--p2", "3"), "--p2 cannot be combined with --height"),
+        ((*SIDES, *ALPHA1), "--alpha1 cannot be combined with --height"),
+        ((*SIDES, "--block", "b.toml"), "--height cannot be combined with --block"),
+        (("--polygon", "a.csv", "--block", "b.toml"), "--polygon cannot be combined with --block"),
         ((*ALPHA1, "--phi", "30"), "--beta is missing"),
         ((*ALPHA1, "--beta", "3"), "--phi is missing"),
-        (("--p2", "3", "--kr", "0.1", "--phi", "30"), "--phi goes with the shape of a block"),
-        (("--p2", "3", "--kr", "0.1", "--units", "g"), "--units goes with --motion"),
-        (("--p2", "3", "--kr", "0.1", "--out", "a.csv"), "--out goes with --blocks"),
-        ((*SIDES, "--batch", "a.csv", "--out", "b.csv"), "--blocks does not go with --height"),
+        (("--p2", "3", "--kr", "0.1", "--phi", "30"), "--phi requires the geometry of a block"),
+        (("--p2", "3", "--kr", "0.1", "--units", "g"), "--units requires --motion"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.csv"), "--out requires --blocks"),
+        (
+            (*SIDES, "--batch", "a.csv", "--out", "b.csv"),
+            "--blocks cannot be combined with --height",
+        ),
         ((), "--p2 is missing"),
     ],
 )
@@ -154,7 +157,7 @@ def test_respond_needs_friction_for_the_film_of_a_rectangle(
     shell: Shell, refuses: Refuses, files: Path
 ) -> None:
     asked = ("respond", "record.AT2", *SIDES)
-    assert "needs the shape of the block and its --phi" in refuses(*asked, "--film", "a.gif")
+    assert "requires the block geometry and --phi" in refuses(*asked, "--film", "a.gif")
     for command in ("respond", "critical"):
         said = shell.json(command, *asked[1:])["warnings"]
         assert any("assumed to topple" in text for text in said)

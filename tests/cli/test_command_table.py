@@ -121,18 +121,22 @@ def test_what_was_given_is_said_by_field_and_two_words_of_one_are_refused() -> N
     )
     refused = run(made, ["--dip", "3", "--beta", "3"]).exception
     assert isinstance(refused, InputError)
-    assert refused.spelled(option_of).startswith("--beta does not go with --dip")
+    assert refused.spelled(option_of).startswith("--beta cannot be combined with --dip")
 
 
 def test_the_table_refuses_by_what_is_given_and_known() -> None:
     refuse("any", ["--p2", "--kr"], ["--p2", "--kr", "--motion", "--vertical"])
-    with pytest.raises(InputError, match=r"--block does not go with --p2: a block is described"):
+    with pytest.raises(
+        InputError, match=r"--block cannot be combined with --p2: give one description"
+    ):
         refuse("any", ["--p2", "--block"], ["--p2", "--block"])
-    with pytest.raises(InputError, match=r"--vertical goes with --motion: name the accelerogram"):
+    with pytest.raises(
+        InputError, match=r"--vertical requires --motion: give also the accelerogram"
+    ):
         refuse("any", ["--vertical"], ["--motion", "--vertical"])
     refuse("respond", ["--vertical"], ["--vertical"])  # its motion is an argument
     refuse("predict", ["--model"], ["--model", "--pgv"])
-    with pytest.raises(InputError, match="--model goes with a measure of the motion"):
+    with pytest.raises(InputError, match="--model requires an intensity measure"):
         refuse("rockmass", ["--model"], ["--model", "--pgv"])
 
 

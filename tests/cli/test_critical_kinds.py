@@ -59,13 +59,13 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--kind", "slumping"), "no block: its shape, dip and friction decide about slumping"),
-        (("--kind", "sliding", "--p2", "3"), "--p2 goes with --kind toppling"),
-        (("--rotation", "3"), "--rotation goes with --kind confined_toppling and slumping"),
+        (("--kind", "slumping"), "the kind slumping requires the geometry of a block"),
+        (("--kind", "sliding", "--p2", "3"), "--p2 requires --kind toppling"),
+        (("--rotation", "3"), "--rotation requires --kind confined_toppling or slumping"),
         (("--kind", "falling"), "use one of confined_toppling, rocking, sliding"),
         (("--kind", "rocking", "--p2", "3"), "has no critical value: what overturns"),
         ((), "--p2 is missing"),
-        (("--kind", "sliding", "--displacement", "far"), "'far' is no number"),
+        (("--kind", "sliding", "--displacement", "far"), "'far' is not a number"),
     ],
 )
 def test_what_does_not_fit_the_kind_is_refused(

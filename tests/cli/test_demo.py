@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.cli.commands.demo import NEXT
+from rbfrag.cli.parameters.stack import LONGEST_HELP, MOST_USED, OUTPUT
 from tests.cli.conftest import Shell, shell
 
 __all__ = ["shell"]
@@ -31,11 +32,24 @@ def test_the_last_lines_run_with_the_extras_that_are_installed(shell: Shell) -> 
 
 def test_the_first_six_options_are_those_of_a_beginner(shell: Shell) -> None:
     text = shell("predict", "--help").stdout
-    first = text[text.index("First:") : text.index("A block by its numbers:")]
+    first = text[text.index("Block and shaking:") : text.index("Block parameters:")]
     assert re.findall(r"^  (--[a-z-]+)", first, re.M) == [
         "--height", "--width", "--dip", "--phi", "--kind", "--pgv",
     ]  # fmt: skip
     assert len(re.findall(r"^  --pgv ", text, re.M)) == 1
+
+
+def test_help_shows_the_most_used_options_and_help_all_the_rest(shell: Shell) -> None:
+    def options(word: str) -> set[str]:
+        return {*re.findall(r"^  (--[a-z0-9-]+)", shell("predict", word).stdout, re.M)}
+
+    most_used, every = options("--help"), options("--help-all")
+    assert len(most_used) == LONGEST_HELP
+    assert {"--help-all", "--out", "--json"} <= most_used
+    assert most_used < every
+    assert "--help-all" not in shell("motions", "show", "--help").stdout
+    for names in (OUTPUT, MOST_USED):
+        assert len(names) == len({*names})
 
 
 def test_the_demo_says_at_its_end_that_it_fitted_synthetic_pulses(

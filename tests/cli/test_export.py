@@ -76,8 +76,8 @@ def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., 
     assert "that stands free" in json.loads(Path("a.json").read_text())["block"]["Description"]
     backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
     message = refuses(*backed, "--restitution", "0.8", "--kind", "toppling")
-    assert "--restitution does not go with kind toppling" in message
-    with pytest.raises(InputError, match="shares are of a rock mass"):
+    assert "--restitution cannot be combined with kind toppling" in message
+    with pytest.raises(InputError, match="shares require a rock mass"):
         rbfrag.export.nrml("b.xml", 3.0, 0.1, kind="rocking", shares=[50.0])
 
 
@@ -160,7 +160,7 @@ def test_a_rock_mass_with_several_limit_states(shell: Shell, refuses: Callable[.
     assert [(f.name, f.limit_state) for f in read_nrml("a.xml")] == [
         ("face", f"failed_{share}_percent") for share in (1, 10, 50)
     ]
-    assert "'x' is no number" in refuses(*mass, "--shares", "1,x")
+    assert "'x' is not a number" in refuses(*mass, "--shares", "1,x")
     other = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml", "--shares", "50")
     assert "--shares" in refuses(*other)
 
@@ -183,16 +183,16 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
     [
         (("--p2", "3", "--kr", "0.1", "--imt", "SA(3)"), "use one of PGV, PGA, SA(1)"),
         (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "use one of PGV, PGA, SA(1)"),
-        (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is unknown"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
         (
             ("--p2", "3", "--kr", "0.1", "--blocks", "b.csv"),
-            "--blocks does not go with --p2: a block is described once",
+            "--blocks cannot be combined with --p2: give one description of the block",
         ),
         (("--p2", "3"), "--kr is missing"),
         (("--blocks", "none.csv"), "no such file"),
         (("--blocks", "bad.csv"), "line 2 (block A7): kr = -1 is not above zero"),
-        (("--blocks", "twice.csv"), "'A7' is there twice"),
+        (("--blocks", "twice.csv"), "'A7' occurs twice"),
     ],
 )
 def test_refusals(refuses: Callable[..., str], options: tuple[str, ...], words: str) -> None:

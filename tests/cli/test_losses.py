@@ -98,10 +98,10 @@ def test_files_by_name_and_time_by_option(shell: Shell, job: Path) -> None:
 def test_what_is_refused(refuses: Refuses, job: Path) -> None:
     blocks = ("--blocks", "blocks.csv")
     assert "there is no file of gmf-data" in refuses("losses", *blocks)
-    assert "is no folder" in refuses("losses", "nowhere", *blocks)
+    assert "is not a folder" in refuses("losses", "nowhere", *blocks)
     assert "no column gmv_PGA" in refuses("losses", job, *blocks, "--imt", "PGA")
     assert "--samples" in refuses("losses", job, *blocks, "--expected", "--samples", "5")
-    assert "--plot does not go with" in refuses(
+    assert "--plot cannot be combined with" in refuses(
         "losses", job, *blocks, "--expected", "--plot", "a.svg"
     )
     assert "--jobs" in refuses("losses", job, *blocks, "--jobs", "0")

@@ -77,7 +77,7 @@ def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> No
         update_rows(connection, fragility_model, one, {"method": "guess"})
     told = shell("models", "check", expect=1).stdout
     assert "unreadable" in told
-    assert "'guess', which this rbfrag does not know" in " ".join(told.split())
+    assert "'guess', which is not supported by this version" in " ".join(told.split())
 
 
 def test_without_a_database_it_is_refused(refuses: Refuses, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_campaign_of_two_sizes_ends_in_one_sentence(
     shell("motions", "add", write_suite(tmp_path / "records"))
     shell("simulate", "--p2", "10,1", "--jobs", "1")
     message = refuses("fit", "--term", "pga", "--method", "bounded")
-    assert "do not tell the 5 parameters of method bounded apart" in message
+    assert "do not identify the 5 parameters of method bounded" in message
 
 
 def test_a_default_is_chosen_in_a_copy_of_the_built_in_data(

@@ -40,7 +40,7 @@ def test_every_figure_of_the_database(
         shell("plot", name, *options, "--out", path)
         assert path.stat().st_size > 5000, name
     # these motions have no vertical components
-    assert "simulate both, by rbfrag simulate" in refuses(
+    assert "run  rbfrag simulate  for both" in refuses(
         "plot", "vertical", "--out", tmp_path / "v.png"
     )
     assert not (tmp_path / "v.png").exists()
@@ -67,7 +67,7 @@ def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_pa
         assert "model PGV, rocking" in path.read_text(encoding="utf-8")
         assert "no plane backs the block" not in done.stdout
     told = refuses("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
-    assert "restitution does not go with kind toppling" in told
+    assert "restitution cannot be combined with kind toppling" in told
 
 
 def test_curves_of_blocks_that_slide_and_slump(

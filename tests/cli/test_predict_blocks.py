@@ -102,7 +102,7 @@ def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
     Path("a.csv").write_text("p2,kr\n3,0.1\n")
     only = refuses("predict", "--pgv", "0.6", "--blocks", "a.csv", "--sheet", "x")
     assert "only workbooks (.xlsx) have sheets" in only
-    assert "--sheet goes with --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
+    assert "--sheet requires --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
 
 
 def add_row(path: Path) -> None:
@@ -132,7 +132,7 @@ def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> 
     alone = of_one(shell, "2.4", "0.5", "3")
     assert row["block_id"] == "A1"
     assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)
-    assert "--template does not go with --height" in refuses(
+    assert "--template cannot be combined with --height" in refuses(
         "block", "--template", name, "--height", "2"
     )
     assert "none of .xlsx, .csv" in refuses("block", "--template", "a.parquet")

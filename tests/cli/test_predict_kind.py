@@ -68,17 +68,20 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
         (
             ("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"),
-            "nothing about the motion is given: a prediction needs --pgv, or --sa10",
+            "nothing about the motion is given: a prediction requires --pgv, or --sa10",
         ),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
         (
             ("--kind", "slumping", "--kr", "0.1", *MOTION),
-            "kind slumping reads --ks and --ps2",
+            "kind slumping uses --ks and --ps2",
         ),
-        (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "ky does not go with kind toppling"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION),
+            "ky cannot be combined with kind toppling",
+        ),
         (
             ("--kind", "confined_toppling", "--p2", "3", "--kr", "1", *MOTION),
-            "kind confined_toppling reads --kct and --pct2",
+            "kind confined_toppling uses --kct and --pct2",
         ),
         (
             (
@@ -92,7 +95,7 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
                 "2",
                 *MOTION,
             ),
-            "a rotation is no failure of a block of kind confined_toppling",
+            "rotation_deg is not a failure criterion of kind confined_toppling",
         ),
         (
             ("--kind", "slumping", "--ks", "0.1", "--ps2", "3", "--rotation", "7", *MOTION),
@@ -137,13 +140,13 @@ def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> Non
 
 
 def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
-    assert "--p2 goes with --kind rocking or toppling" in refuses(
+    assert "--p2 requires --kind rocking or toppling" in refuses(
         "simulate", "--kind", "sliding", "--p2", "1"
     )
     assert "campaigns are of" in refuses("simulate", "--kind", "falling")
     message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
-    assert "method wls fits blocks known by p2 and kr, not those of kind sliding" in message
-    assert "leave --rotation out" in refuses("fit", "--term", "pgv", "--rotation", "2")
+    assert "method wls fits blocks with p2 and kr, not those of kind sliding" in message
+    assert "omit --rotation" in refuses("fit", "--term", "pgv", "--rotation", "2")
 
 
 def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:

@@ -90,7 +90,7 @@ def test_a_column_of_restitution_with_empty_cells_is_that_of_each_block(shell: S
     assert float(stated["probability"]) == pytest.approx(given["probability"], rel=1e-12)
     for row in (rests, wrong):
         assert row["probability"] == ""
-        assert "restitution is no ratio of speeds" in row["reason"]
+        assert "restitution is outside the model" in row["reason"]
 
 
 def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:
@@ -126,6 +126,6 @@ def test_block_names_the_command_for_a_block_that_stands_free(
     shell: Shell, refuses: Refuses
 ) -> None:
     shape = ("block", "--height", "2", "--width", "0.5", "--no-back")
-    assert "predict and respond answer with --kind rocking" in refuses(*shape)
+    assert "no friction angle is required with --kind rocking" in refuses(*shape)
     warned = shell.json(*shape, "--phi", "40")["warnings"]
     assert any("rbfrag predict --kind rocking" in text for text in warned)

@@ -42,8 +42,8 @@ def test_draws_of_a_table_are_one_block(shell: Shell) -> None:
     ("more", "words"),
     [
         (("--kr-sigma", "-1"), "kr_sigma = -1: give a standard deviation of 0 or more"),
-        (("--restitution-sigma", "0.1"), "--restitution-sigma does not go with kind"),
-        (("--block-draws", "draws.csv"), "--block-draws does not go with --p2"),
+        (("--restitution-sigma", "0.1"), "--restitution-sigma cannot be combined with kind"),
+        (("--block-draws", "draws.csv"), "--block-draws cannot be combined with --p2"),
     ],
 )
 def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:

@@ -97,7 +97,7 @@ def test_python_writes_the_same(shell: Shell) -> None:
     with pytest.raises(InputError, match="2 rates and the table 1 blocks"):
         write_release_rates(answer, {"height_m": [2.0], "width_m": [0.5]}, "python.csv")
     columns = {"height_m": [2.0, 2.0], "width_m": [0.5, 0.4]}
-    with pytest.raises(InputError, match="x and y need a coordinate reference system"):
+    with pytest.raises(InputError, match="x and y require a coordinate reference system"):
         write_release_rates(answer, {**columns, "x": [1.0, 2.0], "y": [1.0, 2.0]}, "python.csv")
     with pytest.raises(InputError, match="strike_length_m = -1"):
         write_release_rates(answer, {**columns, "strike_length_m": [1.0, -1.0]}, "python.csv")

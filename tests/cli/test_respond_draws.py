@@ -1,4 +1,4 @@
-"""`respond --draws`: as from Python, and what does not go with it."""
+"""`respond --draws`: as from Python, and what cannot be combined with it."""
 
 from __future__ import annotations
 
@@ -52,11 +52,17 @@ def test_a_table_and_a_rectangle_are_drawn_from(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--kr", "0.1", "--kr-sigma", "0.1"), "--kr-sigma goes with --draws"),
+        (("--kr", "0.1", "--kr-sigma", "0.1"), "--kr-sigma requires --draws"),
         (("--kr", "0.1", "--draws", "0"), "draws = 0"),
-        (("--kr", "0.1", "--draws", "3", "--csv", "x.csv"), "--draws does not go with --csv"),
-        (("--kr", "0.1", "--draws", "3", "--reverse", "--polarity", "both"), "--polarity does not"),
-        (("--draws", "3", "--block-draws", "draws.csv"), "--block-draws does not go with --p2"),
+        (
+            ("--kr", "0.1", "--draws", "3", "--csv", "x.csv"),
+            "--draws cannot be combined with --csv",
+        ),
+        (("--kr", "0.1", "--draws", "3", "--reverse", "--polarity", "both"), "--polarity cannot"),
+        (
+            ("--draws", "3", "--block-draws", "draws.csv"),
+            "--block-draws cannot be combined with --p2",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:

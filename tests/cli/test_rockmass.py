@@ -184,11 +184,11 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--seed", "-1"), "seed = -1"),
         (("mass.toml", "--pgv", "nan"), "--pgv = nan"),
         (("mass.toml", "--pgv", "-1"), "--pgv = -1"),
-        (("mass.toml", "--model", "line"), "--model goes with a measure of the motion"),
-        (("mass.toml", "--db", "a.db"), "--db goes with a motion or a measure of it"),
+        (("mass.toml", "--model", "line"), "--model requires an intensity measure"),
+        (("mass.toml", "--db", "a.db"), "--db requires a motion or an intensity measure"),
         (("mass.toml", "--pgv", "1", "--level", "2"), "level = 2.0"),
         (("mass.toml", "--out", "a.xls"), "none of .csv, .xlsx, .parquet"),
-        (("mass.toml", "--out", "none/a.csv"), "there is no folder none"),
+        (("mass.toml", "--out", "none/a.csv"), "create the folder none"),
         (("mass.toml", "--plot", "a.gif"), "none of .png"),
         (("none.toml",), "no such file"),
         (("steep.toml", "--pgv", "1", "--db", "none.db"), "none.db"),
@@ -213,7 +213,7 @@ def test_refusals(
         ("phi_deg = 35", "phi_deg = nan", "friction.phi_deg: nan is not finite"),
         ("spacing_m = 1.0", "spacing_m = 0.0", "base.spacing_m: 0 is out of range"),
         ("spacing_m = 1.0", "", "base.spacing_m is missing"),
-        ("lognormal", "gamma", "back.spacing_m: distribution = 'gamma' is not known"),
+        ("lognormal", "gamma", "back.spacing_m: distribution = 'gamma' is unknown"),
     ],
 )
 def test_files_are_refused_with_file_and_key(
@@ -229,9 +229,12 @@ def test_files_are_refused_with_file_and_key(
     ("arguments", "words"),
     [
         (("--phi", "90"), "phi_deg"),
-        (("--phi", "35", "--blocks", "a.csv", "--rockmass", "mass.toml"), "does not go with"),
+        (
+            ("--phi", "35", "--blocks", "a.csv", "--rockmass", "mass.toml"),
+            "cannot be combined with",
+        ),
         (("--phi", "35", "--blocks", "a.csv"), "a.csv: no such file"),
-        (("--phi", "35", "--blocks", "empty.csv"), "no block to show"),
+        (("--phi", "35", "--blocks", "empty.csv"), "no valid block"),
     ],
 )
 def test_charts_are_refused(

@@ -79,12 +79,12 @@ def test_a_stored_motion_by_its_number(shell: Shell, record: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (("--scales", "1,2"), "--scales goes with --motion"),
-        (("--jobs", "2"), "--jobs goes with --motion"),
-        (("--displacement", "0.1"), "--displacement goes with --motion"),
-        (("--reverse",), "--reverse goes with --motion"),
-        (("--motion", "record.AT2", "--pgv", "0.5"), "does not go with --pgv"),
-        (("--motion", "record.AT2", "--model", "x"), "--model goes with a measure"),
+        (("--scales", "1,2"), "--scales requires --motion"),
+        (("--jobs", "2"), "--jobs requires --motion"),
+        (("--displacement", "0.1"), "--displacement requires --motion"),
+        (("--reverse",), "--reverse requires --motion"),
+        (("--motion", "record.AT2", "--pgv", "0.5"), "cannot be combined with --pgv"),
+        (("--motion", "record.AT2", "--model", "x"), "--model requires an intensity measure"),
         (("--motion", "none.AT2"), "none.AT2"),
         (("--motion", "record.AT2", "--vertical", "none.AT2"), "none.AT2"),
         (("--motion", "record.AT2", "--scales", "1,x"), "--scales"),

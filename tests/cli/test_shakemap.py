@@ -188,7 +188,7 @@ def test_nodes_without_a_number_are_left_out_and_counted(shell: Shell, grid: Pat
             "component 'x'",
         ),
         (("--out", "a.csv"), "--p2 is missing"),
-        (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat go together"),
+        (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat are required together"),
         (("--out", "a.csv", "--blocks", "bad.csv"), "line 2: kr = 0 is not above zero"),
         (
             ("--out", "a.csv", "--blocks", "far.csv"),
@@ -269,7 +269,7 @@ def test_free_standing_blocks_with_their_restitution(
     assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
     assert told["model"] == "rocking-pgv_pga"
     message = refuses("shakemap", grid, *one, *SINGLE, "--kind", "toppling")
-    assert "--restitution does not go with kind toppling" in message
+    assert "--restitution cannot be combined with kind toppling" in message
 
 
 def test_progress_is_shown(shell: Shell, grid: Path) -> None:

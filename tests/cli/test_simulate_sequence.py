@@ -59,9 +59,9 @@ def test_the_table_is_printed_written_and_the_same_again(shell: Any, shocks: Pat
     ("more", "message"),
     [
         (("--sequence",), "--kind toppling: a block that topples or rocks carries no state"),
-        (("--kind", "sliding", "--seed", "2"), "--seed goes with --sequence"),
-        (("--kind", "sliding", "--out", "a.csv"), "--out goes with --sequence"),
-        (("--sequence", "--vertical", "with"), "--vertical does not go with --sequence"),
+        (("--kind", "sliding", "--seed", "2"), "--seed requires --sequence"),
+        (("--kind", "sliding", "--out", "a.csv"), "--out requires --sequence"),
+        (("--sequence", "--vertical", "with"), "--vertical cannot be combined with --sequence"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(

@@ -73,7 +73,7 @@ def test_stored_motion(shell: Shell, record: Path) -> None:
     ("options", "words"),
     [
         (("--p2", "3,0"), "p2 number 2 is 0"),
-        (("--p2", "3,x"), "'x' is no number"),
+        (("--p2", "3,x"), "'x' is not a number"),
         (("--polarity", "up"), "'up'"),
         (("--csv", "x.txt"), ".txt"),
         (("--plot", "x.jpg"), ".jpg"),

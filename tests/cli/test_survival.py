@@ -123,7 +123,7 @@ def test_refusals_of_a_logic_tree(
     branch, weights = tree / "hazard_curve-rlz-000-PGV_7.csv", tree / "realizations_7.csv"
     asked = (*BLOCK, "--age", "3000")
     at = ("--site", "SLIDE-A")
-    assert "choose it by its number or name" in refuses("survival", branch, *asked)
+    assert "choose it by number or name" in refuses("survival", branch, *asked)
     assert "add up to 0.5, not 1" in refuses("survival", branch, *at, *asked, "--weights", weights)
     assert "none of the curves is one" in refuses("survival", curve, *asked, "--weights", weights)
     Path("few.csv").write_text("rlz_id,branch_path,weight\n1,A~B,1.0\n")
@@ -131,7 +131,7 @@ def test_refusals_of_a_logic_tree(
     assert "there is no rlz_id 0" in message
     Path("none.csv").write_text("rlz_id,weight\n0,half\n")
     message = refuses("survival", branch, *at, *asked, "--weights", "none.csv")
-    assert "is no realization" in message
+    assert "is not a realization" in message
     other = tree / "hazard_curve-mean-PGA_7.csv"
     assert "curves are of PGV, PGA" in refuses("survival", branch, other, *at, *asked)
 

@@ -147,7 +147,7 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
     message = refuses(*asked[command], "--blocks", "b.csv")
     assert "7 of 9 blocks cannot be used" in message
     assert "line 3 (block B)" in message
-    assert "correct these rows or take them out" in message
+    assert "correct or remove these rows" in message
     assert len(message) < 500
     assert not Path("a.xml").exists()
     shell(*asked[command], "--blocks", "sound.csv")
@@ -269,4 +269,4 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
 def test_a_chart_shows_the_blocks_that_it_can(shell: Shell) -> None:
     Path("b.csv").write_text("alpha1_deg,alpha3_deg\n-20,20\nsteep,20\n,20\n-30,10\n")
     done = shell("plot", "modes", "--phi", "30", "--blocks", "b.csv", "--out", "a.svg")
-    assert "2 of 4 rows are no block and not shown" in done.stdout
+    assert "2 of 4 rows have invalid angles and are not shown" in done.stdout

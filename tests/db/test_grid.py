@@ -126,7 +126,7 @@ def test_a_grid_that_comes_later(engine: Engine, store: Store) -> None:
     with engine.begin() as connection:
         for _ in range(2):
             add_grids(connection, {first: GRID})
-        with pytest.raises(InputError, match="there is no combination"):
+        with pytest.raises(InputError, match="unknown combination"):
             add_grids(connection, {"0" * 64: GRID})
     with engine.connect() as connection:
         known = known_combinations(connection, [first, second])

@@ -210,7 +210,7 @@ class TestFastReader:
             read_models(stored)
         with closing(sqlite3.connect(stored)) as raw, raw:
             raw.execute("DROP TABLE rbfrag_revision")
-        with pytest.raises(NotADatabaseError, match="holds no schema"):
+        with pytest.raises(NotADatabaseError, match="has no schema"):
             read_models(stored)
 
     def test_loads_nothing_heavy(self, stored: Path) -> None:

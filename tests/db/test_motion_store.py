@@ -206,7 +206,7 @@ def test_suites(engine: Engine, make_motion: MakeMotion) -> None:
         assert len(motion_rows(connection)) == 3
         assert [row.source_file for row in motion_rows(connection, suite="a")] == ["2.txt"]
         assert len(motion_rows(connection, suite="b")) == 2
-        with pytest.raises(InputError, match="no suite 'c'; the database holds: a, b"):
+        with pytest.raises(InputError, match="unknown suite 'c'; the suites are a, b"):
             motion_rows(connection, suite="c")
         with pytest.raises(InputError, match="suite must not be empty"):
             add_motion(connection, make_motion(1), earthquake=GUESS, is_vertical=False, suite=" ")

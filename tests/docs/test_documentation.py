@@ -68,7 +68,8 @@ def complaint(words: list[str]) -> str | None:
     rest = words[depth:]
     if hasattr(command, "list_commands") and rest and not rest[0].startswith("-"):
         return f"no command {' '.join(words[: depth + 1])}"
-    options = {name for parameter in command.params for name in parameter.opts} | {"--help"}
+    options = {name for parameter in command.params for name in parameter.opts}
+    options |= {"--help", "--help-all"}
     for word in rest:
         if word.startswith("--") and word.split("=")[0] not in options:
             return f"{' '.join(words[:depth])} has no option {word}"

@@ -161,7 +161,9 @@ def test_a_block_that_credible_shaking_does_not_fail_has_none() -> None:
     numbers = {"p2": np.array([3.0, 0.1]), "kr": np.array([0.1, 3.0])}
     with pytest.raises(InputError, match=r"1 of 2 blocks, first 'b', have no fragility"):
         block_functions(["a", "b"], numbers, "pgv_m_s")
-    with pytest.raises(InputError, match="levels = 9: a discrete fragility needs at least 10"):
+    with pytest.raises(
+        InputError, match=("levels = 9: a discrete fragility function requires at least 10")
+    ):
         block_functions(["a"], {"p2": np.array([3.0]), "kr": np.array([0.1])}, "pgv_m_s", levels=9)
 
 

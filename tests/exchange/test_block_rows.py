@@ -170,7 +170,7 @@ def test_lines_are_those_of_an_editor(
 def _no_arrow() -> None:
     from rbfrag.errors import MissingExtraError
 
-    raise MissingExtraError("Parquet files need pyarrow", "parquet")
+    raise MissingExtraError("Parquet files require pyarrow", "parquet")
 
 
 def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None:
@@ -217,7 +217,7 @@ def test_kinds_of_rows() -> None:
     assert own.blocks["row"].tolist() == [0, 3, 4]
     assert own.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
     rocking, sliding = own.refused["reason"].tolist()
-    assert rocking.startswith("restitution = 1.2 is no ratio of speeds")
+    assert rocking.startswith("restitution = 1.2 is outside the model")
     assert sliding == (
         "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
         "displacement_m"
@@ -241,7 +241,7 @@ def test_kinds_of_rows() -> None:
         ({"p2_1_s2": [3.0], "kr": [0.1, 0.2]}, "differ in length: p2_1_s2 1, kr 2"),
         ({"p2_1_s2": [3.0]}, "there is no column kr"),
         ({"p2_1_s2": [], "kr": []}, "there is no block"),
-        ({"p2_1_s2": [3.0], "kr": [0.1], "lon": [1.0]}, "lon and lat go together"),
+        ({"p2_1_s2": [3.0], "kr": [0.1], "lon": [1.0]}, "lon and lat are required together"),
         ({"p2_1_s2": [3.0], "kr": [0.1], "weight": [0.0]}, "weights of the blocks sum to zero"),
         (3, "blocks is of type int"),
     ],
@@ -301,6 +301,6 @@ def test_a_long_list_has_room_in_a_message() -> None:
         ).whole("all are asked about")
     message = str(refusal.value)
     assert "4,999 of 5,000 blocks" in message
-    assert message.endswith("correct these rows or take them out")
+    assert message.endswith("correct or remove these rows")
     assert "…" not in message
     assert unusable_in_words(0, 5, [], []) == ()

@@ -156,12 +156,12 @@ def test_refusals(database: Path, tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").touch()
     for out, options, message in (
-        ("full", {}, "it holds something already"),
-        ("full/mine.txt", {}, "it holds something already"),
-        ("none/out", {}, "there is no folder"),
+        ("full", {}, "the folder is not empty"),
+        ("full/mine.txt", {}, "the folder is not empty"),
+        ("none/out", {}, "create the folder"),
         ("out", {"format": "xlsx"}, "choose one of parquet, csv"),
-        ("out", {"format": "csv", "arrays": True}, "a CSV cell holds no array"),
-        ("out", {"tables": ["motions"]}, "there is no table 'motions'"),
+        ("out", {"format": "csv", "arrays": True}, "not supported in CSV"),
+        ("out", {"tables": ["motions"]}, "unknown table 'motions'"),
         ("out", {"tables": []}, "at least one table"),
     ):
         with pytest.raises(InputError, match=message):
@@ -173,5 +173,5 @@ def test_the_command_line(database: Path, shell: Shell, refuses: Refuses) -> Non
     words = ("db", "export", "--db", database, "--out", "out")
     answer = shell.json(*words, "--tables", "motion, suite")
     assert answer == {"folder": "out", "format": "parquet", "rows": {"motion": 2, "suite": 1}}
-    assert "it holds something already" in refuses(*words)
-    assert "there is no database" in refuses("db", "export", "--out", "out2")
+    assert "the folder is not empty" in refuses(*words)
+    assert "no database" in refuses("db", "export", "--out", "out2")

@@ -85,9 +85,9 @@ def test_every_writer_of_csv_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for words in ([], ["--excel-text"]):
         shell("spectrum", "=1+1.AT2", "--p2", "3", "--csv", "x.csv", *words)
         assert Path("x.csv").read_text().splitlines()[1].startswith("'=" if words else "=")
-    assert "goes with --csv" in shell("spectrum", "1", "--excel-text", expect=2).stderr
+    assert "requires --csv" in shell("spectrum", "1", "--excel-text", expect=2).stderr
     mass = Path(__file__).parents[2] / "docs" / "examples" / "rockmass.toml"
     shell("rockmass", mass, "--n", "20", "--out", "blocks.csv", "--excel-text")
     for name in ("blocks.xlsx", "blocks.parquet"):
         told = shell("rockmass", mass, "--n", "20", "--out", name, "--excel-text", expect=2)
-        assert f"--excel-text is about CSV, and {name} is none" in told.stderr
+        assert f"--excel-text applies to CSV output only, not to {name}" in told.stderr

@@ -312,17 +312,17 @@ CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("a.txt", "v 0 0 0", "ends in .obj, .ply, .stl, not '.txt'"),
+        ("a.txt", "v 0 0 0", "use .obj, .ply, .stl, not '.txt'"),
         ("a.obj", "", "has no triangles"),
         ("a.stl", "", "has no triangles"),
-        ("a.ply", "", "not a mesh that can be read"),
+        ("a.ply", "", "not a valid mesh"),
         ("a.obj", CUBE, "has no triangles"),
         ("a.obj", CUBE + "f 1 2 99\n", "a.obj"),
         ("a.obj", CUBE.replace("1 1 1", "1 1 nan") + "f 6 7 8\n", "not finite"),
         ("a.obj", CUBE.replace("1 1 1", "1 1 1e200") + "f 6 7 8\n", "beyond arithmetic"),
         ("a.obj", CUBE + "f 1 2 3\n", "not closed|resting|no volume"),
         ("a.obj", "v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", "a.obj"),
-        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9\n", "not a mesh that can be read"),
+        ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9\n", "not a valid mesh"),
     ],
 )
 def test_files_that_hold_no_mesh(name: str, content: str, words: str, tmp_path: Path) -> None:

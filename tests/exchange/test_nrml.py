@@ -88,7 +88,7 @@ def test_what_cannot_be_written() -> None:
     other = lognormal_function("b", "moved", PGV, 0.5, 0.3, "test")
     with pytest.raises(InputError, match="no fragility function"):
         nrml_text([])
-    with pytest.raises(InputError, match="'a' is there twice"):
+    with pytest.raises(InputError, match="'a' occurs twice"):
         nrml_text([one, other, one])
     with pytest.raises(InputError, match="'b' has other limit states"):
         nrml_text([one, other])
@@ -110,18 +110,18 @@ WHOLE = """<?xml version="1.0"?>
         ('ls="high"', 'ls="higher"', "lacks the limit state 'high'"),
         ('ls="high"', 'ls="low"', "line 6: limit state 'low' is given twice"),
         ("0.1 0.5", "0.1", "2 levels and 1 probabilities"),
-        ("0.1 0.5", "0.5 0.1", "falls with rising level"),
+        ("0.1 0.5", "0.5 0.1", "decreases with increasing level"),
         ("0.1 0.5", "0.1 1.5", "outside 0 to 1"),
         ("0.1 0.5", "0.1 x", "'x' is not a number"),
-        ("10 20", "20 10", "the levels must rise"),
-        ('imt="PGV"', 'imt="CAV"', "'CAV' is not known"),
+        ("10 20", "20 10", "the levels must increase"),
+        ('imt="PGV"', 'imt="CAV"', "'CAV' is unknown"),
         ('format="discrete"', 'format="other"', "neither continuous nor discrete"),
         ("<limitStates>low high</limitStates>", "", "limitStates is missing"),
         ("low high", " ", "there is no limit state"),
         ('id="A" ', "", "has no id"),
         ("</nrml>", "", "not well-formed"),
         ("<nrml xmlns", '<!DOCTYPE nrml [<!ENTITY a "b">]><nrml xmlns',
-         "document type definition, which is refused"),
+         "document type definition, which is not supported"),
     ],
 )  # fmt: skip
 def test_bad_files_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -103,7 +103,7 @@ def _one_site_unknown(file: Any) -> None:
         (_no_weights, "has no 'weights'"),
         (_table_of_weights, r"weights: of shape \(3, 2\)"),
         (_nan, "gmf_data, row 4: gmv_PGV is nan, no number"),
-        (_event_twice, "events, row 2: the event 0 is there twice"),
+        (_event_twice, "events, row 2: the event 0 occurs twice"),
         (_one_site_unknown, "gmf_data, row 1: the site '9' is not in calc_5.hdf5"),
     ],
 )

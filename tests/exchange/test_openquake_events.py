@@ -145,16 +145,16 @@ def test_years_beyond_the_stated_time_are_warned_of(tmp_path: Path) -> None:
         ("gmf-data", "1,80.0", "1.5,80.0", r"line 5: event_id is '1.5', not a whole number"),
         ("gmf-data", "event_id,", "event,", r"line 2: there is no column event_id or eid"),
         ("gmf-data", "checksum=77", "checksum=78", r"checksum is 77, .*gmf-data_5\.csv is 78"),
-        ("events", "2026-01", "2026-02", r"events_5\.csv, line 1: start_date .*different jobs"),
+        ("events", "2026-01", "2026-02", r"events_5\.csv, line 1: start_date .*files of one job"),
         ("events", "3,1073741827,1", "3,1073741827,7", r"line 6: the realization 7 is not in"),
-        ("events", "1,1073741825", "0,1073741825", r"line 4: the event 0 is there twice"),
+        ("events", "1,1073741825", "0,1073741825", r"line 4: the event 0 occurs twice"),
         ("sitemesh", "custom_site_id,lon", "site,longitude", r"no column custom_site_id or .* lon"),
-        ("sitemesh", "007,", "0012,", r"line 4: the site '0012' is there twice"),
-        ("realizations", "1,A~A", "0,A~A", r"line 4: rlz_id 0 is there twice"),
+        ("sitemesh", "007,", "0012,", r"line 4: the site '0012' occurs twice"),
+        ("realizations", "1,A~A", "0,A~A", r"line 4: rlz_id 0 occurs twice"),
         ("realizations", "3.0000000e-01", "-0.3", r"line 4: the weight -0.3"),
         ("realizations", "1,A~A", "1e999,A~A", r"line 4: rlz_id is '1e999', not a whole number"),
         ("ruptures", "path=2", "path=0", r"line 1: .*path = .0. is not above zero"),
-        ("ruptures", "path=2", "path=2.5", r"rupt.*path = 2\.5 is no whole number"),
+        ("ruptures", "path=2", "path=2.5", r"rupt.*path = 2\.5 is not a whole number"),
     ],
 )  # fmt: skip
 def test_refusals_name_the_line(
@@ -170,7 +170,7 @@ def test_refusals_name_the_line(
 def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:
     folder = write_job(tmp_path / "job")
     shutil.copy(folder / "events_5.csv", folder / "events_6.csv")
-    with pytest.raises(InputError, match=r"and events_6\.csv.*name the file of events"):
+    with pytest.raises(InputError, match=r"and events_6\.csv.*give the file of events"):
         read(folder)
     named = JobFiles.of(folder, {"events": folder / "events_6.csv"})
     assert read_events(named).event_id.size == len(EVENTS)
@@ -178,7 +178,7 @@ def test_files_of_a_folder_and_by_name(tmp_path: Path) -> None:
     (folder / "gmf-data_5.csv").rename(tmp_path / "shaking.csv")
     with pytest.raises(InputError, match="no file of gmf-data"):
         JobFiles.of(folder)
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         JobFiles.of(tmp_path / "nowhere")
 
 

@@ -55,7 +55,7 @@ def test_what_cannot_be_written() -> None:
     one = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
     with pytest.raises(InputError, match="no fragility function"):
         pelicun_text([])
-    with pytest.raises(InputError, match="'a' is there twice"):
+    with pytest.raises(InputError, match="'a' occurs twice"):
         pelicun_text([one, one])
 
 
@@ -69,7 +69,7 @@ def test_ids_have_no_dashes() -> None:
         with pytest.raises(InputError, match="an ID of a fragility table has no dash"):
             pelicun_text([lognormal_function(name, "toppled", PGV, 0.5, 0.3, "test")])
     twice = [lognormal_function(name, "toppled", PGV, 1, 1, "test") for name in ("A-7", "A.7")]
-    with pytest.raises(InputError, match=r"'A\.7' is there twice"):
+    with pytest.raises(InputError, match=r"'A\.7' occurs twice"):
         pelicun_text(renamed(twice, "-", ".", "a loader splits at")[0])
 
 
@@ -102,11 +102,14 @@ HEAD = (
     [
         ("ID,x\n", "line 1: there is no column Demand-Type"),
         (HEAD + "a,0,Peak Ground Velocity,mps\n", "line 2: 4 cells under 10 columns"),
-        (HEAD + "a,0,Peak Ground Velocity,knots,0,0,lognormal,1,1,\n", "in 'knots' is not known"),
+        (
+            HEAD + "a,0,Peak Ground Velocity,knots,0,0,lognormal,1,1,\n",
+            "in 'knots' is not supported",
+        ),
         (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,x,1,\n", "Theta_0: 'x' is not"),
         (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,-1,1,\n", "median is -1"),
         (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,1,,\n", "Theta_1: '' is not"),
-        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,gamma,1,1,\n", "family 'gamma' is not known"),
+        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,gamma,1,1,\n", "family 'gamma' is not supported"),
         (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"1,2",,\n', "levels|probab"),
         (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"2,1|0,1",,\n', "must rise"),
     ],

@@ -108,16 +108,16 @@ def test_between_the_nodes(grid_file: Path) -> None:
         ("</shakemap_grid>", "", "not well-formed"),
         ("shakemap_grid", "other_grid", "not a ShakeMap grid"),
         ("20.0 41.0 10 5\n", "", "5 nodes, grid_specification says 3 x 2 = 6"),
-        ("20.0 41.0 10 5\n", "20.0 41.0 10\n", "23 numbers, which is no multiple of the 4 fields"),
+        ("20.0 41.0 10 5\n", "20.0 41.0 10\n", "23 numbers, not a multiple of the 4 fields"),
         ("20.0 41.0 10 5", "20.0 41.0 x 5", "node 1 of grid_data: 'x' is not a number"),
         ("20.5 40.0 20 10", "20.5 40.0 -2 10", "node 5 of grid_data: PGV = -2"),
-        ("20.5 40.0", "200.5 40.0", "node 5 of grid_data: LON = 200.5 lies off the map"),
-        ('units="cm/s"', 'units="knots"', "PGV in 'knots' is not known"),
+        ("20.5 40.0", "200.5 40.0", "node 5 of grid_data: LON = 200.5 must be between"),
+        ('units="cm/s"', 'units="knots"', "PGV in 'knots' is unknown"),
         ('name="LAT"', 'name="MMI"', "there is no field LAT; the fields are LON, MMI, PGV, PGA"),
         ('index="4"', 'index="5"', "indices up to 5 but there are 4"),
         ('index="4"', 'index="x"', "index 'x' is not a number"),
-        ('name="PGA"', 'name="PGV"', "field PGV is there twice"),
-        ('nlon="3"', 'nlon="x"', "nlon = 'x' is no number"),
+        ('name="PGA"', 'name="PGV"', "field PGV occurs twice"),
+        ('nlon="3"', 'nlon="x"', "nlon = 'x' is not a number"),
     ],
 )
 def test_bad_grids_are_refused(grid_file: Path, old: str, new: str, words: str) -> None:
@@ -170,5 +170,5 @@ def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -
 def test_hdf5_is_refused_with_what_to_take_instead(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(InputError, match=r"is HDF5 .*: take grid\.xml of the same ShakeMap"):
+    with pytest.raises(InputError, match=r"is HDF5 .*: use grid\.xml"):
         read_shakemap(path)

@@ -70,13 +70,13 @@ def test_blocks_that_share_nothing_are_counted_by_the_binomial_law() -> None:
 
 @pytest.mark.parametrize("shares", [[], [0.0], [10.0, 5.0], [101.0], [5.0, 5.0]])
 def test_shares_that_are_refused(model: FragilityModel, shares: list[float]) -> None:
-    with pytest.raises(InputError, match="rising percentages"):
+    with pytest.raises(InputError, match="increasing percentages"):
         of(model, [3.0], [0.1], shares)
 
 
 def test_without_the_dependence_nothing_is_known() -> None:
     model = FragilityModel.from_row(model_row(dependence=None))
-    with pytest.raises(InputError, match="does not know what the blocks of one earthquake share"):
+    with pytest.raises(InputError, match="has no dependence model"):
         of(model, [3.0, 4.0], [0.1, 0.1], [50.0])
 
 

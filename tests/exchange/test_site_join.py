@@ -69,8 +69,8 @@ def test_a_name_goes_before_a_place() -> None:
 def test_several_sites_and_nothing_that_tells() -> None:
     blocks = {"block_id": ["A", "B"]}
     assert join_sites(blocks, [""], None).site.tolist() == [0, 0]
-    with pytest.raises(InputError, match="nothing tells at which of them 2 of 2 blocks stand"):
+    with pytest.raises(InputError, match="2 of 2 blocks have no site"):
         join_sites(blocks, ["a", "b"], [(0.0, 0.0), (1.0, 0.0)])
-    with pytest.raises(InputError, match="nothing tells"):
+    with pytest.raises(InputError, match="blocks have no site"):
         join_sites(at([0.0], [0.0]), ["a", "b"], None)
     assert options.WITHIN_KM == WITHIN_KM

@@ -39,7 +39,7 @@ def answer(
     if request.param == "without pyarrow":
 
         def missing() -> None:
-            raise MissingExtraError("Parquet files need pyarrow", "parquet")
+            raise MissingExtraError("Parquet files require pyarrow", "parquet")
 
         monkeypatch.setattr(csv_file, "pyarrow", missing)
     database = tmp_path / "model.db"
@@ -117,7 +117,7 @@ def test_of_many_rows_some_tell_what_pairs_share(
 def test_what_is_not_known_of_a_total_is_none(tmp_path: Path) -> None:
     told = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
     assert told.failures_low is told.failures_high is None
-    with pytest.raises(InputError, match="rows of a table stand where"):
+    with pytest.raises(InputError, match="use the column site_id in a table"):
         predict_table(tmp_path / "a.csv", given={}, sites=3)
 
 
@@ -148,7 +148,7 @@ def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
 def test_what_is_said_of_all_rows_must_matter(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(TABLE)
-    with pytest.raises(InputError, match="beta_deg does not go with the blocks of"):
+    with pytest.raises(InputError, match="beta_deg cannot be combined with the blocks of"):
         answer(source, target, beta_deg=5.0)
     assert not target.exists()
 
@@ -194,7 +194,7 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
     ("text", "words"),
     [
         (TABLE.replace("p2_1_s2", "size"), "there is no column p2_1_s2"),
-        (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
+        (TABLE.replace("block_id", "kr"), "the column kr occurs twice"),
         ("", "no column p2_1_s2, nor height_m and width_m; the columns are none"),
     ],
 )
@@ -225,7 +225,7 @@ def test_a_bad_row_far_down_is_answered_with_its_reason(answer: Answer, tmp_path
 def test_the_table_itself_is_not_overwritten(answer: Answer, tmp_path: Path) -> None:
     source = tmp_path / "a.csv"
     source.write_text(TABLE)
-    with pytest.raises(InputError, match="is the table itself"):
+    with pytest.raises(InputError, match="is the input table"):
         answer(source, source)
     assert source.read_text() == TABLE
 

@@ -64,9 +64,9 @@ def test_correlations_are_positive_semidefinite(
 def test_what_is_no_dependence_is_refused() -> None:
     with pytest.raises(InputError, match=r"is 0\.955 and must be 1"):
         replace(LAW, rho_e=0.01)
-    with pytest.raises(InputError, match="rho_e is a share between 0 and 1"):
+    with pytest.raises(InputError, match="rho_e is a fraction between 0 and 1"):
         replace(LAW, rho_e=-0.1, rho_s=0.317)
-    with pytest.raises(InputError, match="rho_o is a share"):
+    with pytest.raises(InputError, match="rho_o is a fraction"):
         replace(LAW, rho_o=math.nan)
     for length in (0.0, -1.0, math.inf, math.nan):
         with pytest.raises(InputError, match="l_y is a length above 0"):

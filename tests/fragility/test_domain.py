@@ -107,7 +107,7 @@ def test_contradictory_measures_are_named() -> None:
     answer = one(row, **given_by_issue())
     assert not answer.in_domain
     assert domain_sentences(answer) == [
-        "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.6 s: "
+        "a PGV of 0.169 m/s is inconsistent with a PGA of 0.906 g and a Tm of 1.6 s: "
         "PGV/(PGA·g·Tm/2π) is 0.074, outside the fitted 0.5 to 2.8: the answer is an "
         "extrapolation",
     ]
@@ -116,8 +116,8 @@ def test_contradictory_measures_are_named() -> None:
     assert not as_array.in_domain[0]
     assert as_array.probability[0] == pytest.approx(answer.probability, rel=1e-12)
     assert as_array.reason[0] == (
-        "PGV does not go with PGA and Tm: PGV/(PGA·g·Tm/2π) is outside the fitted 0.5 to 2.8: the "
-        "answer is an extrapolation"
+        "PGV is inconsistent with PGA and Tm: PGV/(PGA·g·Tm/2π) is outside the fitted 0.5 to 2.8: "
+        "the answer is an extrapolation"
     )
     # a motion that goes together, and one number that is out of its range by itself
     assert one(row, **{**given_by_issue(), "pgv_m_s": 1.6}).in_domain
@@ -132,7 +132,7 @@ def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityMo
     beside = one(row, **given_)
     assert not beside.in_domain
     assert (
-        "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.4 s"
+        "a PGV of 0.169 m/s is inconsistent with a PGA of 0.906 g and a Tm of 1.4 s"
         in (domain_sentences(beside)[0])
     )
 
@@ -147,7 +147,7 @@ def test_scaling_pgv_alone_leaves_the_domain(
     own["kr"] = min(own["kr"], 0.5 * own["pga_g"])
     answer = one(fitted, **{**own, "pgv_m_s": own["pgv_m_s"] * factor})
     assert not answer.in_domain
-    assert any("a PGV of" in text and "does not go with" in text for text in answer.warnings)
+    assert any("a PGV of" in text and "is inconsistent with" in text for text in answer.warnings)
     # the whole motion scaled, the block's strength with it, contradicts nothing
     scaled = {name: own[name] * factor for name in ("kr", "pgv_m_s", "pga_g")}
     assert not any("does not go" in text for text in one(fitted, **{**own, **scaled}).warnings)
@@ -249,11 +249,11 @@ def test_a_displacement_that_velocity_and_period_cannot_go_with_is_told_of() -> 
     # a harmonic motion has PGD = PGV Tm / 2π, any other more
     for pgd_m, told in ((0.02, True), (0.06, False), (1.0, False), (12.0, True)):
         answer = predict(3.0, 0.1, pgd_m=pgd_m, **shaking)
-        text = f"a PGD of {pgd_m:.3g} m does not go with a PGV of 0.6 m/s and a Tm of 0.5 s"
+        text = f"a PGD of {pgd_m:.3g} m is inconsistent with a PGV of 0.6 m/s and a Tm of 0.5 s"
         assert any(text in warning for warning in answer.warnings) is told
         assert answer.in_domain is not told
         many = predict(3.0, [0.1, 0.2], pgd_m=pgd_m, **shaking)
-        assert all(("PGD does not go with PGV and Tm" in each) is told for each in many.reason)
+        assert all(("PGD is inconsistent with PGV and Tm" in each) is told for each in many.reason)
         assert many.in_domain.tolist() == [not told] * 2
 
 

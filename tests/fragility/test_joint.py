@@ -138,7 +138,7 @@ def test_what_is_no_portfolio_is_refused() -> None:
         Placement.of([math.nan], 0.0)
     with pytest.raises(InputError, match="polarity is"):
         Placement.of([0.0], 0.0, polarity=2)
-    with pytest.raises(InputError, match="numbered 0 and 1"):
+    with pytest.raises(InputError, match="must be 0 and 1"):
         Placement.of([0.0, 0.0], 0.0, component=[7, 0], polarity=[1, 0])
     one = Placement.of([0.0], 0.0)
     with pytest.raises(InputError, match="1 blocks need as many probabilities"):

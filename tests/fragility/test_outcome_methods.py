@@ -178,10 +178,10 @@ def broken(source: FitSource, kind: str) -> FitSource:
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("none", "no outcomes are stored: simulate kind toppling"),
+        ("none", "none are stored: simulate kind toppling"),
         ("all alike", "0 toppled.*all alike"),
         ("separated", "separated without error"),
-        ("few", "7 outcomes on the grid toppled; a fit needs 20"),
+        ("few", "7 outcomes on the grid toppled; a fit requires 20"),
     ],
 )
 def test_outcomes_that_cannot_carry_a_fit_are_refused(kind, words):
@@ -192,12 +192,14 @@ def test_outcomes_that_cannot_carry_a_fit_are_refused(kind, words):
 
 def test_what_does_not_go_together_is_refused():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=5)
-    with pytest.raises(InputError, match=r"record does not go with the term pgv: it fits xp"):
+    with pytest.raises(
+        InputError, match=r"record cannot be combined with the term pgv: it fits xp"
+    ):
         fit(source, term="pgv", method="record")
     with pytest.raises(InputError, match=r"bounded keeps M = 1.*logistic, lognormal"):
         fit(source, term="pgv_kr", method="bounded", estimate_m=True)
     no_spectrum = replace(source, xp_m_s=np.full(source.xp_m_s.size, np.nan))
-    with pytest.raises(FitError, match=r"needs the toppling spectrum X\(p\).*rbfrag simulate"):
+    with pytest.raises(FitError, match=r"requires the toppling spectrum X\(p\).*rbfrag simulate"):
         fit(no_spectrum, term="xp", method="record")
 
 

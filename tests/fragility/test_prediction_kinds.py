@@ -202,9 +202,9 @@ def test_a_motion_answers_for_every_kind() -> None:
         ({"level": 2}, "level"),
         ({"ky": "0.1"}, "ky = '0.1' is not a number"),
         ({"ky": None, "displacement_m": None, **SLUMP}, "of kind sliding: it reads ky and"),
-        ({"kr": 0.1}, "kr does not go with kind sliding"),
+        ({"kr": 0.1}, "kr cannot be combined with kind sliding"),
         ({"kind": "slumping"}, "of kind sliding, not slumping"),
-        ({"rotation_deg": 2.0}, "a rotation is no failure"),
+        ({"rotation_deg": 2.0}, "rotation_deg is not a failure criterion"),
     ],
 )
 def test_what_cannot_be_answered_is_refused(changes: dict[str, Any], words: str) -> None:

@@ -208,12 +208,15 @@ def test_extrapolation_is_said_where_part_of_the_block_is_outside() -> None:
         ({"kr_sigma": -0.1}, "kr_sigma = -0.1: give a standard deviation of 0 or more"),
         ({"kr_sigma": math.nan}, "kr_sigma = nan"),
         ({"ky_sigma": 0.1}, "ky_sigma"),
-        ({"kr": [0.1, 0.2], "weights": [1.0, -1.0]}, "weights of draws are 0 or more"),
-        ({"kr": [0.1, 0.2], "weights": [0.0, 0.0]}, "not all of them 0"),
+        ({"kr": [0.1, 0.2], "weights": [1.0, -1.0]}, "weights of draws must be 0 or more"),
+        ({"kr": [0.1, 0.2], "weights": [0.0, 0.0]}, "not all 0"),
         ({"kr": [0.1, 0.2], "weights": [1.0, 1.0, 1.0]}, "one length"),
         ({"kr": [0.1, -0.2], "weights": 1.0}, "draw 2: kr = -0.2"),
-        ({"kr": [0.1, 0.2], "kr_sigma": 0.1, "weights": 1.0}, "kr_sigma does not go with draws"),
-        ({"pgv_m_s": [0.1, 0.2], "weights": 1.0}, "the motion is one, too"),
+        (
+            {"kr": [0.1, 0.2], "kr_sigma": 0.1, "weights": 1.0},
+            "kr_sigma cannot be combined with draws",
+        ),
+        ({"pgv_m_s": [0.1, 0.2], "weights": 1.0}, "a single motion is required"),
     ],
 )
 def test_what_is_no_uncertainty_is_refused(given: dict[str, Any], words: str) -> None:
@@ -222,7 +225,7 @@ def test_what_is_no_uncertainty_is_refused(given: dict[str, Any], words: str) ->
 
 
 def test_a_sigma_without_its_value_is_refused() -> None:
-    with pytest.raises(InputError, match="restitution_sigma goes with restitution"):
+    with pytest.raises(InputError, match="restitution_sigma requires restitution"):
         one(stored("pgv_pga", T2), p2=3.0, kr=0.2, pgv_m_s=0.6, pga_g=0.5, restitution_sigma=0.1)
 
 

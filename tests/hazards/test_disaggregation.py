@@ -141,7 +141,7 @@ def test_what_a_disaggregation_does_not_tell_is_refused(tmp_path: Path) -> None:
     pga = hazard_curve("pga_g", LEVELS, 1e-4 * LEVELS**-2.0)
     with pytest.raises(InputError, match=r"must start at or below k_r.*0\.02 g.*from 0\.019 g"):
         rbfrag.hazard(pga, 3.0, [0.1, 0.019], disaggregation=file)
-    with pytest.raises(InputError, match="makes PGV out of PGA"):
+    with pytest.raises(InputError, match="converts PGA to PGV"):
         rbfrag.hazard(hazard_curve("pgv_m_s", LEVELS, LEVELS**-2.0), 3.0, 0.1, disaggregation=file)
     elsewhere = hazard_curve("pga_g", LEVELS, 1e-4 * LEVELS**-2.0, lon=174.8, lat=-41.279)
     with pytest.raises(InputError, match=r"of lon 174\.776, the curve of 174\.8"):

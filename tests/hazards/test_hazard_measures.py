@@ -133,7 +133,7 @@ def test_a_model_that_reads_more_is_refused(measures_db: str, model: str) -> Non
         ("pga_g", None, {"convert": "newmark_hall_1982"}, "is for spectral accelerations"),
         ("sa_g", 2.0, {"convert": "newmark_hall_1982"}, r"is for SA\(1\), not for SA\(2\)"),
         ("sa_g", 1.0, {"convert": "x"}, "unknown conversion 'x'"),
-        ("sa_g", 1.0, {"convert_sigma": 0.3}, "belongs to convert"),
+        ("sa_g", 1.0, {"convert_sigma": 0.3}, "requires convert"),
         ("sa_g", 1.0, {"convert": "newmark_hall_1982", "convert_sigma": 0.0}, "above zero"),
         ("sa_g", 1.0, {"convert": "newmark_hall_1982", "convert_sigma": math.nan}, "above zero"),
     ],

@@ -71,7 +71,7 @@ def test_unit_of_caller(tmp_path: Path) -> None:
 
 def test_unit_is_never_guessed(tmp_path: Path) -> None:
     for header in ("", "# Quarry road\n", "time,acc\n", "# Time (s),Acceleration\n"):
-        assert "with units" in refusal(tmp_path, header + "0,1\n0.01,2\n").reason
+        assert "give units" in refusal(tmp_path, header + "0,1\n0.01,2\n").reason
 
 
 def test_unit_in_brackets_is_not_overruled(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_header_and_caller_disagree(tmp_path: Path) -> None:
     error = refusal(tmp_path, text, units="g")
     assert error.line == 1
     assert "m/s2, not g" in error.reason
-    assert "leave units out" in error.reason
+    assert "omit units" in error.reason
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def test_index_beside_the_file(record: Path) -> None:
     motion = read_motion(record, units="g")
     assert motion.acceleration_g.tolist() == [2.278e-5, 1.432e-5, -2.603e-5]
     assert motion.dt_s == 0.005
-    assert motion.remarks == ("the file states no dt; 0.005 s is from dt_index.txt, line 2",)
+    assert motion.remarks == ("the file has no dt; 0.005 s is from dt_index.txt, line 2",)
 
 
 def test_what_is_stated(record: Path) -> None:

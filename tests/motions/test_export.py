@@ -105,7 +105,7 @@ def test_processing_and_origin_are_kept(tmp_path: Path) -> None:
         ("# npts: 3", "# npts: 4", "4 samples, but 3 follow"),
         ("# npts: 3", "# npts: true", "npts 'true' cannot be used"),
         ("# npts: 3", "# points: 3", "no 'npts'"),
-        ("# dt_s: 0.01", "# dt_s: 0.02", "time 0.01 s stands where 0.02 s was expected"),
+        ("# dt_s: 0.01", "# dt_s: 0.02", "time 0.01 s instead of 0.02 s"),
         ("# dt_s: 0.01", "# dt_s: NaN", "dt_s 'NaN' cannot be used"),
         ("# dt_s: 0.01", f"# dt_s: 1{'0' * 400}", "cannot be used"),
         ("# dt_s: 0.01", "# dt_s: -0.01", "positive"),
@@ -156,7 +156,7 @@ def test_cut_file_is_read_on_request(tmp_path: Path) -> None:
 def test_refused(tmp_path: Path) -> None:
     motion = GroundMotion(shaking(1), 0.02)
     for motions, name, words in (
-        ([motion], "m.txt", "'txt' is none of csv, at2"),
+        ([motion], "m.txt", "unsupported format 'txt'"),
         ([motion, motion], "m.AT2", "one motion, not 2"),
         ([], "m.csv", "no motion"),
         ([GroundMotion.from_nodes([0.0, 1.0], [0.0, 1.0])], "m.csv", "equally spaced"),

@@ -174,7 +174,7 @@ def test_v3_holds_spectra(tmp_path: Path, formats_dir: Path) -> None:
         "RESPONSE AND FOURIER AMPLITUDE SPECTRA  (91 PERIODS)\nCORRECTED ACCELEROGRAM  X-1\n"
     )
     for path in (formats_dir / "records" / "chan001.v3", tmp_path / "made.v3"):
-        with pytest.raises(MotionFileError, match=r"holds spectra; take the \.v2"):
+        with pytest.raises(MotionFileError, match=r"with spectra: use the \.v2"):
             read_motions(path)
 
 

@@ -199,7 +199,7 @@ def test_a_stated_interval_overrides(
     assert [motion.sha256 for motion in motions] == [motion.sha256 for motion in whole]
     assert all(motion.dt_s == pytest.approx(0.02) for motion in motions)
     assert doubts(motions[0].remarks)
-    with pytest.raises(MotionFileError, match="leave dt_s out"):
+    with pytest.raises(MotionFileError, match="omit dt_s"):
         read(tmp_path, text, dt_s=0.03)
 
 
@@ -221,7 +221,7 @@ def test_a_stated_unit_overrides(tmp_path: Path, name: str, unit: str | None) ->
     assert motion.sha256 == whole[0].sha256
     assert "is what was stated" in doubts(motion.remarks)[0]
     assert motion.stated_unit == unit
-    with pytest.raises(MotionFileError, match="leave units out"):
+    with pytest.raises(MotionFileError, match="omit units"):
         read(tmp_path, text, units="mm/s2")
 
 

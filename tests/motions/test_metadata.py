@@ -83,7 +83,7 @@ def test_traces_of_a_file_in_order(tmp_path: Path) -> None:
 def test_a_whole_file_and_one_of_its_traces(tmp_path: Path, order: tuple[str, str]) -> None:
     first, second = order
     path = table(tmp_path, f"file,trace_index\na.V2A,{first}\na.V2A,{second}\n")
-    with pytest.raises(MotionFileError, match="one row without trace_index for the whole file"):
+    with pytest.raises(MotionFileError, match="one row without trace_index for the file"):
         read_metadata(path)
 
 

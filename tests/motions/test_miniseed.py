@@ -80,7 +80,7 @@ def test_several_stations_are_remarked_upon(tmp_path: Path) -> None:
 @pytest.mark.parametrize("channel", ["BHZ", "HHE", "EHZ", "LDO"])
 def test_channels_of_other_quantities(tmp_path: Path, channel: str) -> None:
     path = written(tmp_path, miniseed(COUNTS, channel=channel))
-    with pytest.raises(MotionFileError, match=f"{channel} is no accelerometer"):
+    with pytest.raises(MotionFileError, match=f"{channel} is not an accelerometer"):
         read_motions(path, gain=GAIN)
 
 
@@ -121,13 +121,13 @@ def test_what_is_stated_must_fit(tmp_path: Path) -> None:
     path = written(tmp_path, miniseed(COUNTS))
     with pytest.raises(InputError, match="gain must be a positive number"):
         read_motions(path, gain=0.0)
-    with pytest.raises(MotionFileError, match="not g: leave units out"):
+    with pytest.raises(MotionFileError, match="not g: omit units"):
         read_motions(path, gain=GAIN, units="g")
     with pytest.raises(MotionFileError, match=r"dt = 0\.01 s, not 0.02"):
         read_motions(path, gain=GAIN, dt_s=0.02)
     text = tmp_path / "record.csv"
     text.write_text("# Time (s),Acceleration (g)\n0,0\n0.01,1\n0.02,0\n")
-    with pytest.raises(MotionFileError, match="not in counts: leave gain out"):
+    with pytest.raises(MotionFileError, match="not in counts: omit gain"):
         read_motions(text, gain=GAIN)
 
 
@@ -161,4 +161,4 @@ def test_a_gain_that_nobody_needs(tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_text("# Time (s),Acceleration (g)\n0,0\n0.01,1\n0.02,0\n")
     report = add_motions(path, db=tmp_path / "one.db", gain=GAIN)
-    assert "leave gain out" in report.failed[0].reason
+    assert "omit gain" in report.failed[0].reason

@@ -67,11 +67,11 @@ def test_contradicting_options(tmp_path: Path, name: str) -> None:
     path = tmp_path / "record"
     path.write_text(text)
     assert read_motions(path, units=UNITS[name], dt_s=0.01)[0].dt_s == 0.01
-    assert "leave dt_s out" in refusal(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
+    assert "omit dt_s" in refusal(tmp_path, text, units=UNITS[name], dt_s=0.02).reason
     if name in STATE_NO_UNIT:
-        assert "with units" in refusal(tmp_path, text).reason
+        assert "give units" in refusal(tmp_path, text).reason
     else:
-        assert "leave units out" in refusal(tmp_path, text, units="mm/s2").reason
+        assert "omit units" in refusal(tmp_path, text, units="mm/s2").reason
 
 
 def test_stated_unit_of_a_header_in_gal(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ Change = tuple[str, str]
         ("UNAM standard file", ("/0.01/0.01/0.01", "/0.01/0.01/0.02"), ("differ", "0.02")),
         ("UNAM standard file", ("/0.01/0.01/0.01", "/0.02/0.02/0.02"), ("0.24 s", "0.12")),
         ("UNAM standard file", ("CANALES                      : 3", "CANALES     : 4"),
-         ("4 channels", "orients 3")),
+         ("4 channels", "orientations of 3")),
         ("UNAM standard file", ("3F10.4", "6F10.4"), ("6F10.4", "3 channels")),
         ("AFAD NSMN text", ("DATA          : 12", "DATA          : 11"),
          ("11 samples", "12 follow")),
@@ -141,10 +141,10 @@ Change = tuple[str, str]
         ("USGS SMC", ("CORRECTED ACCELEROGRAM", "VELOCITY             "), ("velocity",)),
         ("USGS SMC", ("1.0000000E+02", "0.0000000E+02"), ("samples per second", "positive")),
         ("SimCenter event JSON", ('"numSteps": 12', '"numSteps": 13'),
-         ("numSteps says 13", "12 values")),
+         ("numSteps is 13", "12 values")),
         ("SimCenter event JSON", ("     0.1,", "     NaN,"), ("nan", "finite")),
-        ("SimCenter event JSON", ("     0.1,", "     0.1;"), ("no JSON",)),
-        ("SimCenter event JSON", ('"dT": 0.01', '"dT": 0.02'), ("one dT", "0.02")),
+        ("SimCenter event JSON", ("     0.1,", "     0.1;"), ("not JSON",)),
+        ("SimCenter event JSON", ('"dT": 0.01', '"dT": 0.02'), ("a single dT", "0.02")),
         ("GeoNet text (.000/.090/.ver)", ("12  1.0", "13  1.0"), ("13 samples", "12 follow")),
         ("GeoNet text (.000/.090/.ver)", (" 1.0\n", " inf\n"), ("'inf'",)),
     ],

@@ -72,7 +72,7 @@ def test_cut_within_a_number(tmp_path: Path) -> None:
     text = at2(SAMPLES, 0.01)
     # of the last number, 4.00000E-02, is left what is still a number
     path.write_text(text[:-5])
-    with pytest.raises(MotionFileError, match=r"ends within the number '4.00000'"):
+    with pytest.raises(MotionFileError, match=r"truncated within the number '4.00000'"):
         read_motion(path)
     motion = read_motion(path, allow_partial=True)
     path.write_text(text)

@@ -64,6 +64,6 @@ def test_vertical_shows_every_pair(tmp_path, caught, overlapping) -> None:
 def test_vertical_without_pairs_is_refused(tmp_path) -> None:
     without = critical_values()
     none = replace(without, status=np.full(N, "below_limit", dtype=object))
-    with pytest.raises(InputError, match="simulate both"):
+    with pytest.raises(InputError, match="run  rbfrag simulate  for both"):
         plot_vertical(vertical_pairs(without, none), tmp_path / "v.png")
     assert not list(tmp_path.iterdir())

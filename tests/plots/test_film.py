@@ -100,9 +100,7 @@ def test_without_ffmpeg_a_film_as_mp4_is_refused_with_the_remedy(
     slump: Response, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(
-        InputError, match=r"install it \(apt install ffmpeg.* or name the film \.gif"
-    ):
+    with pytest.raises(InputError, match=r"install it \(apt install ffmpeg.* or use \.gif"):
         film(slump, BLOCK, tmp_path / "slump.mp4", beta_deg=0.0)
     assert not list(tmp_path.iterdir())
 
@@ -124,7 +122,7 @@ def test_an_ffmpeg_that_fails_is_told(
     ("name", "exaggerate", "word"),
     [
         ("film.avi", 1.0, "none of .gif, .mp4, .html"),
-        ("nowhere/film.gif", 1.0, "there is no folder"),
+        ("nowhere/film.gif", 1.0, "create the folder"),
         ("film.gif", 0.0, "exaggerate = 0"),
     ],
 )

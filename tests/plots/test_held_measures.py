@@ -105,7 +105,7 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
         (
             model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record"),
             {},
-            "one intensity cannot stand for them",
+            "not a single intensity",
         ),
     ],
 )

@@ -106,7 +106,7 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
 def test_a_table_that_makes_no_document(refuses: Refuses) -> None:
     Path("blocks.csv").write_text(TABLE)
     asked = ("report", "blocks.csv", "--pgv", "0.5", "--out")
-    assert "write .pdf or .html" in refuses(*asked, "a.png")
+    assert "require .pdf or .html" in refuses(*asked, "a.png")
     Path("blocks.csv").write_text("height [m],width [m],pgv [m/s]\n1,x,0.5\n")
     assert "'x' is not a number" in refuses("report", "blocks.csv", "--out", "a.pdf")
     assert not list(Path().glob("a.*"))
@@ -144,7 +144,7 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
         (("--p2", "-3", "--kr", "0.1", "--pgv", "0.6"), "p2 = -3"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--kind", "sliding"), "kind sliding"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--hazard", "no.csv"), "no.csv: no such"),
-        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--years", "10"), "--years goes with"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--years", "10"), "--years requires"),
         (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "state --displacement"),
     ],
 )

@@ -168,8 +168,11 @@ def test_sites_of_an_earthquake_do_not_share_the_direction() -> None:
 @pytest.mark.parametrize(
     ("question", "expected"),
     [
-        ({"magnitude": 6.8, "rjb_km": 12.0, "vs30_m_s": 760.0}, "does not go with a scenario"),
-        ({"motion": "record"}, "component does not go with a motion"),
+        (
+            {"magnitude": 6.8, "rjb_km": 12.0, "vs30_m_s": 760.0},
+            "cannot be combined with a scenario",
+        ),
+        ({"motion": "record"}, "component cannot be combined with a motion"),
         ({"pgv_m_s": 0.6, "component": "RotD50"}, "did you mean 'rotd50'"),
         ({"pgv_m_s": [0.6, 0.7], "component": ["rotd50", "horizontal"]}, "'horizontal'.*larger"),
     ],

@@ -185,7 +185,7 @@ def test_rates_have_the_drained_bound(shell: Shell) -> None:
 
 def test_a_drainage_without_water_or_of_another_name_is_rejected(refuses: Refuses) -> None:
     words = ("predict", "--height", "4", "--width", "2", "--phi", "40", "--pgv", "0.5")
-    assert "--drainage goes with --water" in refuses(*words, "--drainage", "drained")
+    assert "--drainage requires --water" in refuses(*words, "--drainage", "drained")
     assert "it must be undrained or drained" in refuses(*words, "--water", "1", "--drainage", "no")
     with pytest.raises(InputError, match="water_m"):
         rbfrag.predict(**{**TOPPLE, "height_m": [4.0, 4.0]}, drainage="drained")

@@ -106,8 +106,8 @@ def test_python_and_requests_know_it(copied: Path) -> None:
     assert answer["same"]
     for warnings in answer["warnings"]:
         assert "hardness is ignored: no model uses it" in warnings
-    assert answer["schema"].count("Rebound hardness of the rock [MPa].") >= 2  # GET and POST
-    assert "``hardness``: Rebound hardness of the rock [MPa]." in answer["help"]
+    assert answer["schema"].count("Rebound hardness of the rock [MPa]") >= 2  # GET and POST
+    assert "``hardness``: Rebound hardness of the rock [MPa]" in answer["help"]
     field, measure = (answer["vocabulary"][name] for name in ("hardness", "csi_g"))
     assert (field["label"], field["unit"]) == ("Rebound hardness of the rock", "MPa")
     assert (measure["parameters"], measure["symbol"], measure["group"]) == (
@@ -116,8 +116,8 @@ def test_python_and_requests_know_it(copied: Path) -> None:
 
 
 def test_the_shell_and_its_tables_know_it(copied: Path) -> None:
-    assert "Rebound hardness of the rock [MPa]." in run(
-        copied, "-m", "rbfrag.cli.main", "predict", "--help"
+    assert "Rebound hardness of the rock [MPa]" in run(
+        copied, "-m", "rbfrag.cli.main", "predict", "--help-all"
     )
     told = run(
         copied, "-m", "rbfrag.cli.main", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6",
@@ -146,8 +146,8 @@ def test_a_measure_is_a_line_too(copied: Path) -> None:
     assert answer["power"] == 1
     assert any("csi_g was not used" in text for text in answer["warnings"])
     assert "csi_g = 7 g is larger than recorded" in answer["warnings"]
-    assert "``csi_g``: Characteristic intensity [g]." in answer["help"]
-    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--help")
+    assert "``csi_g``: Characteristic intensity [g]" in answer["help"]
+    told = run(copied, "-m", "rbfrag.cli.main", "predict", "--help-all")
     assert "--csi" in told
     (copied / "csi.csv").write_text("p2,kr,PGV [cm/s],csi [%g]\n3,0.1,60,40\n")
     told = run(copied, "-m", "rbfrag.cli.main", "predict", "--blocks", "csi.csv", "--json")

@@ -77,7 +77,7 @@ def test_refusals(base: str, back: str, face: str, why: str) -> None:
 
 def test_steep_base_and_a_plane_stated_twice() -> None:
     assert "steeper than the face" in section_of(Plane(30, 90), Plane(40, 90)).remarks[0]
-    with pytest.raises(InputError, match="beta_deg does not go with base"):
+    with pytest.raises(InputError, match="beta_deg cannot be combined with base"):
         in_section({"base": "5/090", "face": "70/090", "beta_deg": 5.0, "height_m": 2.0})
 
 

@@ -158,8 +158,8 @@ def test_a_table_of_another_model(tmp_path: Path) -> None:
         ({"vs30_m_s": 100.0}, "150 to 1500"),
         ({"mechanism": "thrust"}, "strike-slip"),
         ({"vs30_m_s": None}, "vs30_m_s is missing"),
-        ({"pgv_m_s": 0.5}, "pgv_m_s does not go with a scenario"),
-        ({"pgv_sigma": 0.5}, "pgv_sigma does not go with a scenario"),
+        ({"pgv_m_s": 0.5}, "pgv_m_s cannot be combined with a scenario"),
+        ({"pgv_sigma": 0.5}, "pgv_sigma cannot be combined with a scenario"),
         ({"rjb_km": np.array([10.0, 500.0])}, "rjb_km = 500"),
     ],
 )

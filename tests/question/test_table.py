@@ -62,7 +62,7 @@ def test_no_name_stands_for_two_fields() -> None:
         (["height_m", "restitutoin"], "did you mean 'restitution'"),
         (["hieght_cm", "width_m"], "did you mean 'height"),
         (["dip", "beta"], "are both the dip of the base"),
-        (["kr", "kr"], "kr is there twice"),
+        (["kr", "kr"], "kr occurs twice"),
         (["Height [ft]"], "'ft'"),
         (["PGA (knots)"], "'knots'"),
     ],
@@ -75,7 +75,7 @@ def test_what_cannot_be_meant_is_refused(header: list[str], words: str) -> None:
 def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewhere() -> None:
     header = ["height_m", "width_m", "dip direction", "note"]
     stated = columns_in(header, "blocks.csv", COLUMNS)
-    with pytest.raises(InputError, match="'dip direction' is not understood and may be the dip of"):
+    with pytest.raises(InputError, match="'dip direction' is unknown; for the dip of"):
         stated.check_unused("blocks.csv", stated.columns)
     # of a block given by its numbers the dip does not matter
     stated.check_unused("blocks.csv", ("p2", "kr"))
@@ -162,7 +162,7 @@ def test_a_rectangle_that_slides_is_never_answered_as_one_that_topples(tmp_path:
     )
     first, second, third = rows
     assert first["probability"] == ""
-    assert "slides (yield 0.21 g): state displacement_m" in first["reason"]
+    assert "slides (yield 0.21 g): give displacement_m" in first["reason"]
     assert [row["mode"] for row in rows] == ["slide", "topple", "slide"]
     assert stability(Block.rectangle(2.5, 2.5), beta_deg=20.0, phi_deg=32.0).mode == "slide"
     assert float(second["probability"]) > 0.0

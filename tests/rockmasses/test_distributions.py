@@ -111,7 +111,7 @@ def test_a_constant_is_a_number_or_a_table() -> None:
         ("measured", {"values": 3.0}, "values = 3.0"),
         ("measured", {"values": [1.0, math.nan]}, "values\\[1\\] = nan"),
         ("measured", {"values": [1.0], "low": 0.0}, "unknown key 'low'"),
-        ("weibull", {"mean": 1.0}, "distribution = 'weibull' is not known: use one of constant"),
+        ("weibull", {"mean": 1.0}, "distribution = 'weibull' is unknown: use one of constant"),
     ],
 )
 def test_refusals_name_the_key(name: str, keys: dict[str, object], words: str) -> None:

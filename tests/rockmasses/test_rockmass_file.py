@@ -120,7 +120,7 @@ def test_planes_in_both_forms(tmp_path: Path) -> None:
         ("spacing_m = 0.6", "spacing_m = nan", "back.spacing_m: nan is not finite"),
         ("spacing_m = 0.6", "spacing_m = '0.6'", "back.spacing_m: '0.6' is not a number"),
         ("kappa = 130", "kapa = 130", "base.dip_deg: the key kappa is missing"),
-        ('"uniform"', '"triangle"', "friction.phi_deg: distribution = 'triangle' is not known"),
+        ('"uniform"', '"triangle"', "friction.phi_deg: distribution = 'triangle' is unknown"),
         ("high = 45", "high = 90", "friction.phi_deg: 90 is out of range"),
         ("realisations = 500", "realisations = 0", "realisations = 0"),
         ("[block]", "[block", "not valid TOML"),
@@ -143,8 +143,8 @@ def test_toml_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
         ("variable, d", "name, d", "line 2: the columns are name"),
         ("value, mean", "mean, mean", "line 2: .*each once"),
         ("seed,,7", "seed,,seven", "line 4: seed: value = 'seven' is not a number"),
-        ("seed,,7", "seed,,7,8", "line 4: seed: without a distribution only a value counts"),
-        ("seed,,7", "realisations,,7", "line 4: realisations is stated twice"),
+        ("seed,,7", "seed,,7,8", "line 4: seed: without a distribution give value only"),
+        ("seed,,7", "realisations,,7", "line 4: realisations is given twice"),
         ("seed,,7", "seed,,,,,,,,,,,7", "line 4: 12 cells under 10 columns"),
         ("41 44.5", "4" * 200_000, "line 8: not a CSV file"),
         ("41 44.5", "41 x", "line 8: back.dip_deg: values = 'x' is not a number"),
@@ -167,7 +167,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         ("none.toml", "no such file"),
         ("folder.toml", "is a folder"),
         ("bytes.csv", "not a text file"),
-        ("mass.json", "ends in .toml or .csv"),
+        ("mass.json", "use .toml or .csv"),
         ("empty.csv", "is empty"),
     ):
         with pytest.raises(InputError, match=words):

@@ -126,7 +126,7 @@ def test_no_model_is_looked_up_where_no_block_needs_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("measures", "words"),
     [
-        ({}, "needs a measure of the motion"),
+        ({}, "requires an intensity measure"),
         ({"pgv_m_s": math.nan}, "pgv_m_s = nan m/s is not a number"),
         ({"pgv_m_s": -1.0}, "pgv_m_s = -1 m/s is negative"),
         ({"pgd_m": 0.1, "tm_s": 0.0}, "tm_s = 0 s is not above zero"),
@@ -147,7 +147,7 @@ def test_a_level_that_is_none_is_refused(made: Realisations, model: FragilityMod
 
 def test_vertical_acceleration_of_the_file_is_refused(model: FragilityModel) -> None:
     made = RockMass.of({**WILD, "block.kv": 0.1}).realise(100, 1)
-    with pytest.raises(InputError, match=r"block\.kv does not belong"):
+    with pytest.raises(InputError, match=r"block\.kv is not supported"):
         scenario(made, {"pgv_m_s": 0.4}, model=model)
 
 

@@ -250,7 +250,7 @@ def test_what_does_not_stand_after_its_first_slip_fails() -> None:
     ("changes", "words"),
     [
         ({"back.drainage": "dry"}, "it must be undrained or drained"),
-        ({"back.water_m": None, **DRAINED}, "back.drainage goes with back.water_m"),
+        ({"back.water_m": None, **DRAINED}, "back.drainage requires back.water_m"),
         ({"block.back_fracture": False}, "without a back fracture"),
         ({"friction.jrc": 8.0}, "jcs_mpa is missing"),
         ({"back.water_m": -1.0}, "back.water_m: -1 is out of range"),

@@ -60,7 +60,7 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
     shape = {**ANGLES, "phi": 22, "pgv": 0.6}
     refused = client.get("/v1/predict", params=shape)
     assert refused.status_code == 422
-    assert "the block slides (yield 0.07 g): state displacement" in refused.json()["detail"]
+    assert "the block slides (yield 0.07 g): give displacement" in refused.json()["detail"]
     query = {**shape, "kind": "sliding", "displacement": 0.05}
     assert client.get("/v1/predict", params=query).json()["kind"] == "sliding"
 
@@ -70,13 +70,13 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
     [
         ("height=2", "width is missing"),
         ("height=2&width=0", "width = 0 is not above 0"),
-        ("height=2&width=0.5&kr=0.1", "kr does not go with height"),
-        ("height=2&width=0.5&r3=2", "r3 does not go with height"),
-        ("height=2&width=0.5&dip=3&beta=3", "dip does not go with beta"),
+        ("height=2&width=0.5&kr=0.1", "kr cannot be combined with height"),
+        ("height=2&width=0.5&r3=2", "r3 cannot be combined with height"),
+        ("height=2&width=0.5&dip=3&beta=3", "dip cannot be combined with beta"),
         ("alpha1=-15&alpha3=24&r3=2.5", "beta is missing"),
         ("alpha1=-15&alpha3=24&r3=2.5&beta=18", "phi is missing"),
-        ("p2=3&kr=0.1&phi=30", "phi goes with the shape of a block"),
-        ("p2=3&kr=0.1&no_back=true", "no_back goes with the shape of a block"),
+        ("p2=3&kr=0.1&phi=30", "phi requires the geometry of a block"),
+        ("p2=3&kr=0.1&no_back=true", "no_back requires the geometry of a block"),
     ],
 )
 def test_what_is_no_single_block_is_refused(client, query, words):
@@ -91,7 +91,7 @@ def test_what_is_no_single_block_is_refused(client, query, words):
     ("body", "words"),
     [
         ({"height": [2, 3], "pgv": 1}, "width is missing"),
-        ({"height": 2, "width": [0.5], "kr": 0.1, "pgv": 1}, "kr does not go with height"),
+        ({"height": 2, "width": [0.5], "kr": 0.1, "pgv": 1}, "kr cannot be combined with height"),
         ({"height": 2, "width": "0.5", "pgv": 1}, "width = '0.5' is not a number"),
     ],
 )

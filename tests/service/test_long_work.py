@@ -69,9 +69,9 @@ def test_a_rock_mass_is_answered_as_by_the_command_line(client, written, shell: 
 @pytest.mark.parametrize(
     ("query", "body", "words"),
     [
-        ("n=6001", EXAMPLE_TOML, "6001 realisations are more than the 6000 of one request"),
+        ("n=6001", EXAMPLE_TOML, "6001 realisations exceed the maximum of 6000 per request"),
         ("n=0", EXAMPLE_TOML, "n = 0"),
-        ("model=wls-pgv", EXAMPLE_TOML, "model goes with a measure of the motion"),
+        ("model=wls-pgv", EXAMPLE_TOML, "model requires an intensity measure"),
         ("", "[base]\n", "base.dip_deg is missing"),
         ("", "[base\n", "not valid TOML"),
         ("", "base = 3\n", "base = 3 is not a table"),
@@ -148,7 +148,7 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
 @pytest.mark.parametrize(
     ("query", "body", "words"),
     [
-        ("p2=3", "no record at all", "no known format of accelerogram"),
+        ("p2=3", "no record at all", "unknown format"),
         ("p2=3", "time_s,acceleration_g\n0,0\n0.1,x\n", "the file, line 3"),
         ("p2=3", "0.1\n0.2\n0.3\n", "unit"),
         ("p2=3&units=g", "0.1\n0.2\n0.3\n", "no sampling interval"),
@@ -193,7 +193,7 @@ def test_rows_are_answered_alike_however_many_there_are(client):
 
 def test_more_rows_than_the_limit_are_refused(client):
     answer = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1] * 6001, "pgv": 0.6})
-    assert "one request may hold 6000" in refusal(answer)
+    assert "the maximum per request is 6000" in refusal(answer)
 
 
 def test_hazard_answers_for_free_standing_blocks(client):

@@ -54,7 +54,7 @@ def test_the_page_and_the_health_check_need_none(guarded):
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "example.org"])
 def test_other_computers_need_a_token(host, monkeypatch):
-    with pytest.raises(InputError, match="the service needs a token"):
+    with pytest.raises(InputError, match="a token is required"):
         ServiceSettings(host=host).checked()
     monkeypatch.setenv(VARIABLE, TOKEN)
     assert ServiceSettings(host=host).checked().token == TOKEN
@@ -81,7 +81,7 @@ def test_the_command_refuses_to_start_without_a_token(shell: Shell):
         (["--time-limit", "0"], "--time-limit 0"),
         (["--body-limit-mb", "nan"], "--body-limit-mb nan"),
         (["--token-file", "none.txt"], "none.txt: cannot be read"),
-        (["--host", "192.0.2.1"], "the service needs a token"),
+        (["--host", "192.0.2.1"], "a token is required"),
     ],
 )
 def test_the_command_refuses_what_cannot_be(shell: Shell, options, words):

@@ -410,15 +410,15 @@ def test_a_throw_is_reported() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"p2": 3.0, "kr": 0.2, "restitution": 0.0}, "restitution = 0: give the speed"),
+        ({"p2": 3.0, "kr": 0.2, "restitution": 0.0}, "restitution = 0: give the coefficient"),
         ({"p2": 3.0, "kr": 0.2, "restitution": 1.01}, "above 0 and up to 1"),
         ({"p2": 3.0, "kr": 0.2, "restitution": math.nan}, "restitution = nan is not finite"),
         ({"p2": 3.0, "kr": -0.2}, "kr = -0.2 is not above zero"),
         ({"p2": 3.0}, "kr is missing"),
-        ({"p2": 3.0, "kr": 0.2, "beta_deg": 2.0}, "beta_deg does not go with p2 and kr"),
+        ({"p2": 3.0, "kr": 0.2, "beta_deg": 2.0}, "beta_deg cannot be combined with p2 and kr"),
         ({"block": Block.from_angles(2.0, 9.0, 1.0), "beta_deg": 0.0}, "backward over its heel"),
         ({"block": Block.from_angles(-9.0, 9.0, 1.0), "beta_deg": 9.5}, "forward over its toe"),
-        ({"block": Block.from_angles(-9.0, 80.0, 1.0), "beta_deg": -11.0}, "falls backward"),
+        ({"block": Block.from_angles(-9.0, 80.0, 1.0), "beta_deg": -11.0}, "overturns backward"),
         ({"block": Block.from_angles(-70.0, 80.0, 1.0), "beta_deg": -15.0}, "below 90 degrees"),
         ({"block": Block.from_angles(-9.0, 9.0, 1.0)}, "beta_deg is missing"),
         (
@@ -426,7 +426,7 @@ def test_a_throw_is_reported() -> None:
                 "block": Block.from_angles(-9.0, 9.0, 1.0), "beta_deg": 0.0, "phi_deg": 30.0,
                 "cohesion_pa": 1e3, "density_kg_m3": 2700.0,
             },
-            "cohesion_pa does not go with rocking",
+            "cohesion_pa cannot be combined with rocking",
         ),
     ],
 )  # fmt: skip
@@ -438,7 +438,7 @@ def test_what_no_model_covers_is_refused(given: dict, words: str) -> None:
 
 def test_restitution_is_an_option_of_this_kind_alone() -> None:
     motion = GroundMotion(shaking(3), 0.02)
-    with pytest.raises(InputError, match="restitution does not go with toppling"):
+    with pytest.raises(InputError, match="restitution cannot be combined with toppling"):
         rbfrag.respond(motion, p2=3.0, kr=0.2, restitution=0.9)
 
 

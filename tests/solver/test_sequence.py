@@ -217,10 +217,10 @@ def test_a_run_from_a_state() -> None:
     ("motions", "options", "word"),
     [
         ([], {}, "no motion"),
-        (motion(1), {"gap_s": 1.0}, "goes with a list"),
+        (motion(1), {"gap_s": 1.0}, "requires a list"),
         ([motion(1)], {"gap_s": -1.0}, "negative"),
         ([motion(1), motion(2)], {"vertical": [None]}, "one vertical motion for each"),
-        ([motion(1), motion(2)], {"vertical": motion(1)}, "it is a list, too"),
+        ([motion(1), motion(2)], {"vertical": motion(1)}, "give a list for a list of motions"),
         (motion(1), {"vertical": [motion(1)]}, "one vertical motion"),
     ],
 )
@@ -233,5 +233,5 @@ def test_what_is_refused(
 
 def test_a_state_of_a_block_that_carries_none() -> None:
     slid = respond(motion(1), ky=0.1).state
-    with pytest.raises(InputError, match="start does not go with toppling"):
+    with pytest.raises(InputError, match="start cannot be combined with toppling"):
         respond(motion(1), p2=3.0, kr=0.1, start=slid)

@@ -206,7 +206,7 @@ def test_roughness_is_not_followed_in_time_before_the_first_slip() -> None:
     block = Block.from_fractures(2.0, 3.0, 60.0)
     on = {"block": block, "beta_deg": 20.0, "phi_deg": 38.0, "density_kg_m3": RHO}
     motion = rbfrag.GroundMotion(np.array([0.0, 0.6, 0.0]), 0.2)
-    with pytest.raises(InputError, match=r"jrc does not go .* history of sliding"):
+    with pytest.raises(InputError, match=r"jrc cannot be combined with .* history of sliding"):
         rbfrag.respond(motion, **on, jrc=8.0, jcs_mpa=60.0)
     rough = {"jrc": 8.0, "jcs_mpa": 60.0}
     left = rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=30.0)
@@ -216,7 +216,7 @@ def test_roughness_is_not_followed_in_time_before_the_first_slip() -> None:
     assert any("after its first slip" in text for text in left.warnings)
     with pytest.raises(InputError, match="does not stand on phi_residual_deg"):
         rbfrag.respond(motion, **on, **rough, water_m=1.1372, phi_residual_deg=15.0)
-    with pytest.raises(InputError, match="water_m does not go with p2 and kr"):
+    with pytest.raises(InputError, match="water_m cannot be combined with p2 and kr"):
         rbfrag.respond(motion, p2=3.0, kr=0.2, water_m=1.0)
     # a topple turns about its toe whatever the roughness of its base
     slender = {"block": Block.rectangle(4.0, 1.0), "beta_deg": 0.0, "phi_deg": 30.0}

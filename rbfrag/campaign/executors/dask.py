@@ -37,15 +37,15 @@ def connected(address: str) -> Iterator[Any]:
         The client, for :func:`run_on_cluster`.
     """
     if importlib.util.find_spec("distributed") is None:
-        raise MissingExtraError("Dask clusters need distributed", "dask")
+        raise MissingExtraError("Dask clusters require distributed", "dask")
     import distributed
 
     try:
         client = distributed.Client(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {address}: {_first_line(error)}; start one "
-            "with  dask scheduler  and name the address that it prints (tcp://host:8786)",
+            f"no Dask scheduler answers at {address}: {_first_line(error)}; start one with  dask "
+            "scheduler  and give the address that it prints (tcp://host:8786)",
         ) from None
     try:
         try:

@@ -36,7 +36,7 @@ def check_workers(jobs: int | None, scheduler: str | None) -> None:
         raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
     if jobs is not None and scheduler is not None:
         raise InputError(
-            "jobs counts local workers, scheduler names others: give one of them",
+            "jobs is for local workers, scheduler for a cluster: give one of them",
             fields=("jobs", "scheduler"),
         )
 

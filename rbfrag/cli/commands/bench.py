@@ -15,25 +15,25 @@ EXAMPLE = "Example:  rbfrag bench --quick"
 @stacked
 def bench(
     *,
-    quick: bool = option("Fewer cases and settings: under a minute.", False),
+    quick: bool = option("Reduced set of cases and settings (less than a minute)", False),
     records: str | None = option(
-        "Accelerogram file or folder to measure on. Default: the folder in "
-        "RBFRAG_TEST_RECORDS, else the sample records of rbfrag[samples], else analytic "
-        "pulses.",
+        "Accelerogram file or folder [default: folder in RBFRAG_TEST_RECORDS, else sample "
+        "records of rbfrag[samples], else analytic pulses]",
         metavar="PATH",
     ),
     out: str | None = option(
-        "Folder for the tables as CSV and, with matplotlib, work-precision.svg.", metavar="FOLDER"
+        "Output folder for the tables (CSV) and, with matplotlib, work-precision.svg",
+        metavar="FOLDER",
     ),
     json: options.Json = False,
 ) -> None:
-    """Measure speed against error beside general ODE solvers.
+    """Compare speed and error with general ODE solvers.
 
-    Every method runs the same blocks under the same records, in turns, and is compared with
-    an extended-precision reference: blocks that a slope backs, and free-standing ones. Then
-    come the critical search and the scaling with the length of the record and the number of
-    workers. Times are processor times of one thread, those of workers wall times. Peers that
-    are not installed are named and left out.
+    Every method integrates the same blocks under the same records in turns and is compared with an
+    extended-precision reference, for blocks backed by a rock face and free-standing blocks. The
+    critical search and the scaling with record length and number of workers follow. Times are
+    processor times of one thread, for workers wall times. Solvers that are not installed are listed
+    and skipped.
     """
     from dataclasses import asdict
 
@@ -43,7 +43,7 @@ def bench(
 
     folder = None if out is None else Path(out)
     if folder is not None and not folder.is_dir():
-        raise InputError(f"--out: there is no folder {folder}; make it first")
+        raise InputError(f"--out: create the folder {folder} first")
 
     def say(sentence: str) -> None:
         print(sentence, file=sys.stderr, flush=True)

@@ -30,23 +30,23 @@ def block(
     ],
     mesh: MeshOptions,
     plot: str | None = option(
-        "Draw the block on its planes with its contacts and the resultant at yield, or the "
-        "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)."
+        "Figure of the block on its planes with contacts and resultant at yield, or of the "
+        "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)"
     ),
     template: str | None = option(
-        "Write an empty table of blocks with units and an example row, which  rbfrag predict "
-        "--blocks  reads when it is filled in (.xlsx, .csv).",
+        "Empty table of blocks with units and an example row, for rbfrag predict --blocks "
+        "(.xlsx, .csv)",
         metavar="FILE",
     ),
     printing: options.Printing,
 ) -> None:
-    """Print a block's failure mode, yield accelerations and size.
+    """Print the failure mode, yield accelerations and p² of a block.
 
-    Angles in degrees, lengths in m, accelerations in g, the size parameter p2 in 1/s2. A block
-    that topples is backed by a slope; a free-standing one rocks, and fails at weaker shaking
-    (rbfrag predict --kind rocking, rbfrag respond --kind rocking).
-    Of a mesh, which stands free: volume, mass, inertia, and for each azimuth kr, p2 and
-    restitution about its contacts with the ground.
+    Angles in degrees, lengths in m, accelerations in g, the frequency parameter p2 in 1/s². A
+    toppling block is backed by a rock face. A free-standing block rocks and overturns at weaker
+    shaking (rbfrag predict --kind rocking, rbfrag respond --kind rocking). A mesh is a
+    free-standing block: volume, mass, inertia, and for each azimuth kr, p2 and coefficient of
+    restitution about its ground contacts.
     """
     if template is not None:
         from rbfrag.exchange.block_template import COLUMNS, write_template
@@ -56,7 +56,7 @@ def block(
             print_json({"template": written, "columns": list(COLUMNS)})
         else:
             print(f"{written}: write a row for each block in place of the example, then  rbfrag")
-            print(f"predict --blocks {written}  with a measure of the motion, as --pgv 0.6")
+            print(f"predict --blocks {written}  with an intensity measure, as --pgv 0.6")
         return
     if mesh.mesh is not None:
         _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, printing)

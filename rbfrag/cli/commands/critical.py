@@ -29,15 +29,15 @@ class Searched:
     """What is searched for."""
 
     kind: str | None = option(
-        "toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
-        "the kind of the failure mode of a shape."
+        "Kind of failure: toppling, sliding, slumping or confined_toppling [default: "
+        "toppling with --p2, else from the failure mode of the geometry]"
     )
     rotation: float | None = option(
-        "Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
-        "failure past recovery."
+        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
     )
     displacement: str | None = option(
-        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
+        "Displacement limits of sliding on a level plane [m] [default: 0.01,0.05,0.15,0.3]",
+        metavar="LIST",
     )
 
 
@@ -53,23 +53,23 @@ def critical(
     reading: options.ReadingOptions,
     searched: Searched,
     full_map: bool = option(
-        "Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
+        "Map of toppling and stable intervals of k_r/PGA down to 0.01, limits to 1e-4",
         False,
         word="--map",
     ),
     plot: str | None = option(
-        "Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
-        "Makes the whole map, as --map does, borders to 1e-7.",
+        "Figure of the map, peak rotations, bracket and upper bound (.png, .pdf, .svg); "
+        "computes the map as --map, limits to 1e-7",
         metavar="FILE",
     ),
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
-    """Find the critical block of one accelerogram, with its bracket.
+    """Compute the critical strength of an accelerogram, with bounds.
 
-    Toppling: the largest k_r/PGA that topples at --p2, or at the p2 of a shape. Sliding: the
-    largest k_y/PGA that slides further than --displacement. Slumping and confined toppling: the
-    smallest factor on the record that brings the block down.
+    Toppling: the largest k_r/PGA that topples at --p2, or at the p2 of the block geometry. Sliding:
+    the largest k_y/PGA that slides more than --displacement. Slumping and confined toppling: the
+    smallest scale factor of the record at which the block fails.
     """
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.respond import respond
@@ -139,8 +139,8 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
         model = facts_of(kind)
         if model.search_needs == "block" and "block" not in block:
             raise InputError(
-                f"no block: its shape, dip and friction decide about {kind}; describe it by "
-                f"{WAYS}, with beta_deg and phi_deg",
+                f"the kind {kind} requires the geometry of a block: give {WAYS}, with beta_deg "
+                "and phi_deg",
                 fields=("beta_deg", *SIDES_AND_PLANES),
             )
         return model
@@ -158,11 +158,9 @@ def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> 
         if is_given and SEARCH_OPTION[word] not in model.search_options:
             name = SEARCH_OPTION[word]
             owners = [kind for kind, its in KINDS.items() if name in its.search_options]
-            raise InputError(
-                f"{word} goes with --kind {' and '.join(owners)}, not with {model.kind}"
-            )
+            raise InputError(f"{word} requires --kind {' or '.join(owners)}")
     if model.search_needs == "p2" and not (given["--p2"] or given["--block"]):
-        raise InputError("--p2 is missing: the critical block is searched for one p² [1/s²]")
+        raise InputError("--p2 is missing: the critical strength is computed for one p² [1/s²]")
 
 
 def _searched_block(
@@ -180,7 +178,7 @@ def _searched_block(
             return {name: given[name] for name in ("p2",) if name in given}, None, ()
         if "p2" in given:
             raise InputError(
-                "p2 does not go with the shape of a block: a block is described once",
+                "p2 cannot be combined with the geometry of a block: give one of them",
                 fields=("p2",),
             )
     topples = kind_of_mode("topple") if kind is None else facts_of(kind)
@@ -193,7 +191,8 @@ def _searched_block(
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if planes.pop(name, nothing) != nothing:
                 raise InputError(
-                    f"{name} does not go with a search in time: leave it out", fields=(name,)
+                    f"{name} cannot be combined with a search for the critical strength: omit it",
+                    fields=(name,),
                 )
     read = {name: value for name, value in planes.items() if name in PLANES or name not in JOINT}
     kr = stability(shape.block, **read).kr

@@ -33,7 +33,7 @@ app = command_group(
 
 @app.command("upgrade", epilog="Example:  rbfrag db upgrade --db old.db")
 def upgrade(db: options.Db = None, json: options.Json = False) -> None:
-    """Bring a database to the schema of this rbfrag, in one transaction."""
+    """Upgrade a database to the current schema."""
     from rbfrag.db.upgrade import upgrade_database
 
     before, after = upgrade_database(db)
@@ -50,15 +50,18 @@ def upgrade(db: options.Db = None, json: options.Json = False) -> None:
 def info(
     *,
     db: options.Db = None,
-    by: str | None = option("suite: what was searched and found of each suite instead."),
+    by: str | None = option("Results by suite instead: suite"),
     json: options.Json = False,
 ) -> None:
-    """Print the schema, the number of rows and the default model, or the results by suite."""
+    """Print schema, numbers of rows and default model.
+
+    With --by suite the results are listed by suite.
+    """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.queries import database_info, suite_counts
 
     if by not in (None, "suite"):
-        raise InputError(f"--by {by!r}: the one thing to count by is suite")
+        raise InputError(f"--by {by!r}: it must be suite")
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         if by is None:
             _print_info(database_info(connection), json=json)
@@ -111,16 +114,17 @@ def check(
     *,
     db: options.Db = None,
     sample: int = option(
-        "Combinations to compute again, chosen at random; 0 leaves this out.", 20, min=0
+        "Number of randomly chosen combinations to compute again, 0 for none", 20, min=0
     ),
-    seed: int = option("Seed of the random choice.", 0),
-    accept: bool = option(
-        "Take the rows that are there for those that were written, once a loss is known.", False
-    ),
+    seed: int = option("Seed of the random sample", 0),
+    accept: bool = option("Accept the rows present as complete, after a loss", False),
     json: options.Json = False,
 ) -> None:
-    """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
-    computed again. Exit 1 if any is found."""
+    """Check a database for damage.
+
+    The check covers the file, references, samples, keys, brackets, maps, and a random sample
+    computed again. The exit status is 1 if damage is found.
+    """
     from rbfrag.db.check.damage import Damage
     from rbfrag.db.check.database import check_database, coverage
     from rbfrag.db.check.ledger import accept_rows, mark_sound
@@ -186,16 +190,16 @@ def check(
 def export(
     *,
     out: str = option(
-        "Folder to make: a file for each table, and the data dictionary.", ..., metavar="DIR"
+        "New folder with a file for each table and the data dictionary", ..., metavar="DIR"
     ),
     db: options.Db = None,
-    format: str = option("parquet or csv.", "parquet"),
-    tables: str | None = option("Only these, with commas between."),
-    arrays: bool = option("Include samples [g] and histories (Parquet only).", False),
+    format: str = option("File format: parquet or csv", "parquet"),
+    tables: str | None = option("Tables to export, separated by commas [default: all]"),
+    arrays: bool = option("Include samples [g] and response histories (Parquet only)", False),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     json: options.Json = False,
 ) -> None:
-    """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
+    """Export the tables as Parquet or CSV, with a data dictionary."""
     from rbfrag.exchange.database_tables import export_database
 
     names = None if tables is None else [name.strip() for name in tables.split(",") if name.strip()]
@@ -215,14 +219,16 @@ def export(
 def merge(
     *,
     other: str = argument(
-        "Database to read: a path or an SQLAlchemy URL. It is not changed.", metavar="OTHER"
+        "Source database, a path or SQLAlchemy URL; it is not modified", metavar="OTHER"
     ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Add all that another database holds: motions, suites, results, models.
+    """Add the contents of another database.
 
-    Merging twice changes nothing. If the two contradict each other, nothing is written."""
+    Motions, suites, results and models are added. A second merge changes nothing. If the databases
+    contradict each other, nothing is written.
+    """
     from rbfrag.db.merge.databases import merge_databases
 
     _print_merge(merge_databases(other, db=db), json=json)
@@ -232,14 +238,16 @@ def merge(
 @stacked
 def import_(
     *,
-    table: str = argument("CSV with a critical value a line.", metavar="TABLE.csv"),
-    map: str = option("TOML: the column and the unit of each field.", ..., metavar="FILE"),
+    table: str = argument("CSV table with one critical value per line", metavar="TABLE.csv"),
+    map: str = option("TOML file with the column and unit of each field", ..., metavar="FILE"),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Add critical values of toppling, with measures of their motions, out of a table.
+    """Import critical values of toppling from a table.
 
-    Importing twice changes nothing. If what is stored says otherwise, nothing is written."""
+    The table also has the intensity measures of the motions. A second import changes nothing. If
+    the table contradicts stored values, nothing is written.
+    """
     from rbfrag.exchange.tables.critical_values import import_critical_values
 
     _print_merge(import_critical_values(table, map, db=db), json=json)

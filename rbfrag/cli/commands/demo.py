@@ -21,22 +21,19 @@ NEXT = (
 
 
 @stacked
-def demo(
-    *, context: typer.Context, folder: str = option("Folder that the results are written to.", ".")
-) -> None:
-    """Run the whole chain from records to a prediction.
+def demo(*, context: typer.Context, folder: str = option("Output folder", ".")) -> None:
+    """Run an example from records to a prediction.
 
-    That is records, responses, campaign, fit, prediction and two pictures. The records are the
-    18 samples that come with the extra rbfrag[samples]; without them analytic pulses take their
-    place. Every command is printed before it runs. Leaves rbfrag-demo.db,
-    rbfrag-demo-response.png and rbfrag-demo-fit.png.
+    The steps are records, responses, campaign, fit, prediction and two figures. The records are the
+    18 samples of the extra rbfrag[samples], or else analytic pulses. Each command is printed before
+    it runs. The results are rbfrag-demo.db, rbfrag-demo-response.png and rbfrag-demo-fit.png.
     """
     from rbfrag.errors import InputError
     from rbfrag.motions.sample_motions import demo_motions, sample_folder
 
     home = Path(folder)
     if not home.is_dir():
-        raise InputError(f"--folder: there is no folder {home}; make it first")
+        raise InputError(f"--folder: create the folder {home} first")
     database = home / "rbfrag-demo.db"
     response_png, fit_png = home / "rbfrag-demo-response.png", home / "rbfrag-demo-fit.png"
     for suffix in ("", "-wal", "-shm"):

@@ -23,23 +23,26 @@ app = command_group(
 
 Answering = Annotated[Given, fields_of(*ANSWERING, without=("level",))]
 
-Out = Annotated[str, typer.Option("--out", help="File to write.")]
+Out = Annotated[str, typer.Option("--out", help="Output file")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionOptions(BlocksOptions):
     """The blocks, one function each, and what a function is of."""
 
-    name: str = option("Identifier of the one block or of the rock mass.", "block")
-    imt: str = option("Measure of the function: PGV, PGA, or SA at 1 s.", "PGV")
-    levels: int = option("Greatest number of levels of a function that is not lognormal.", 80)
+    name: str = option("Identifier of the single block or of the rock mass", "block")
+    imt: str = option("Intensity measure of the fragility function: PGV, PGA, or SA at 1 s", "PGV")
+    levels: int = option(
+        "Maximum number of intensity levels of a function that is not lognormal", 80
+    )
     component: str = option(
-        "Horizontal component of the measure: single, geometric_mean, rotd50, rotd100 or larger.",
+        "Horizontal component of the intensity measure: single, geometric_mean, rotd50, "
+        "rotd100 or larger",
         "single",
     )
     shares: str | None = option(
-        "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
-        "Example: 1,10,50.",
+        "Fractions of the blocks of a rock mass [%], such as 1,10,50; each defines a limit "
+        "state: at least this fraction fails",
         metavar="LIST",
     )
 
@@ -66,7 +69,10 @@ def nrml(
     answering: Answering,
     json: options.Json = False,
 ) -> None:
-    """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
+    """Export an OpenQuake fragility model (NRML 0.5).
+
+    PGV is in cm/s.
+    """
     from rbfrag.exchange.export import nrml as written
 
     keywords, remarks = blocks.keywords(given, answering)
@@ -84,10 +90,10 @@ def pelicun(
     answering: Answering,
     json: options.Json = False,
 ) -> None:
-    """Write a fragility table of pelicun and SimCenter (.csv), and its description (.json).
+    """Export a fragility table for pelicun and SimCenter.
 
-    PGV is in m/s (mps) there. The description has the table's name: fragility.json stands beside
-    fragility.csv, as SimCenter's library has them.
+    PGV is in m/s (mps). A description (.json) is written next to the table (.csv) under the same
+    name.
     """
     from rbfrag.exchange.export import pelicun as written
 

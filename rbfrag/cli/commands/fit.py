@@ -17,10 +17,12 @@ class Data:
 
     suite: options.Suite = None
     include_structures: bool = option(options.INCLUDE_STRUCTURES, False)
-    vertical: str = option("Combinations without vertical motion, with it, or both.", "without")
+    vertical: str = option(
+        "Combinations without or with vertical motion, or both: without, with, both", "without"
+    )
     doubtful_pgd: bool = option(
-        "Let pgd_tm read the PGD of records flagged final_velocity or "
-        "final_displacement, which it leaves out otherwise.",
+        "For pgd_tm, use records flagged final_velocity or final_displacement, which are "
+        "excluded by default",
         False,
     )
 
@@ -29,43 +31,44 @@ class Data:
 class ModelOptions:
     """How the model is stored, and what its bootstrap draws."""
 
-    name: str | None = option("Name of the model. Default: method-term.")
-    seed: int = option("Seed of the bootstrap by earthquake.", 0)
-    replace: bool = option("Replace a stored model of the same name.", False)
+    name: str | None = option("Name of the model [default: METHOD-TERM]")
+    seed: int = option("Seed of the bootstrap by earthquake", 0)
+    replace: bool = option("Replace a stored model of the same name", False)
 
 
 @stacked
 def fit(
     *,
     term: str = option(
-        "Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
-        "pgv_pga, pgv_pga_tm and pgv_pga_sa10_sa30: PGV with PGA (and Tm, or spectral "
-        "accelerations at 1 and 3 s); xp: the toppling spectrum X(p); pgv_kr: PGV with the block's "
-        "strength; pga; sa10; pga_sa10, pga_sa10_sa30 and pga_sa03_sa10_sa30: PGA with these; "
-        "pga_m, pgv_pga_m and pgv_pga_ia: with magnitude or Arias intensity.",
+        "Set of intensity measures: pgv; pga_tm = PGA g Tm/(2 pi) and pgd_tm = 2 pi PGD/Tm "
+        "[m/s]; pgv_pga, pgv_pga_tm and pgv_pga_sa10_sa30: PGV with PGA (and Tm, or SA at 1 "
+        "and 3 s); xp: toppling spectrum X(p); pgv_kr: PGV with k_r; pga; sa10; pga_sa10, "
+        "pga_sa10_sa30 and pga_sa03_sa10_sa30: PGA with SA; pga_m, pgv_pga_m and pgv_pga_ia: "
+        "with magnitude or Arias intensity",
         ...,
         show_default=False,
     ),
     data: Data,
     kind: str = option(
-        "What the blocks do: toppling; slumping and confined_toppling, on pgv_pga and pgv_pga_m "
-        "(with magnitude); sliding, on these, pgv and pgv_pga_ia; rocking (free-standing), on pgv, "
-        "pgv_pga, sa10, pga_sa10, pga_m and those of sa10_sa30; or another kind that campaigns "
-        "store.",
+        "Kind of failure: toppling; slumping and confined_toppling, with pgv_pga and "
+        "pgv_pga_m; sliding, with these, pgv and pgv_pga_ia; rocking (free-standing), with "
+        "pgv, pgv_pga, sa10, pga_sa10, pga_m, pgv_pga_sa10_sa30 and pga_sa10_sa30; or "
+        "another kind of a stored campaign",
         "toppling",
     ),
     rotation: float | None = option(
-        "Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+        "Rotation limit of slumping [deg] [default: failure past recovery]",
         show_default=False,
     ),
     method: str | None = option(
-        "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
-        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, bounded; on "
-        "xp: record. Default: the one that predicts earthquakes left out best with this term.",
+        "Method for blocks with p2 and kr; of critical values: wls (weighted least squares, "
+        "as in the dissertation), lognormal (with censored motions); of outcomes: logistic, "
+        "bounded; with xp: record [default: best score in leave-one-earthquake-out "
+        "cross-validation]",
         show_default=False,
     ),
     free_m: bool = option(
-        "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).", False
+        "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic)", False
     ),
     stored: ModelOptions,
     db: options.Db = None,
@@ -73,9 +76,9 @@ def fit(
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
-    The model is stored in the database; without one the built-in data are fitted and nothing is
-    stored. The one of the best score on earthquakes left out is the default of its
-    kind, unless  rbfrag models default NAME  has chosen another.
+    The model is stored in the database. Without a database the built-in data set is fitted and
+    nothing is stored. The default model of a kind is that with the best score in
+    leave-one-earthquake-out cross-validation, unless it is set by rbfrag models default NAME.
     """
     from rbfrag.fragility.fit.stored import fit as run
 

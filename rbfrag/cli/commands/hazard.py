@@ -27,18 +27,20 @@ EXAMPLE = (
 class RateOptions:
     """Which rates are asked for."""
 
-    years: float = option("Period of the probability [years].", 50.0)
+    years: float = option("Exposure time of the probability [years]", 50.0)
     weights: str | None = option(
-        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
-        "realizations."
+        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
+        "or the realizations file of OpenQuake"
     )
     joint: bool = option(
-        "Count earthquakes in which any of several blocks of a site fails, too.", False
+        "Compute also the rate of earthquakes in which at least one of several blocks at a "
+        "site fails",
+        False,
     )
     within_km: float = option(options.WITHIN_HELP, options.WITHIN_KM)
     at_least: str | None = option(
-        "Numbers of failures in one earthquake whose rates are wanted, as 1,5,20, with --joint. "
-        "Default: 1, 2, 5, 10, …",
+        "Numbers of failures K for rates of earthquakes with at least K failures, such as "
+        "1,5,20, with --joint [default: 1, 2, 5, 10, …]",
         metavar="K,K",
     )
 
@@ -50,7 +52,8 @@ class RateOptions:
             return [int(part) for part in self.at_least.split(",")]
         except ValueError:
             raise InputError(
-                f"--at-least {self.at_least!r}: give whole numbers with commas, as 1,5,20"
+                f"--at-least {self.at_least!r}: give whole numbers separated by commas, such as "
+                "1,5,20"
             ) from None
 
 
@@ -58,9 +61,9 @@ class RateOptions:
 def hazard(
     *,
     curve: list[str] = argument(
-        "Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
-        "names their units (pgv_m_s,annual_rate); several are branches or statistics of one "
-        "logic tree.",
+        "Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns with units in "
+        "the header (pgv_m_s,annual_rate); several files are branches or statistics of one "
+        "logic tree",
         metavar="CURVE...",
     ),
     given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
@@ -69,27 +72,29 @@ def hazard(
     answering: options.Answering,
     wanted: RateOptions,
     workers: WorkerOptions,
-    out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
+    out: str | None = option(
+        "Output table with one row per block and site (.csv, .xlsx, .parquet)"
+    ),
     release: str | None = option(
-        "Write places, sizes and rates of the blocks for tools of rockfall propagation (.csv, "
-        ".xlsx, .parquet).",
+        "Output table of coordinates, sizes and rates of the blocks for rockfall propagation "
+        "tools (.csv, .xlsx, .parquet)",
         metavar="FILE",
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
-        "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
+        "Figure of the disaggregation of the rate of a single block by intensity (.png, .pdf, .svg)"
     ),
     printing: options.Printing,
 ) -> None:
-    """Print the annual rate at which a block topples.
+    """Print annual rate and return period of failure of blocks.
 
-    The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. Blocks of --blocks stand at the curves' sites by site_id, or at the nearest by lon and
-    lat. With --joint it gives how often an earthquake fails at least one block of a site, or more,
-    by what the model knows of blocks that share the shaking. Curves of PGV, SA at 1 s and PGA are
-    answered, each by a model of that very measure; another needs --convert. With --weights curves
-    are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
-    backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
+    The fragility function is integrated over the hazard curve. Blocks of --blocks are assigned to
+    the sites of the curves by site_id, or to the nearest site by lon and lat. --joint adds the rate
+    of earthquakes in which at least one block of a site fails, from the dependence model of the
+    fragility model. Curves of PGV, SA at 1 s and PGA are supported, each with a model of the same
+    intensity measure; other curves require --convert. With --weights the curves are logic-tree
+    branches: the result is the mean rate and its distribution over the branches. Toppling blocks
+    are backed by a rock face; a free-standing block overturns at weaker shaking: --kind rocking.
     """
     import numpy as np
 
@@ -106,7 +111,9 @@ def hazard(
     check_files(table=release)
     table, is_class, remarks, rows = blocks.given_blocks(given, reads=(*RELEASE, "count"))
     if release is not None and is_class:
-        raise InputError("--release needs the places of blocks, and a rock mass has none: --blocks")
+        raise InputError(
+            "--release requires the coordinates of blocks: use --blocks instead of --rockmass"
+        )
     if rows is None:
         table = {**{name: [given[name]] for name in SIDES if name in given}, **table}
     files = [suited_in(path, **vars(meaning)) for path in curve]
@@ -119,7 +126,7 @@ def hazard(
         remarks += rows.unusable_in_words(FROM_SUMS)
     if plot is not None and len(at.names) > 1 and not is_class:
         raise InputError(
-            "--plot draws one block at one site: choose them with --site, --p2 and --kr"
+            "--plot requires a single block at a single site: give --site, --p2 and --kr"
         )
     elsewhere = workers.scheduler is not None or (workers.jobs or 1) > 1
     run = workers.runner(rate_part) if elsewhere else None

@@ -17,14 +17,16 @@ class JobFileOptions:
     """The exports of one job."""
 
     gmf_data: str | None = option(
-        "File of ground motion fields, CSV or HDF5 (gmf-data, which names the sites too).",
+        "Ground-motion fields, CSV or HDF5 (gmf-data, which also names the sites)",
         metavar="FILE",
     )
-    events: str | None = option("File of all events.", metavar="FILE")
-    sitemesh: str | None = option("File of all sites.", metavar="FILE")
-    realizations: str | None = option("File of the logic tree's weights.", metavar="FILE")
+    events: str | None = option("Events file", metavar="FILE")
+    sitemesh: str | None = option("Site mesh file", metavar="FILE")
+    realizations: str | None = option(
+        "Realizations file with the logic-tree weights", metavar="FILE"
+    )
     ruptures: str | None = option(
-        "File of ruptures, whose first line states how long the events took.", metavar="FILE"
+        "Ruptures file, with the investigation time in its first line", metavar="FILE"
     )
 
     def named(self) -> dict[str, str]:
@@ -37,10 +39,12 @@ class Time:
     """How long the events took, where no file of ruptures states it."""
 
     investigation_time: float | None = option(
-        "Years of one stochastic event set, as in job.ini; where no file of ruptures states it."
+        "Investigation time of one stochastic event set [years], as in job.ini, if no "
+        "ruptures file gives it"
     )
     ses: int | None = option(
-        "Number of event sets of each realization (ses_per_logic_tree_path), likewise."
+        "Number of stochastic event sets per realization (ses_per_logic_tree_path), as in "
+        "job.ini, if no ruptures file gives it"
     )
 
 
@@ -48,9 +52,9 @@ class Time:
 class Sampling:
     """How the blocks of one event are taken together."""
 
-    samples: int = option("Samples of each event.", 100)
-    expected: bool = option("Expected values alone, without samples and curves.", False)
-    seed: int = option("Seed of the samples.", 0)
+    samples: int = option("Number of samples per event", 100)
+    expected: bool = option("Expected values only, without samples and curves", False)
+    seed: int = option("Seed of the samples", 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +62,16 @@ class Meaning:
     """What shakes the blocks, and how they fail."""
 
     imt: str | None = option(
-        "Measure that the models read: PGV, 'SA(1.0)', or PGA, turned into PGV by the magnitudes "
-        "of the ruptures; several as PGV,PGA, with their --model, which the engine draws "
-        "independently. Default: the first of PGV and SA(1.0) that the job has."
+        "Intensity measure: PGV, 'SA(1.0)', or PGA, converted to PGV with the magnitudes of "
+        "the ruptures; several (PGV,PGA) with their --model, sampled independently by "
+        "OpenQuake [default: PGV, else SA(1.0), as available]"
     )
     component: str | None = option(
-        "Horizontal component of the measures: single, geometric_mean, rotd50, rotd100 or larger "
-        "[default: rotd50]."
+        "Horizontal component of the intensity measures: single, geometric_mean, rotd50, "
+        "rotd100 or larger [default: rotd50]"
     )
     kind: str | None = option(
-        "Kind of failure of rows that state none. Default: toppling, backed by a slope."
+        "Kind of failure of rows without one [default: toppling, backed by a rock face]"
     )
 
 
@@ -77,7 +81,7 @@ class LossTable:
 
     blocks: str = option(
         "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
-        "width_m [m], site_id or lon and lat, and if wanted count, weight, loss, loss_sigma, kind.",
+        "width_m [m]; site_id or lon and lat; optional count, weight, loss, loss_sigma, kind",
         ...,
         metavar="FILE",
     )
@@ -91,8 +95,8 @@ class LossTable:
 def losses(
     *,
     folder: str | None = argument(
-        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV; "
-        "or its datastore calc_N.hdf5 (extra hdf5).",
+        "Folder with the exports of one job: gmf-data, events, sitemesh, realizations, "
+        "ruptures CSV; or its datastore calc_N.hdf5 (extra hdf5)",
         None,
         metavar="[FOLDER]",
     ),
@@ -103,19 +107,21 @@ def losses(
     meaning: Meaning,
     workers: WorkerOptions,
     answering: options.Answering,
-    out: str | None = option("Write the table of events (.csv, .xlsx, .parquet)."),
+    out: str | None = option("Output table of events (.csv, .xlsx, .parquet)"),
     excel_text: bool = option(options.EXCEL_TEXT, False),
-    plot: str | None = option("Draw how often numbers of failures are reached (.png, .pdf, .svg)."),
+    plot: str | None = option(
+        "Figure of exceedance rates of the number of failures (.png, .pdf, .svg)"
+    ),
     printing: options.Printing,
 ) -> None:
-    """Count failures and losses in the earthquakes of an event set.
+    """Compute failures and losses of blocks in an event set.
 
-    The event set is that of an OpenQuake job, event-based or scenario. Blocks join it by site_id,
-    or by lon and lat.
-    Each event counts weight(realization)/(investigation time x event sets) a year; a scenario has
-    no rate, and its answer is given the event. What the blocks of one event do together is drawn
-    by the model's dependence: what the earthquake shares, what a site shares, what each block has.
-    The answer is the same for any number of workers.
+    The event set is that of an OpenQuake job, event-based or scenario. Blocks are assigned to its
+    sites by site_id, or by lon and lat. Each event has the annual rate
+    weight(realization)/(investigation time x event sets); results of a scenario are conditional on
+    the earthquake. Failures of blocks in one event are sampled with the dependence model of the
+    fragility model: residuals of the earthquake, of the site and of the block. The result does not
+    depend on the number of workers.
     """
     from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, read_blocks
     from rbfrag.exchange.event_losses import losses as answered

@@ -18,7 +18,7 @@ app = command_group(
 )
 
 Name = Annotated[
-    str, typer.Argument(metavar="NAME", help="Name of the model.", autocompletion=model_names)
+    str, typer.Argument(metavar="NAME", help="Name of the model", autocompletion=model_names)
 ]
 
 
@@ -26,11 +26,10 @@ Name = Annotated[
 def list_models(db: options.Db = None, json: options.Json = False) -> None:
     """List the fitted models with their scores.
 
-    The log loss is that of earthquakes left out, the smaller the better among the models of a kind;
-    of blocks known by k_r it is that of k_r >= 0.05. Of the models that what is given suffices for,
-    the default answers, the one that was chosen or else the best of all, or else the best; those
-    of a method that is kept for comparison answer by name alone. Without a database the models that
-    are shipped are listed.
+    The log loss is from leave-one-earthquake-out cross-validation; lower is better, among models of
+    one kind. For blocks with k_r it is that of k_r >= 0.05. Among the models whose predictors are
+    available, the default model is used, else the best. Models of methods for comparison are used
+    by name only. Without a database the built-in models are listed.
     """
     from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
@@ -62,14 +61,14 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 def show_model(
     printing: options.Printing,
     name: str | None = argument(
-        "Name of the model. Default: all are listed.",
+        "Name of the model [default: list all]",
         None,
         metavar="NAME",
         autocompletion=model_names,
     ),
     db: options.Db = None,
 ) -> None:
-    """Print the report of a fitted model from its stored row, or the list of them."""
+    """Print the report of a fitted model, or the list of models."""
     if name is None:
         list_models(db, json=printing.json)
         return
@@ -84,7 +83,7 @@ def show_model(
 
 @app.command("default", epilog="Example:  rbfrag models default logistic-pgv")
 def set_default_model(name: Name, db: options.Db = None) -> None:
-    """Choose the default of a kind, instead of the model of the best score."""
+    """Set the default model of a kind, instead of the model with the best score."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.location import data_place
     from rbfrag.db.models import set_default
@@ -93,8 +92,8 @@ def set_default_model(name: Name, db: options.Db = None) -> None:
     place, built_in = data_place(db)
     if built_in:
         raise InputError(
-            f"the built-in data set is read only: name the model with --model {name}, or copy "
-            f"{place} to rbfrag.db, run  rbfrag db upgrade  and choose the default of that"
+            f"the built-in data set is read-only: use --model {name}, or copy {place} to "
+            "rbfrag.db, run  rbfrag db upgrade  and set the default there"
         )
     with opened_database(db) as engine, engine.begin() as connection:
         set_default(connection, name)
@@ -103,9 +102,9 @@ def set_default_model(name: Name, db: options.Db = None) -> None:
 
 @app.command("check", epilog="Example:  rbfrag models check")
 def check(db: options.Db = None, json: options.Json = False) -> None:
-    """Say whether the data of each model have changed since it was fitted.
+    """Check whether the data of the models have changed since they were fitted.
 
-    The exit status is 1 if any have, or if a model cannot be read.
+    The exit status is 1 if data have changed, or if a model is invalid.
     """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import model_rows

@@ -36,40 +36,39 @@ app = command_group(
 def add(
     *,
     paths: list[str] = argument(
-        "Files, zips or members of one (FILE.zip/NAME), or folders to search.", metavar="PATHS..."
+        "Files, zip archives, members of one (FILE.zip/NAME), or folders to search",
+        metavar="PATHS...",
     ),
     reading: options.ReadingOptions,
-    suite: str | None = option("Put the motions into this suite."),
+    suite: str | None = option("Suite that the motions are added to"),
     metadata: str | None = option(
-        "Table with the columns file, trace_index, event_id, units, is_vertical, "
-        "companion_group, magnitude, processing (only file must be there). Files are named "
-        "relative to the table's folder.",
+        "Table with the columns file (required), trace_index, event_id, units, is_vertical, "
+        "companion_group, magnitude, processing; file names are relative to the folder of "
+        "the table",
         metavar="CSV",
     ),
     processing: str = option(
-        "What was done to the records where no metadata say it, corrected or uncorrected; also "
-        "where their format says otherwise.",
+        "Processing of records without metadata: corrected or uncorrected; overrides the "
+        "file format",
         "",
         metavar="WORDS",
     ),
-    raw: bool = option(
-        "Store every record as its file has it; uncorrected ones are flagged.", False
-    ),
+    raw: bool = option("Store every record unprocessed; uncorrected records are flagged", False),
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Read accelerogram files and store them; uncorrected records are processed first.
+    """Store accelerograms; uncorrected records are processed first.
 
-    Uncorrected, by metadata, header or format: mean removed, 20 s of zeros on each side,
-    Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records are
-    stored as they are. Vertical components called DOWN are turned upward.
+    Processing of uncorrected records (by metadata, header or format): mean removed, 20 s of zeros
+    on each side, Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records
+    are stored unchanged. Vertical components called DOWN are reversed to point upward.
 
-    Formats are recognised by content. In a folder or zip, texts about the records (.md, .pdf,
-    .html, .rst, .doc) are passed over, and V3 files beside the V2 of their record. A file that
-    cannot be read is listed with its reason,
-    the others are added, and the exit status is 1. Without --metadata an earthquake is only a
-    guess from the file's header, flagged, and never merged with one that was stated.
+    Formats are detected from the content. In a folder or zip archive, documents (.md, .pdf, .html,
+    .rst, .doc) and V3 files next to the V2 file of the record are skipped. Invalid files are listed
+    with the reason, all others are added, and the exit status is 1. Without --metadata the
+    earthquake is guessed from the file header, flagged, and never merged with an earthquake from
+    metadata.
     """
     from rbfrag.campaign.add_motions import add_motions
 
@@ -100,7 +99,7 @@ def list_motions(
 ) -> None:
     """List the stored motions with their intensity measures and quality flags.
 
-    Long names are cut; --json has all, and every measure.
+    Long names are shortened; --json prints full names and all intensity measures.
     """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.motions import motion_rows
@@ -161,16 +160,17 @@ def export(
     *,
     motions: options.Motions,
     reading: options.ReadingOptions,
-    out: str = option("File to write.", ..., metavar="FILE"),
+    out: str = option("Output file", ..., metavar="FILE"),
     file_format: str | None = option(
-        "csv (several motions, every label) or at2 (one motion). Default: what FILE ends in.",
+        "File format: csv (several motions, all labels) or at2 (one motion) [default: from "
+        "the suffix of FILE]",
         word="--format",
     ),
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Write motions into a file from which they are read back bit for bit."""
+    """Export motions to a file, without loss of precision."""
     from rbfrag.motions.export import export_motions
 
     records = [

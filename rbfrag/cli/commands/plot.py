@@ -26,7 +26,7 @@ app = command_group(
     "Example:  rbfrag plot fit --out fit.png",
 )
 
-Out = Annotated[str, typer.Option("--out", help="File to write: .png, .pdf or .svg.")]
+Out = Annotated[str, typer.Option("--out", help="Output file (.png, .pdf, .svg)")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,15 +34,13 @@ class Held:
     """What lines of equal probability are drawn for."""
 
     p2: float | None = option(
-        "Frequency parameter p² [1/s²] of the blocks drawn. Default: the middle of the "
-        "fitted range."
+        "Frequency parameter p² of the blocks [1/s²] [default: middle of the fitted range]"
     )
     pga: float | None = option(
-        "PGA [g] of the motions drawn. Default: in proportion to PGV, by the middle of "
-        "the fitted range."
+        "PGA of the motions [g] [default: proportional to PGV, from the middle of the fitted range]"
     )
     tm: float | None = option(
-        "Mean period [s] of the motions drawn. Default: the middle of the fitted range."
+        "Mean period of the motions [s] [default: middle of the fitted range]"
     )
 
 
@@ -51,11 +49,14 @@ class Held:
 def plot_fit(
     *,
     out: Out,
-    model: str | None = option("Name of the model. Default: the database's default."),
-    log: bool = option("Logarithmic axes.", False),
+    model: str | None = option("Name of the model [default: default model of the database]"),
+    log: bool = option("Logarithmic axes", False),
     db: options.Db = None,
 ) -> None:
-    """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
+    """Draw the data of a fit with failure lines.
+
+    The failure lines are those of P = 2.5 %, 50 % and 97.5 %, with histograms.
+    """
     from rbfrag.plots import plot
 
     picture = plot.fit(out, model=model, log=log, db=db)
@@ -70,17 +71,18 @@ def plot_chart(
     out: Out,
     held: Held,
     model: str | None = option(
-        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm); of another kind "
-        "than toppling any. Default: the one that answers for PGV."
+        "Name of a model with a single intensity measure (PGV, SA(1), PGA, ...) or PGV with "
+        "PGA (and Tm); any model of kinds other than toppling [default: model used for PGV]"
     ),
     displacement: float | None = option(
-        "Sliding: displacement [m] that is too far. Default: the middle of the fitted range."
+        "Displacement limit of sliding [m] [default: middle of the fitted range]"
     ),
     db: options.Db = None,
 ) -> None:
-    """Draw lines of equal probability of toppling over intensity and block, to read by hand.
+    """Draw a design chart: lines of equal probability.
 
-    What the model reads beside them is held: --p2, and of a model of PGV with PGA --pga and --tm.
+    The axes are intensity and block. Further predictors are held constant: --p2, and for a model of
+    PGV with PGA --pga and --tm.
     """
     from rbfrag.plots import plot
 
@@ -106,21 +108,21 @@ def plot_curve(
     given: options.Block,
     held: options.Measures,
     over: str | None = option(
-        "What the curve runs over: pgv, pga, pgd or sa10. Default: pgv, or what "
-        "--model reads first."
+        "Intensity measure on the horizontal axis: pgv, pga, pgd or sa10 [default: pgv, or "
+        "the first predictor of --model]"
     ),
     answering: options.Ranging,
     beside: str | None = option(
-        "Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
-        "pelicun table (.csv).",
+        "Fragility functions of the same intensity measure for comparison: NRML 0.4 or 0.5 "
+        "(.xml), or a pelicun table (.csv)",
         metavar="FILE",
     ),
 ) -> None:
-    """Draw the fragility curve of one block over a measure of the shaking.
+    """Draw the fragility curve of a block.
 
-    The band is the confidence interval of P; with --sites a second one is the share
-    of such blocks that fails at so many sites of one earthquake. The other measures are held at the
-    values given.
+    The band is the confidence interval of P. With --sites a second band is the prediction interval
+    of the fraction of identical blocks that fails at these sites in one earthquake. Other intensity
+    measures are held at the given values.
     """
     from rbfrag.plots import plot
 
@@ -140,7 +142,10 @@ def plot_curve(
 
 @app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
 def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
-    """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
+    """Draw critical k_r/PGA over the frequency ratio.
+
+    The frequency ratio is omega_m/p. The lines are those of single pulses.
+    """
     from rbfrag.plots import plot
 
     plot.sensitivity(out, suite=suite, db=db)
@@ -153,14 +158,15 @@ def plot_calibration(
     *,
     out: Out,
     model: list[str] | None = option(
-        "Stored model; may be given up to four times. Default: the default."
+        "Name of a stored model, up to four times [default: default model]"
     ),
-    seed: int = option("Seed of the draws of earthquakes.", 0),
+    seed: int = option("Seed of the earthquake bootstrap", 0),
     db: options.Db = None,
 ) -> None:
-    """Draw predicted probabilities beside the shares that toppled, earthquakes left out in turn.
+    """Draw predicted probabilities and observed fractions.
 
-    Each model is fitted again, once without each earthquake.
+    The predictions are from leave-one-earthquake-out cross-validation: each model is refitted
+    without each earthquake in turn.
     """
     from rbfrag.plots import plot
 
@@ -170,7 +176,7 @@ def plot_calibration(
 
 @app.command("vertical", epilog="Example:  rbfrag plot vertical --out vertical.png")
 def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
-    """Draw critical strengths with vertical motion beside those without it."""
+    """Draw critical strengths with and without vertical motion."""
     from rbfrag.plots import plot
 
     plot.vertical(out, suite=suite, db=db)
@@ -184,11 +190,11 @@ def plot_spectrum(
     motions: options.Motions,
     out: Out,
     reading: options.ReadingOptions,
-    p2: str = option("The figure spans at least these p² [1/s²].", "0.1,30"),
+    p2: str = option("Minimum range of p² on the axis [1/s²]", "0.1,30"),
     polarity: options.Polarity = "both",
     db: options.Db = None,
 ) -> None:
-    """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
+    """Draw the toppling spectra of motions over p², with PGV."""
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
@@ -211,7 +217,11 @@ def plot_response(
     reading: options.ReadingOptions,
     db: options.Db = None,
 ) -> None:
-    """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
+    """Draw the response history of a block.
+
+    The upper part is the acceleration with k_r(theta), the lower part theta over the critical
+    angle.
+    """
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.plots import plot
 
@@ -236,9 +246,10 @@ def plot_planes(
     planes: Annotated[Given, fields_of(*SPACE)],
     out: Out,
 ) -> None:
-    """Draw base, back and face of a block on a stereonet: lower hemisphere, equal area.
+    """Draw base, back and face of a block on a stereonet.
 
-    Shaded are the poles of planes that strike too far off the face for a section.
+    The projection is lower hemisphere, equal area. Shaded are the poles of planes whose strike
+    deviates too much from the face for a section.
     """
     from rbfrag.plots import plot
 
@@ -252,10 +263,10 @@ class Ultimate:
     """The motion under which the cells of a chart are followed."""
 
     ultimate: bool = option(
-        "Follow the block of each cell of 3 degrees, of the spacing --s1 (default 1 m), in time.",
+        "Simulate the block of each 3° cell, with the spacing --s1 (default 1 m), to its end",
         False,
     )
-    motion: str | None = option("The accelerogram of --ultimate.", metavar="MOTION")
+    motion: str | None = option("Accelerogram of --ultimate", metavar="MOTION")
     jobs: options.Jobs = None
 
 
@@ -276,19 +287,17 @@ def plot_modes(
     reading: options.ReadingOptions,
     db: options.Db = None,
     blocks: str | None = option(
-        "Show the blocks of a table (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
-        "as  rbfrag rockmass --out  writes it.",
+        "Table of blocks to show (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
+        "such as that of rbfrag rockmass --out",
         metavar="FILE",
     ),
     sheet: str | None = option(options.SHEET, metavar="NAME"),
-    rockmass: str | None = option(
-        "Show the blocks of a rock mass file (.toml, .csv).", metavar="FILE"
-    ),
+    rockmass: str | None = option("Rock mass file of blocks to show (.toml, .csv)", metavar="FILE"),
 ) -> None:
-    """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3.
+    """Draw failure modes and yield accelerations.
 
-    With water, cohesion or roughness the chart is of blocks of one spacing --s1; with --ultimate
-    its colours are the modes in which they end under --motion.
+    The axes are the block angles alpha1 and alpha3. With water, cohesion or roughness the chart is
+    for blocks of one spacing --s1. With --ultimate the colours are the final modes under --motion.
     """
     from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots import plot
@@ -296,13 +305,13 @@ def plot_modes(
 
     if "phi_deg" not in planes:
         raise InputError(
-            "phi_deg is missing: the chart is drawn for one friction angle", fields=("phi_deg",)
+            "phi_deg is missing: the chart is for one friction angle", fields=("phi_deg",)
         )
     plot_path(out)
     shown = charted_blocks(blocks, rockmass, planes, sheet=sheet)
     ran, warnings = None, [*shown.warnings]
     if ended.ultimate != (ended.motion is not None):
-        raise InputError("--ultimate and --motion go together: cells are followed under a motion")
+        raise InputError("--ultimate requires --motion, and --motion requires --ultimate")
     if ended.motion is not None:
         from rbfrag.campaign.shake_rockmass import shake
         from rbfrag.plots.modes import chart_cells
@@ -331,15 +340,15 @@ def plot_rotation(
     out: Out,
     given: Annotated[Given, fields_of(*SHAPE, *PLANES, *WHOLE, without=("kind",))],
     back_follows: str = option(
-        "Shares of the block's rotation by which the back plane turns with it, from 0 to 1.",
+        "Rotations of the back plane as fractions of the block rotation, 0–1",
         "0,0.5,1",
     ),
     json: options.Json = False,
 ) -> None:
-    """Draw the yield of a slump or a confined topple over its rotation, and print its least.
+    """Draw the yield acceleration over the rotation.
 
-    The rock behind a block may give way with it: its back plane then turns by a share of the
-    block's rotation.
+    The block slumps or topples with confinement. The minimum is printed. The rock behind the block
+    may yield: the back plane then rotates by a fraction of the block rotation.
     """
     from rbfrag.plots.rotation import plot_rotation as draw
     from rbfrag.plots.rotation import yield_lines
@@ -348,10 +357,15 @@ def plot_rotation(
     with given.named():
         block, planes, *_ = on_planes(without_kv(given))
     if not planes.pop("back_fracture", True):
-        raise InputError("--no-back: without a plane behind it no block turns against it")
+        raise InputError(
+            "--no-back is not supported: slumping and confined toppling require a back plane"
+        )
     for name in planes.keys() - {*PLANES}:
-        text = f"{name} does not go with yields over a rotation, which follows a first slip"
-        raise InputError(f"{text}: leave it out", fields=(name,))
+        text = (
+            f"{name} cannot be combined with the yield over a rotation, which follows the first "
+            "slip"
+        )
+        raise InputError(f"{text}: omit it", fields=(name,))
     shares = options.number_list(back_follows, "--back-follows")
     draw(block, out, back_follows=shares, **planes)
     lines = yield_lines(block, back_follows=shares, **planes)

@@ -18,11 +18,13 @@ class RecordOptions:
     """The accelerogram itself."""
 
     motion: str | None = option(
-        "The accelerogram itself, instead of its measures: a file, FILE#INDEX or a "
-        "database id. Its toppling spectrum answers, for both polarities and their mean.",
+        "Accelerogram instead of intensity measures: a file, FILE#INDEX or a database id; P "
+        "is computed from its toppling spectrum",
         metavar="MOTION",
     )
-    polarity: str = option("With --motion: forward, reverse, or both where unknown.", "both")
+    polarity: str = option(
+        "Polarity of --motion: forward, reverse, or both if unknown (mean of the two)", "both"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,20 +32,18 @@ class BatchOptions:
     """A table of blocks, and one of answers."""
 
     blocks: str | None = option(
-        "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns p2_1_s2 and kr (or "
-        "height_m and width_m; or ky and displacement_m; or ks and ps2_1_s2; or kct and "
-        "pct2_1_s2), restitution, p2_sigma, kr_sigma and the like, and any of pgv_m_s, sa03_g, "
-        "sa10_g, sa30_g, pga_g, tm_s, pgd_m, arias_m_s, magnitude; what is the same for all rows "
-        "may be an option.",
+        "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns such as p2_1_s2 and kr, "
+        "or height_m and width_m, or ky and displacement_m; standard deviations such as "
+        "kr_sigma; and pgv_m_s, pga_g, sa10_g etc.; values common to all rows can be options",
         word=("--blocks", "--batch"),
         metavar="FILE",
     )
     sheet: str | None = option(options.SHEET, metavar="NAME")
     ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME")
     out: str | None = option(
-        "With --blocks: table to write, the same columns with kind, mode, probability, ci_low, "
-        "ci_high, event_low, event_high, in_domain, how (what answered), reason and, of uncertain "
-        "blocks, block_sd. Default: a list of the answers; --json lists the first 10,000.",
+        "Output table for --blocks: the columns of the input and kind, mode, probability, "
+        "ci_low, ci_high, event_low, event_high, in_domain, how, reason and, for uncertain "
+        "blocks, block_sd",
         metavar="FILE",
     )
     excel_text: bool = option(options.EXCEL_TEXT, False)
@@ -61,26 +61,26 @@ def predict(
     table: BatchOptions,
     printing: options.Printing,
 ) -> None:
-    """Print the probability that a block fails.
+    """Print the probability of failure of blocks.
 
-    P is the mean over all earthquakes and sites with these intensity measures, with its confidence
-    interval. With --sites a prediction interval gives the fraction of such blocks that fails at so
-    many sites of one earthquake.
+    P is the mean over earthquakes and sites with these intensity measures, with its confidence
+    interval. With --sites a prediction interval is added for the fraction of identical blocks that
+    fails at these sites in one earthquake.
 
-    What is known of the motion decides which model answers: PGV, alone or with PGA, best with the
-    spectral accelerations at 1 and 3 s or Tm, too; PGA with spectral accelerations; SA at 1 s or
-    PGA alone; of slides and slumps also Arias intensity or magnitude; or the motion itself. Where
-    the measures suffice for several models, each is answered.
+    The intensity measures determine the model: PGV alone or with PGA, best with SA at 1 and 3 s or
+    Tm; PGA with spectral accelerations; SA at 1 s or PGA alone; for sliding and slumping also Arias
+    intensity or magnitude; or the accelerogram. Where they suffice for several models, the answers
+    of all are listed.
 
-    Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
-    shaking: ask for --kind rocking.
+    Toppling blocks are backed by a rock face; a free-standing block overturns at weaker shaking:
+    --kind rocking.
 
-    Where no measure is known, --magnitude, --rjb, --vs30 and --mechanism say how strong the shaking
-    is and how it scatters (Boore et al. 2014), or --gmm FILE, a table of another ground-motion
-    model. P is the mean over that scatter, or over that of --pgv-sigma and the like.
+    Without intensity measures, --magnitude, --rjb, --vs30 and --mechanism give median and
+    dispersion of the shaking (Boore et al. 2014), or --gmm FILE, a table of another ground-motion
+    model. P is then integrated over the ground-motion uncertainty, as with --pgv-sigma etc.
 
-    A block of which --kr-sigma and the like are given is uncertain: P is the mean over all that it
-    may be, and block_sd how much P differs among them.
+    With --kr-sigma etc. the block is uncertain: P is integrated over the block uncertainty, and
+    block_sd is the standard deviation of P among blocks.
     """
     if table.blocks is not None:
         from rbfrag.exchange.table_answers import SHOWN, predict_table

@@ -25,8 +25,8 @@ EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out bloc
 class Heading:
     """What stands above a report."""
 
-    title: str | None = option("Title of the page. Default: Seismic fragility of a rock block.")
-    date: str = option("Date to print; nothing is printed without.", "")
+    title: str | None = option("Title of the page [default: Seismic fragility of a rock block]")
+    date: str = option("Date on the page [default: none]", "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,29 +34,29 @@ class Hazard:
     """How often a year the block is asked to fail."""
 
     hazard: list[str] | None = option(
-        "Hazard curve, as in  rbfrag hazard: the report has the return period of failure, too; "
-        "give it once for each branch of a logic tree.",
+        "Hazard curve as in rbfrag hazard, for the return period of failure; once for each "
+        "branch of a logic tree",
         metavar="CURVE",
     )
     weights: str | None = option(
-        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
-        "realizations."
+        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
+        "or the realizations file of OpenQuake"
     )
-    years: float = option("Period of the probability [years].", 50.0)
+    years: float = option("Exposure time of the probability [years]", 50.0)
 
 
 @stacked
 def report(
     *,
     blocks: str | None = argument(
-        "Table of blocks (.csv, .xlsx, .parquet, .geojson) in the place of one block: a summary, "
-        "and half a page for each. Options hold for the rows that do not state them.",
+        "Table of blocks (.csv, .xlsx, .parquet, .geojson) instead of a single block: a "
+        "summary and half a page for each block; options apply to rows without such a value",
         None,
         metavar="[BLOCKS]",
     ),
     sheet: str | None = option(options.SHEET, metavar="NAME"),
     ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME"),
-    out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
+    out: str = option("Output file: .pdf or .png (A4 page), or .html (single file)", ...),
     given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
     shaking: options.Shaking,
     request: Annotated[Given, fields_of(*REQUEST, without=("component",))],
@@ -65,13 +65,13 @@ def report(
     heading: Heading,
     json: options.Json = False,
 ) -> None:
-    """Write one document about blocks: PDF or HTML to attach.
+    """Write a report on blocks (PDF or HTML).
 
-    It takes what predict and hazard take. A page has the answer in a sentence, the block to scale,
-    a table of what was asked, the design chart and the fragility curve with the block on them, with
-    --hazard the return period of failure, the notes, and the versions of program, model and data.
-    Of a table the first page lists the blocks, those that are unstable without shaking first, and
-    the totals. The same question gives the same file.
+    The options are those of predict and hazard. A page has the answer, the block to scale, the
+    inputs, the design chart and the fragility curve with the block, with --hazard the return period
+    of failure, the notes, and the versions of program, model and data. For a table the first page
+    lists the blocks, those unstable at rest first, and the totals. The same inputs give the same
+    file.
     """
     from rbfrag.exchange.block_table import read_rows
     from rbfrag.plots.report.contents import COLUMNS, RateQuestion

@@ -25,15 +25,14 @@ EXAMPLE = "Example:  rbfrag respond record.AT2 --height 2.4 --width 0.5 --plot r
 class Model:
     """How a block slides or rocks, and by which model."""
 
-    two_way: bool = option("Sliding: the block may slide up the base too.", False)
+    two_way: bool = option("Two-way sliding: upslope displacement is possible", False)
     horizontal: bool = option(
-        "Sliding: leave out the factor cos(phi - beta)/cos(phi), as Newmark's horizontal "
-        "block does.",
+        "Sliding on a horizontal plane (Newmark), without the factor cos(phi - beta)/cos(phi)",
         False,
     )
     kind: str | None = option(
-        "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
-        "that of the block's failure mode; of a block that topples with --no-back, rocking."
+        "Kind of response: toppling, rocking, sliding, slumping or confined_toppling "
+        "[default: from the failure mode; rocking for a toppling block with --no-back]"
     )
 
 
@@ -42,13 +41,11 @@ class Directions(options.Direction):
     """How several motions act on the block."""
 
     vertical: list[str] | None = option(  # type: ignore[assignment]
-        "Vertical accelerogram of the same recording, upward positive; of several motions one for "
-        "each, in their order.",
+        "Vertical accelerogram of the same recording, positive upward; for several motions "
+        "one for each, in their order",
         metavar="MOTION",
     )
-    gap: float | None = option(
-        "Rest between two motions [s]. Default: as long as the block takes to come to rest."
-    )
+    gap: float | None = option("Time between two motions [s] [default: until the block is at rest]")
 
     def each(self, count: int) -> list[options.Direction]:
         """Return the direction of each of so many motions."""
@@ -56,7 +53,7 @@ class Directions(options.Direction):
         if len(texts) != count:
             raise InputError(
                 f"{count} motions and {len(texts)} times --vertical: give one for each motion, or "
-                "none at all"
+                "none"
             )
         return [options.Direction(vertical=text, reverse=self.reverse) for text in texts]
 
@@ -66,13 +63,12 @@ class BlockDrawOptions:
     """What the block may be, and how many of it are run."""
 
     draws: int | None = option(
-        "Run so many blocks that the one may be, by the standard deviations or --block-draws, and "
-        "print which share of them fails."
+        "Number of draws of an uncertain block, from its standard deviations or "
+        "--block-draws, for the fraction that fails"
     )
-    seed: int = option("With --draws: seed of the draws.", 1)
+    seed: int = option("Seed of --draws", 1)
     polarity: str = option(
-        "With --draws: forward, reverse, or both (every other draw the one way) where it is not "
-        "known how the motion points at the block.",
+        "Polarity for --draws: forward, reverse, or both (alternating draws)",
         "forward",
     )
     block_draws: options.BlockDraws = None
@@ -82,18 +78,16 @@ class BlockDrawOptions:
 class ResponseFiles:
     """What is written."""
 
-    csv: str | None = option("Write the motion of the block in time.")
+    csv: str | None = option("Response history (.csv)")
     plot: str | None = option(
-        "Draw the acceleration against the strength that is left, and the motion of the "
-        "block (.png, .pdf, .svg)."
+        "Figure of the acceleration with the available strength, and of the response history "
+        "(.png, .pdf, .svg)"
     )
     film: str | None = option(
-        "Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
-        "must be given by its shape."
+        "Animation of the block on its planes (.gif, .mp4 with ffmpeg, .html); requires the "
+        "block geometry"
     )
-    exaggerate: float = option(
-        "Factor on displacement and rotation in the film; 1 is true scale.", 1.0
-    )
+    exaggerate: float = option("Scale factor of displacement and rotation in --film", 1.0)
 
 
 @stacked
@@ -123,17 +117,17 @@ def respond(
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
-    """Run one block under one accelerogram.
+    """Compute the response of a block to an accelerogram.
 
-    Several are run one after another: a block that slides or slumps meets each motion where the
-    one before has left it; one that topples or rocks starts again from rest.
+    Several accelerograms act in sequence: a sliding or slumping block starts each motion from its
+    displaced position, a toppling or rocking block from rest at its initial position.
 
-    The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
-    ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
-    of a rectangle without --phi, that it topples.
+    The block is given by --p2 and --kr (toppling, or with --kind rocking free-standing on level
+    ground), --ky (sliding), or its geometry, which determines the failure mode; a rectangular block
+    without --phi is assumed to topple.
 
-    With --draws it is a block that is not known exactly: the answer is the share of the drawn
-    blocks that fail, with its counting error.
+    With --draws the block is uncertain: the result is the fraction of draws that fails, with its
+    sampling uncertainty.
     """
     from rbfrag.solver.history_file import write_history
     from rbfrag.solver.kinds import KINDS
@@ -144,7 +138,7 @@ def respond(
 
         possible, remarks = _possible(drawn, given, model.kind)
         if len(motions) > 1:
-            raise InputError("--draws runs blocks under one motion: leave the others out")
+            raise InputError("--draws supports a single motion: omit the others")
         one = direction.each(1)[0]
         ground, upward, about = find_shaking(motions[0], one, db=db, reading=reading)
         say_when_compiling()
@@ -166,7 +160,7 @@ def respond(
     if files.film is not None:
         if body is None:
             raise InputError(
-                "--film needs the shape of the block and its --phi, unless it stands free"
+                "--film requires the block geometry and --phi, except for free-standing blocks"
             )
         from rbfrag.plots.film import film_path
 
@@ -236,9 +230,9 @@ def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
     if free and what["beta_deg"] == 0.0 and math.isclose(body.alpha1_deg, -body.alpha3_deg):
         return {"p2": body.p2, "kr": body.tan_alpha3}
     raise InputError(
-        "--draws runs blocks that are given by numbers, --p2 and --kr or --ky (rbfrag block prints "
-        "those of a shape), rectangles and tables; scattered joint sets are run by  rbfrag "
-        "rockmass --motion"
+        "--draws supports blocks given by --p2 and --kr, by --ky, as rectangles or in tables; "
+        "see rbfrag block for p2 and kr of a geometry, rbfrag rockmass --motion for variable "
+        "joint sets"
     )
 
 

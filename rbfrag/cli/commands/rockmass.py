@@ -23,8 +23,8 @@ EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --
 class Drawn:
     """How many blocks are drawn."""
 
-    n: int | None = option("Number of realisations. Default: the file's, else 20000.")
-    seed: int | None = option("Seed of the random numbers. Default: the file's, else 1.")
+    n: int | None = option("Number of realisations [default: from the file, else 20000]")
+    seed: int | None = option("Seed of the random numbers [default: from the file, else 1]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,12 +32,12 @@ class ShakenBy(options.Direction):
     """The motion that every block is run under."""
 
     motion: str | None = option(
-        "Run every block under this accelerogram, each in its own mode: a file, "
-        "FILE#INDEX for one trace of several, or a database id.",
+        "Accelerogram for the response of every block in its mode: a file, FILE#INDEX for "
+        "one trace of several, or a database id",
         metavar="MOTION",
     )
     scales: str | None = option(
-        "Factors on the motion, such as 0.5,1,1.5,2. Default: 1.", metavar="LIST"
+        "Scale factors of the motion, such as 0.5,1,1.5,2 [default: 1]", metavar="LIST"
     )
     jobs: options.Jobs = None
 
@@ -47,12 +47,11 @@ class LimitOptions:
     """What counts as failure."""
 
     displacement: float | None = option(
-        "A slide fails beyond this displacement [m]. Default with --motion: 0.05. With "
-        "--pgv, blocks that do not topple freely are answered for where it is given."
+        "Displacement limit of sliding [m] [default with --motion: 0.05]; with --pgv "
+        "required for modes other than toppling"
     )
     rotation: float | None = option(
-        "A slump, or a topple against the back plane, fails beyond this rotation [deg]. "
-        "Default: failure past recovery only."
+        "Rotation limit of slumping and confined toppling [deg] [default: failure past recovery]"
     )
 
 
@@ -61,12 +60,13 @@ class RockMassFiles:
     """What is written."""
 
     out: str | None = option(
-        "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
+        "Output table with one row per block, with a motion one per block and scale (.csv, "
+        ".xlsx, .parquet)"
     )
     excel_text: bool = option(options.EXCEL_TEXT, False)
     plot: str | None = option(
-        "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
-        "shares that fail (.png, .pdf, .svg)."
+        "Figure of cumulative counts of blocks against PGA by mode, with a motion of the "
+        "fractions that fail (.png, .pdf, .svg)"
     )
 
 
@@ -74,7 +74,8 @@ class RockMassFiles:
 def rockmass(
     *,
     file: str = argument(
-        "Rock mass file (.toml or .csv): dips [deg], spacings [m], friction [deg].", metavar="FILE"
+        "Rock mass file (.toml or .csv): dips [deg], spacings [m], friction angles [deg]",
+        metavar="FILE",
     ),
     drawn: Drawn,
     shaken: ShakenBy,
@@ -85,11 +86,11 @@ def rockmass(
     files: RockMassFiles,
     printing: options.Printing,
 ) -> None:
-    """Draw blocks from two fracture sets; print their modes and yields.
+    """Sample blocks from two joint sets; print their modes and yields.
 
-    With --motion every block that the motion moves is run, and the shares that fail are counted by
-    mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
-    the blocks of each mode for which there is a fragility model.
+    With --motion the response of every block that exceeds its yield is computed, and the fractions
+    that fail are listed by mode. With an intensity measure (--pgv etc.) the probability of failure
+    is averaged over the blocks of each mode with a fragility model.
     """
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
     from rbfrag.vocabulary.quantities import SPECTRAL

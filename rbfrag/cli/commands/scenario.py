@@ -21,10 +21,10 @@ def scenario(
     source: Annotated[Given, fields_of(*SOURCE)],
     json: options.Json = False,
 ) -> None:
-    """Print the shaking of an earthquake at a site, and its scatter.
+    """Print median and dispersion of the shaking in an earthquake.
 
-    After Boore et al. (2014), for the median over all directions (RotD50); predict adds the scatter
-    of a single component, 0.16 in ln. tau is what all sites of an earthquake share.
+    Boore et al. (2014), for the median over all directions (RotD50); predict adds the dispersion of
+    a single component, 0.16 in ln. tau is the between-event standard deviation.
     """
     from rbfrag.question.scenario import Source, scenario_shaking
 

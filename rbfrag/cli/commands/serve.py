@@ -19,11 +19,11 @@ EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 class RequestLimits:
     """What a request may take."""
 
-    body_limit_mb: float = option("Longest body of a request [MB].", 16.0)
-    body_time: float = option("Longest time that a body may take to come [s].", 30.0)
-    row_limit: int = option("Most blocks or realisations of one request.", 100_000)
-    time_limit: float = option("Longest time that an answer may take [s].", 60.0)
-    jobs: int = option("Number of processes that do long work beside each that answers.", 2)
+    body_limit_mb: float = option("Maximum size of a request body [MB]", 16.0)
+    body_time: float = option("Maximum time to receive a request body [s]", 30.0)
+    row_limit: int = option("Maximum number of blocks or realisations per request", 100_000)
+    time_limit: float = option("Maximum time of an answer [s]", 60.0)
+    jobs: int = option("Number of processes for long computations per answering process", 2)
 
 
 @stacked
@@ -31,29 +31,30 @@ def serve(
     *,
     limits: RequestLimits,
     db: options.Db = None,
-    host: str = option("Address to listen at; any but loopback needs a token.", "127.0.0.1"),
-    port: int = option("Port to listen at; 0 for any that is free.", 8000),
-    workers: int = option("Number of processes that answer.", 1),
+    host: str = option("Listening address; a token is required except for loopback", "127.0.0.1"),
+    port: int = option("Listening port, 0 for any free port", 8000),
+    workers: int = option("Number of answering processes", 1),
     token_file: str | None = option(
-        "File with the bearer token that requests must bring. Default: RBFRAG_TOKEN.",
+        "File with the bearer token required in requests [default: RBFRAG_TOKEN]",
         metavar="FILE",
     ),
     allow_origin: list[str] | None = option(
-        "Web page elsewhere whose scripts may read answers, such as "
-        "https://maps.example.org; may be repeated.",
+        "Origin of another web page allowed to use the service (CORS), such as "
+        "https://maps.example.org; repeatable",
         metavar="ORIGIN",
     ),
     allow_host: list[str] | None = option(
-        "Name, beside localhost, that a service without a token may be asked by; may be repeated.",
+        "Host name accepted in addition to localhost by a service without a token; repeatable",
         metavar="NAME",
     ),
 ) -> None:
-    """Answer over HTTP, and serve the page.
+    """Start the HTTP API and the web interface.
 
-    The answers are those of the command line."""
+    The answers are those of the command line.
+    """
     for library in ("fastapi", "uvicorn", "httptools", "pebble", "prometheus_client"):
         if importlib.util.find_spec(library) is None:
-            raise MissingExtraError(f"The service needs {library}", "service")
+            raise MissingExtraError(f"The service requires {library}", "service")
     # The service is no part of the command line: it is a program of its own.
     os.environ["RBFRAG_SERVICE"] = json.dumps(
         {

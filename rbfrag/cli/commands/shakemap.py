@@ -26,14 +26,14 @@ class MapOptions:
     """What a ShakeMap means."""
 
     uncertainty: str | None = option(
-        "uncertainty.xml of the same map: the answer is integrated over it.", metavar="FILE"
+        "uncertainty.xml of the same map, over which P is integrated", metavar="FILE"
     )
     component: str = option(
-        "Horizontal component of the map's measures: larger (as ShakeMap), rotd100, rotd50, "
-        "geometric_mean or single.",
+        "Horizontal component of the intensity measures of the map: larger (as ShakeMap), "
+        "rotd100, rotd50, geometric_mean or single",
         "larger",
     )
-    allow_partial: bool = option("Read a grid that has not its declared size.", False)
+    allow_partial: bool = option("Accept a grid whose size differs from its declaration", False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,18 +41,18 @@ class DrawOptions:
     """How the number of failures is drawn."""
 
     draws: int | None = option(
-        "Number of draws of shaking and blocks. Default: 100, more where blocks are few."
+        "Number of draws of shaking and blocks [default: 100, more for few blocks]"
     )
-    seed: int = option("Seed of these draws.", 0)
+    seed: int = option("Seed of the draws", 0)
 
 
 @stacked
 def shakemap(
     *,
-    grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
+    grid: str = argument("ShakeMap grid, version 3 or 4", metavar="GRID.xml"),
     out: str = option(
-        "File to write: .geojson, .csv, .xlsx (extra excel), .parquet, .gpkg or, of nodes, .tif "
-        "(extra gis).",
+        "Output file: .geojson, .csv, .xlsx (extra excel), .parquet, .gpkg or, for nodes, "
+        ".tif (extra gis)",
         ...,
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
@@ -61,17 +61,17 @@ def shakemap(
     meaning: MapOptions,
     drawing: DrawOptions,
     answering: options.Answering,
-    n: int = option("Number of realisations of the rock mass.", 200),
-    plot: str | None = option("Draw the map (.png, .pdf, .svg)."),
+    n: int = option("Number of realisations of the rock mass", 200),
+    plot: str | None = option("Figure of the map (.png, .pdf, .svg)"),
     printing: options.Printing,
 ) -> None:
-    """Write the probability that blocks topple across a ShakeMap.
+    """Map the probability of failure of blocks over a ShakeMap.
 
-    One block, a table without lon and lat, or a rock mass stands at every node; a table with lon
-    and lat [deg] is answered block by block. The best model that the map's measures suffice for
-    answers: PGV and PGA, or, without PGV, PGA with spectral accelerations. Blocks are backed by a
-    slope; free-standing ones fail at weaker shaking: --kind rocking. How many of all fail together
-    is drawn.
+    A single block, a table without lon and lat, or a rock mass is evaluated at every node; a table
+    with lon and lat [deg] is evaluated block by block. The model is the best supported by the
+    intensity measures of the map: PGV and PGA, or PGA with spectral accelerations. Toppling blocks
+    are backed by a rock face; free-standing blocks overturn at weaker shaking: --kind rocking. The
+    total number of failures is sampled.
     """
     from rbfrag.exchange.block_rows import PLACE
     from rbfrag.exchange.map_answer import shakemap as answered
@@ -82,8 +82,8 @@ def shakemap(
     several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
     if target.suffix.lower() in RASTERS and "lon" in several.columns:
         raise InputError(
-            f"{target}: a GeoTIFF file takes the nodes of a grid, and these blocks have places of "
-            "their own: write .gpkg or .csv in its place"
+            f"{target}: GeoTIFF is supported for grid nodes only, not for blocks with "
+            "coordinates: use .gpkg or .csv"
         )
     with ProgressBar("shakemap", "draws") as bar:
         answer = answered(

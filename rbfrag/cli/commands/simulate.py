@@ -36,7 +36,7 @@ class WorkerOptions:
 
     jobs: options.Jobs = None
     scheduler: str | None = option(
-        "Dask scheduler whose workers take the place of local ones, tcp://host:8786.", metavar="URL"
+        "Dask scheduler whose workers replace local ones, such as tcp://host:8786", metavar="URL"
     )
 
     def runner(self, work: Callable[..., Any]) -> Callable[..., Iterator[Any]]:
@@ -64,21 +64,22 @@ class BlockOptions:
     """Which blocks are run, and what counts as their failure; each kind has its own."""
 
     p2: str | None = option(
-        "Toppling and rocking: frequency parameters p² [1/s²], separated by commas. Default: "
-        "30,10,3,1,0.3,0.1."
+        "Frequency parameters p² of toppling and rocking [1/s²], separated by commas "
+        "[default: 30,10,3,1,0.3,0.1]"
     )
     restitution_factor: str | None = option(
-        "Rocking: factors on the restitution 1 - 1.5 sin² α of the rectangle. Default: "
-        "1,0.95,0.9,0.8.",
+        "Factors on the coefficient of restitution 1 - 1.5 sin² α of a rocking rectangular "
+        "block [default: 1,0.95,0.9,0.8]",
         metavar="LIST",
     )
     rotation: str | None = option(
-        "Slumping: rotations that count as failure [deg], and the word recovery for "
-        "failure past recovery. Default: 2,recovery.",
+        "Rotation limits of slumping [deg]; recovery for failure past recovery [default: "
+        "2,recovery]",
         metavar="LIST",
     )
     displacement: str | None = option(
-        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
+        "Displacement limits of sliding on a level plane [m] [default: 0.01,0.05,0.15,0.3]",
+        metavar="LIST",
     )
 
 
@@ -87,18 +88,18 @@ class Sequence:
     """Two motions, one after the other."""
 
     sequence: bool = option(
-        "Sliding, slumping, confined_toppling: run blocks under two motions, one after the other, "
-        "and print the conditional fragility.",
+        "Conditional fragility under two consecutive motions (sliding, slumping, "
+        "confined_toppling)",
         False,
     )
-    seed: int = option("With --sequence: seed of the pairs that are drawn.", 1)
+    seed: int = option("Seed of the pairs of --sequence", 1)
     draws: int = option(
-        "With --sequence: how many first motions are drawn for each that is no later shock of a "
-        "station.",
+        "Number of first motions of --sequence drawn for each motion that is not a later "
+        "shock of its station",
         1,
     )
     out: str | None = option(
-        "With --sequence: write the conditional fragility (.csv, .parquet).", metavar="FILE"
+        "Output table of the conditional fragility of --sequence (.csv, .parquet)", metavar="FILE"
     )
 
 
@@ -107,23 +108,23 @@ class StorageOptions:
     """What is stored of each motion."""
 
     vertical: str = option(
-        "Horizontal motions alone, with the vertical one of their recording, or both.",
+        "Horizontal motions alone, with the vertical motion of the recording, or both",
         "without",
         metavar="without|with|both",
     )
     full_map: bool = option(
-        "Toppling: store the intervals of strength that fail and that do not, too.",
+        "Store also the toppling and stable intervals of k_r/PGA",
         False,
         word="--map",
     )
     grid: str | None = option(
-        "Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
-        "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
+        "Additional toppling blocks for the outcome grid: N blocks with k_r/PGA from 0.99 to "
+        "0.01 in equal ratios, or a list of k_r/PGA",
         metavar="N|LIST",
     )
     store_responses: str | None = option(
-        "Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
-        "values, or the word critical for the critical block of each combination.",
+        "Toppling blocks with stored response histories (about 300 kB each): values of "
+        "k_r/PGA, or critical for the critical block of each combination",
         metavar="LIST",
     )
 
@@ -135,7 +136,7 @@ def simulate(
     suite: options.Suite = None,
     include_structures: bool = option(options.INCLUDE_STRUCTURES, False),
     kind: str = option(
-        "What the blocks do: toppling, rocking, slumping, confined_toppling or sliding.", "toppling"
+        "Kind of failure: toppling, rocking, slumping, confined_toppling or sliding", "toppling"
     ),
     blocks: BlockOptions,
     stored: StorageOptions,
@@ -143,24 +144,22 @@ def simulate(
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
-    """Store critical values and outcomes of every motion and block.
+    """Compute and store critical values and outcomes of all motions.
 
-    A combination is a motion, without or with its vertical one, in one polarity, and a block. Of
-    toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
-    slumping or confined_toppling, the outcomes of a documented family of blocks under scaled
-    records, each followed to its end; with --kind sliding, the strengths that slide stated
-    displacements; with --kind rocking, the outcomes of a grid of free-standing blocks, which have
-    no critical one, in one polarity.
+    A combination is a motion, without or with its vertical motion, in one polarity, and a block.
+    Toppling: the critical strength at each p2 and the outcomes of a grid of blocks. Slumping and
+    confined_toppling: the outcomes of a documented family of blocks under scaled records, each
+    simulated to its end. Sliding: the critical strengths of the displacement limits. Rocking: the
+    outcomes of a grid of free-standing blocks in one polarity, without critical strengths.
 
-    With --sequence, sliding and slumping blocks under two motions, the second of which finds them
-    where the first has left them: two shocks of one station where the metadata state them, and each
-    other motion after one of another earthquake that a seed draws. Printed is the share that fails
-    in the second of those that survived the first, by the state it left and by the PGA of the
-    second over the block's yield acceleration, beside the share of the same blocks in their first
-    place.
+    With --sequence, sliding and slumping blocks are subjected to two consecutive motions: two
+    shocks of one station if the metadata give them, and randomly chosen motions of two earthquakes.
+    The result is the fraction that fails in the second motion of the blocks that survived the
+    first, by their displaced state and by PGA of the second motion over the yield acceleration,
+    compared with the same blocks in their initial position.
 
-    After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
-    not computed again, and what a stored combination lacks is added.
+    After an interruption the same command resumes; stored results are not computed again, and
+    missing parts of a stored combination are added.
     """
     from rbfrag.campaign.interrupt import stopped_by_interrupts
     from rbfrag.campaign.simulate import simulate as run

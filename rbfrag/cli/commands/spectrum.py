@@ -24,18 +24,18 @@ def spectrum(
     *,
     motions: options.Motions,
     reading: options.ReadingOptions,
-    p2: str = option("Frequency parameters p² [1/s²], separated by commas.", "30,10,3,1,0.3,0.1"),
+    p2: str = option("Frequency parameters p² [1/s²], separated by commas", "30,10,3,1,0.3,0.1"),
     polarity: options.Polarity = "forward",
-    csv: str | None = option("Write the values (.csv, .xlsx or .parquet)."),
+    csv: str | None = option("Output table of the spectra (.csv, .xlsx, .parquet)"),
     excel_text: bool = option(options.EXCEL_TEXT, False),
-    plot: str | None = option("Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."),
+    plot: str | None = option("Figure of the spectra over p² with PGV (.png, .pdf, .svg)"),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Compute the toppling spectrum X(p): what a motion can topple.
+    """Compute the toppling spectrum X(p) of accelerograms.
 
-    X(p) is in m/s. No block with a toppling velocity k_r g/p more than 2 % above X(p) topples.
-    With --json, one motion in one polarity is an object, several are a list of such objects.
+    X(p) is in m/s. No block with a toppling velocity k_r g/p more than 2 % above X(p) topples. With
+    --json, one motion in one polarity is an object, several are a list of such objects.
     """
     from rbfrag.motions.toppling_spectrum import TopplingSpectrum
 

@@ -21,20 +21,18 @@ EXAMPLE = (
 class Uncertainty:
     """How well the blocks and their age are known."""
 
-    age: float = option(
-        "How long the blocks have stood in this position [years], the mean.", default=...
-    )
-    age_sd: float = option("Standard deviation of the age [years]; the age is lognormal.", 0.0)
-    draws: int = option("Number of draws where several uncertain blocks are given.", 128)
-    seed: int = option("Seed of these draws.", 0)
+    age: float = option("Mean age of the blocks in their present position [years]", default=...)
+    age_sd: float = option("Standard deviation of the lognormal age [years]", 0.0)
+    draws: int = option("Number of draws for several uncertain blocks", 128)
+    seed: int = option("Seed of the draws", 0)
 
 
 @stacked
 def survival(
     *,
     curves: list[str] = argument(
-        "Hazard curves of one site and one measure: OpenQuake CSV (mean, quantiles, branches), "
-        "USGS NSHM JSON, or CSV of two columns whose header names their units.",
+        "Hazard curves of one site and intensity measure: OpenQuake CSV (mean, quantiles, "
+        "branches), USGS NSHM JSON, or CSV of two columns with units in the header",
         metavar="CURVE...",
     ),
     given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
@@ -43,20 +41,21 @@ def survival(
     meaning: options.Curve,
     answering: options.Answering,
     weights: str | None = option(
-        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
-        "realizations."
+        "Weights of the logic-tree branches in the order of the curves, such as 0.5,0.3,0.2, "
+        "or the realizations file of OpenQuake"
     ),
     plot: str | None = option(
-        "Draw the curves, survival over the factor on their rates, and weights (.png, .pdf, .svg)."
+        "Figure of the curves, survival probability over the factor on their rates, and "
+        "weights (.png, .pdf, .svg)"
     ),
     printing: options.Printing,
 ) -> None:
-    """Print how likely standing blocks are under a seismic hazard.
+    """Print the survival probability of standing blocks.
 
-    --kind is required: rocking for free-standing blocks, toppling for those backed by rock. Several
-    blocks of --blocks stand at one site. The factors are those on all rates of the hazard
-    at which the blocks stand with 5 % and 50 %. With --weights the branches of a logic tree are
-    weighted again by what the standing blocks say of each.
+    --kind is required: rocking for free-standing blocks, toppling for blocks backed by a rock face.
+    The blocks of --blocks stand at one site. The factors on all rates of the hazard are those at
+    which the survival probability is 5 % and 50 %. With --weights the weights of logic-tree
+    branches are updated with the survival of the blocks.
     """
     import numpy as np
 

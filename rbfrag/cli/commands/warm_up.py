@@ -11,11 +11,11 @@ EXAMPLE = "Example:  rbfrag warm-up"
 
 
 def warm_up() -> None:
-    """Compile every kernel now, so that no later command waits.
+    """Compile all kernels, so that later commands start faster.
 
-    The machine code is kept beside the package where that can be written, else in the user's
-    cache folder. Run it once at install time, by a user who may write there; what is compiled
-    already is not compiled again.
+    The machine code is stored next to the package if that folder is writable, else in the cache
+    folder of the user. Run it once after installation as a user with write access; compiled kernels
+    are not compiled again.
     """
     from rbfrag.cli.warm_up import warm_up as prepared
 

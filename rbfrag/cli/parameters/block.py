@@ -25,16 +25,16 @@ class MeshOptions:
     """A free-standing block by its surface."""
 
     mesh: str | None = option(
-        "Closed mesh [m] of a free-standing block in its measured resting pose on level ground "
-        "(.obj, .ply, .stl).",
+        "Closed mesh of a free-standing block [m] in its measured resting pose on level "
+        "ground (.obj, .ply, .stl)",
         metavar="FILE",
     )
-    up: str = option("Axis of the mesh that points up: x, y or z.", "z")
+    up: str = option("Vertical axis of the mesh, positive upward: x, y or z", "z")
     contact_mm: float = option(
-        "Height above the lowest vertex up to which vertices touch the ground [mm].", 10.0
+        "Maximum height of contact vertices above the lowest vertex [mm]", 10.0
     )
     out: str | None = option(
-        "Write the table of a mesh's blocks, one row for each azimuth (.csv, .xlsx, .parquet).",
+        "Output table of the blocks of a mesh, one row per azimuth (.csv, .xlsx, .parquet)",
         metavar="FILE",
     )
     excel_text: bool = option(EXCEL_TEXT, False)
@@ -46,8 +46,8 @@ class TableOptions:
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
-        "height_m and width_m [m] (and dip_deg, phi_deg), or the numbers of another kind; one "
-        "answer a row.",
+        "height_m and width_m [m] (and dip_deg, phi_deg), or the parameters of another kind; "
+        "one answer per row",
         metavar="FILE",
     )
     sheet: str | None = option(SHEET, metavar="NAME")
@@ -99,7 +99,7 @@ class BlocksOptions(TableOptions):
     """A table of blocks or a rock mass in the place of one block."""
 
     rockmass: str | None = option(
-        "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
+        "Rock mass file (.toml, .csv), for the mean over its stable toppling blocks", metavar="FILE"
     )
 
     def given_blocks(
@@ -132,8 +132,8 @@ class BlocksOptions(TableOptions):
 
         if given.get("kind") not in (None, TOPPLING_BLOCK.kind):
             raise InputError(
-                f"--rockmass does not go with --kind {given['kind']}: its blocks are backed by the "
-                "rock behind them, and those that topple are answered for"
+                f"--rockmass cannot be combined with --kind {given['kind']}: only toppling blocks "
+                "of a rock mass are supported"
             )
         return _of_rock_mass(self.rockmass, n)
 
@@ -202,7 +202,7 @@ def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
     blocks = read_rock_mass(path).realise(n, None)
     p2s, krs, share = stable_topples(blocks)
     if krs.size == 0:
-        raise InputError(f"{path}: no block of it topples: there is no model for them")
+        raise InputError(f"{path}: no stable toppling blocks: only these are supported")
     remark = (
         f"the answer is the mean over {krs.size} stable toppling blocks, "
         f"{percent(share)} of the rock mass; the others have no part in it"
@@ -262,11 +262,13 @@ def charted_blocks(
     known = (alpha1 > -90.0) & (alpha1 < alpha3) & (alpha3 < 90.0)
     if not known.any():
         raise InputError(
-            f"{blocks or rockmass}: there is no block to show: alpha1_deg and alpha3_deg lie "
-            "between -90 and 90 degrees, and the first is below the second"
+            f"{blocks or rockmass}: no valid block: alpha1_deg and alpha3_deg must be between -90 "
+            "and 90 degrees, and alpha1_deg below alpha3_deg"
         )
     if not known.all():
-        warnings.append(f"{(~known).sum()} of {known.size} rows are no block and not shown")
+        warnings.append(
+            f"{(~known).sum()} of {known.size} rows have invalid angles and are not shown"
+        )
     return ChartedBlocks(alpha1[known], alpha3[known], warnings)
 
 

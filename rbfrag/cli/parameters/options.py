@@ -29,14 +29,11 @@ if TYPE_CHECKING:
 
     from rbfrag.motions.polarity import Polarity as PolarityName
 
-SHEET = "Sheet of a workbook that holds the table. Default: the first."
+SHEET = "Sheet of the workbook with the table [default: first]"
 
-IGNORE_COLUMNS = (
-    "Columns of the table to ignore, separated by commas: those that are not understood and "
-    "would be rejected."
-)
+IGNORE_COLUMNS = "Unknown columns of the table to ignore, separated by commas; others are rejected"
 
-CRS = "Coordinate reference system of x and y of rows that name none, such as EPSG:2056."
+CRS = "Coordinate reference system of x and y of rows without one, such as EPSG:2056"
 
 
 def column_names(text: str | None) -> tuple[str, ...]:
@@ -45,12 +42,12 @@ def column_names(text: str | None) -> tuple[str, ...]:
 
 
 EXCEL_TEXT = (
-    "In CSV: write texts that begin with = + - or @ with an apostrophe, so that Excel does not "
-    "compute them; rbfrag takes it off when it reads the table."
+    "In CSV output, prefix texts that begin with = + - or @ with an apostrophe, against "
+    "formulas in Excel; rbfrag removes it from input tables"
 )
 
 Json = Annotated[
-    bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")
+    bool, typer.Option("--json", help="Print one JSON document on standard output and nothing else")
 ]
 
 Db = Annotated[
@@ -62,7 +59,7 @@ Motion = Annotated[
     typer.Argument(
         metavar="MOTION",
         autocompletion=motion_ids,
-        help="Accelerogram: a file, FILE#INDEX for one trace of several, or a database id.",
+        help="Accelerogram: a file, FILE#INDEX for one trace of several, or a database id",
     ),
 ]
 
@@ -71,14 +68,15 @@ Motions = Annotated[
     typer.Argument(
         metavar="MOTION...",
         autocompletion=motion_ids,
-        help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
+        help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids",
     ),
 ]
 
 Polarity = Annotated[
     str,
     typer.Option(
-        "--polarity", help="forward: positive samples drive forward; reverse: negative ones; both."
+        "--polarity",
+        help="Polarity: forward (positive samples drive forward rotation), reverse or both",
     ),
 ]
 
@@ -86,12 +84,16 @@ AllowPartial = Annotated[
     bool,
     typer.Option(
         "--allow-partial",
-        help="Read a file whose header states another number of samples than follow, and flag it.",
+        help="Accept and flag a file whose number of samples differs from its header",
     ),
 ]
 
-INCLUDE_STRUCTURES = "Use records of sensors on structures (flag structure), excluded by default."
-Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
+INCLUDE_STRUCTURES = (
+    "Include records of sensors on structures (flag structure), which are excluded by default"
+)
+Suite = Annotated[
+    str | None, typer.Option("--suite", help="Suite of motions [default: all motions]")
+]
 
 Block = Annotated[Given, fields_of(*NUMBERS, *FAILURE, *SHAPE, *PLANES, *WHOLE)]
 """One block of which all is known that is stated, by field."""
@@ -113,16 +115,14 @@ BlockDraws = Annotated[
     typer.Option(
         "--block-draws",
         metavar="FILE",
-        help="Table of what the one block may be (.csv, .xlsx, .parquet), a row each, with the "
-        "columns of a block table and weight if they weigh differently.",
+        help="Table of draws of one uncertain block (.csv, .xlsx, .parquet), one per row, with "
+        "the columns of a block table and weight for unequal weights",
     ),
 ]
 
 Jobs = Annotated[
     int | None,
-    typer.Option(
-        "--jobs", help="Worker processes. Default: one per processor, where there is work for them."
-    ),
+    typer.Option("--jobs", help="Number of worker processes [default: one per processor]"),
 ]
 
 
@@ -130,7 +130,7 @@ Jobs = Annotated[
 class Printing:
     """How an answer is printed: a sentence and a short table unless more is asked for."""
 
-    verbose: bool = option("Print every value, with six digits.", False)
+    verbose: bool = option("Print all values, with six digits", False)
     json: Json = False
 
 
@@ -139,11 +139,11 @@ class ReadingOptions:
     """What the file of an accelerogram leaves open."""
 
     units: str | None = option(
-        "Unit of acceleration of a text file that does not state it: g, m/s2, cm/s2 or mm/s2."
+        "Acceleration unit of a text file without one: g, m/s2, cm/s2 or mm/s2"
     )
-    dt: float | None = option("Sampling interval [s] of a text file that holds accelerations only.")
+    dt: float | None = option("Sampling interval of a text file with accelerations only [s]")
     gain: float | None = option(
-        "Gain [counts/(m/s2)] of a miniSEED file: the sensitivity in its station's StationXML."
+        "Gain of a miniSEED file, the sensitivity in the StationXML of its station [counts/(m/s2)]"
     )
 
 
@@ -152,9 +152,11 @@ class Direction:
     """How a motion acts on the block."""
 
     vertical: str | None = option(
-        "Vertical accelerogram of the same recording, upward positive.", metavar="MOTION"
+        "Vertical accelerogram of the same recording, positive upward", metavar="MOTION"
     )
-    reverse: bool = option("Positive samples drive backward: k_h(t) = -a(t).", False)
+    reverse: bool = option(
+        "Reverse polarity: positive samples drive backward, k_h(t) = -a(t)", False
+    )
 
     @property
     def polarity(self) -> Literal["forward", "reverse"]:
@@ -166,7 +168,7 @@ WITHIN_KM = 5.0
 """Default of the distance of blocks to sites [km], as `rbfrag.exchange.site_join` has it."""
 
 WITHIN_HELP = (
-    "Farthest distance from a block to the nearest site, where lon and lat join them [km]."
+    "Maximum distance from a block to the nearest site, for sites joined by lon and lat [km]"
 )
 
 
@@ -174,23 +176,22 @@ WITHIN_HELP = (
 class Curve:
     """What a hazard curve means."""
 
-    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
-    site: str | None = option("Site of the file: its number from 1 on, or its name.")
+    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'")
+    site: str | None = option("Site in the file, by number (from 1) or name")
     convert: str | None = option(
-        "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
-        "(SA(1)) or bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."
+        "Published conversion of a spectral acceleration to PGV, with its dispersion: "
+        "newmark_hall_1982 (SA(1)) or bommer_alarcon_2006 (SA(0.5))"
     )
     convert_sigma: float | None = option(
-        "Standard deviation of ln PGV about the conversion. Default: that of the reference's "
-        "motions."
+        "Standard deviation of ln PGV about the conversion [default: that of the built-in data set]"
     )
     component: str | None = option(
-        "Horizontal component of the shaking: single, geometric_mean, rotd50, rotd100 or larger "
-        "[default: that of the curve file, else single]."
+        "Horizontal component of the intensity measure: single, geometric_mean, rotd50, "
+        "rotd100 or larger [default: that of the curve file, else single]"
     )
     disaggregation: str | None = option(
-        "OpenQuake's disaggregation of a curve of PGA by magnitude (Mag-*.csv or Mag_Dist-*.csv): "
-        "PGV is taken from both.",
+        "OpenQuake disaggregation of a PGA curve by magnitude (Mag-*.csv or Mag_Dist-*.csv), "
+        "for the conversion to PGV",
         metavar="FILE",
     )
 
@@ -203,7 +204,7 @@ def number_list(text: str, option: str) -> list[float]:
             values.append(float(part))
         except ValueError:
             raise InputError(
-                f"{option}: {part.strip()!r} is no number: write a list such as 30,10,3,1"
+                f"{option}: {part.strip()!r} is not a number: give a list such as 30,10,3,1"
             ) from None
     return values
 
@@ -216,5 +217,5 @@ def polarities(text: str) -> Sequence[PolarityName]:
         return POLARITIES
     chosen = [each for each in POLARITIES if each == text]
     if not chosen:
-        raise InputError(f"--polarity is {text!r}: write forward, reverse or both")
+        raise InputError(f"--polarity {text!r}: use forward, reverse or both")
     return chosen

@@ -22,7 +22,7 @@ FRICTION = tuple(each for each in PLANES if each not in ("--beta", "--dip"))
 SIGMAS = _options(quantities.SCATTER)
 MEASURES = _options(quantities.SHAKING)
 
-ONCE = "a block is described once"
+ONCE = "give one description of the block"
 
 
 class OptionConflict(NamedTuple):
@@ -30,7 +30,7 @@ class OptionConflict(NamedTuple):
 
     Args:
         options: those that are refused.
-        others: those that they do not go with.
+        others: those that they cannot be combined with.
         why: what to do instead, or why not.
         commands: where this holds; () for all that have both.
     """
@@ -68,64 +68,84 @@ CONFLICTS = (
     OptionConflict((*FILES, "--rockmass"), NUMBERS, ONCE),
     OptionConflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
     OptionConflict(
-        tuple(each for each in SHAPE if each != "--gamma"), FILES, "the file has the shape"
+        tuple(each for each in SHAPE if each != "--gamma"), FILES, "the geometry is in the file"
     ),
     OptionConflict(("--polygon",), ("--block",), ONCE),
     OptionConflict(TABLES, (*SHAPE, *FILES), ONCE),
     OptionConflict(("--mesh",), (*SHAPE, *FILES), ONCE),
     OptionConflict(
-        ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
+        ("--block-draws",),
+        (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS),
+        "the table describes the block",
     ),
     OptionConflict(
         ("--template",),
         (*SHAPE, *FILES, *PLANES, "--cohesion", "--density", "--kv", "--mesh", "--plot"),
         "it is an empty table",
     ),
-    OptionConflict(("--block-draws",), ("--blocks",), "one question is about one block"),
-    OptionConflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
-    OptionConflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
+    OptionConflict(("--block-draws",), ("--blocks",), "--block-draws is for a single block"),
+    OptionConflict(("--block-draws",), ("--ky", "--restitution"), "the table describes the block"),
+    OptionConflict(
+        ("--draws",),
+        ("--csv", "--plot", "--film"),
+        "these outputs are for a single response",
+        ("respond",),
+    ),
     OptionConflict(
         ("--vertical", "--map"),
         ("--sequence",),
-        "two motions are two horizontal ones, and no map is made of them",
+        "sequences have horizontal motions only and no map",
         ("simulate",),
     ),
-    OptionConflict(("--polarity",), ("--reverse",), "one of them is enough"),
+    OptionConflict(("--polarity",), ("--reverse",), "give one of them"),
     OptionConflict(
         (*PLANES, "--cohesion", "--kv"),
         ("--mesh",),
-        "a mesh stands free on level ground, in the pose that it was measured in",
+        "a mesh is free-standing on level ground",
     ),
-    OptionConflict(("--rockmass",), ("--blocks",), "one of them is enough"),
+    OptionConflict(("--rockmass",), ("--blocks",), "give one of them"),
     OptionConflict(
-        PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")
-    ),
-    OptionConflict(
-        (*FRICTION, "--motion"), ("--blocks",), "the table has the blocks", ("predict",)
+        PLANES, TABLES, "the planes are in the file", ("hazard", "shakemap", "nrml", "pelicun")
     ),
     OptionConflict(
-        ("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"
+        (*FRICTION, "--motion"), ("--blocks",), "the table describes the blocks", ("predict",)
+    ),
+    OptionConflict(
+        ("--samples", "--seed", "--plot"), ("--expected",), "curves and samples require draws"
     ),
     OptionConflict(
         ("--motion",),
         MEASURES,
-        "give the accelerogram, or the measures that a fragility model answers for",
+        "give the accelerogram or the intensity measures",
     ),
 )
 
-_NAME_IT = "name the accelerogram, too"
+_NAME_IT = "give also the accelerogram"
 _MEASURE = "give --pgv, --pga or --sa10, or --pgd and --tm, too"
 
 NEEDS = (
     Need(
-        ("--ses",), ("--investigation-time",), "--investigation-time", "both say how long it took"
+        ("--ses",),
+        ("--investigation-time",),
+        "--investigation-time",
+        "together they give the duration of the event set",
     ),
-    Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
-    Need(("--out",), ("--blocks",), "--blocks", "--blocks FILE names the table", ("predict",)),
-    Need(("--sheet",), ("--blocks",), "--blocks", "it is a sheet of that workbook"),
-    Need(("--ignore-columns", "--crs"), ("--blocks",), "--blocks", "it is about that table"),
-    Need(("--excel-text",), ("--out",), "--out", "--out FILE names the table that it is about"),
-    Need(("--excel-text",), ("--csv",), "--csv", "--csv FILE names the table that it is about"),
+    Need(
+        ("--investigation-time",),
+        ("--ses",),
+        "--ses",
+        "together they give the duration of the event set",
+    ),
+    Need(("--out",), ("--blocks",), "--blocks", "give also the table of blocks", ("predict",)),
+    Need(("--sheet",), ("--blocks",), "--blocks", "it is a sheet of the workbook"),
+    Need(
+        ("--ignore-columns", "--crs"),
+        ("--blocks",),
+        "--blocks",
+        "it applies to the table of blocks",
+    ),
+    Need(("--excel-text",), ("--out",), "--out", "it applies to that table"),
+    Need(("--excel-text",), ("--csv",), "--csv", "it applies to that table"),
     Need(
         ("--vertical", "--reverse", "--scales", "--jobs", "--units", "--dt", "--polarity"),
         ("--motion",),
@@ -157,14 +177,14 @@ NEEDS = (
         ),
         ("--hazard",),
         "--hazard",
-        "name the hazard curve, too",
+        "give also the hazard curve",
         ("report",),
     ),
-    Need(("--model",), MEASURES, "a measure of the motion", _MEASURE, ("rockmass",)),
+    Need(("--model",), MEASURES, "an intensity measure", _MEASURE, ("rockmass",)),
     Need(
         ("--db",),
         ("--motion", *MEASURES),
-        "a motion or a measure of it",
+        "a motion or an intensity measure",
         f"give --motion, or {_MEASURE.removeprefix('give ')}",
         ("rockmass",),
     ),
@@ -172,23 +192,25 @@ NEEDS = (
         (*SIGMAS, "--block-draws", "--polarity", "--seed", "--displacement"),
         ("--draws",),
         "--draws",
-        "it is about what the block may be, of which so many are run",
+        "it applies to the draws of an uncertain block",
         ("respond",),
     ),
     Need(
         ("--seed", "--draws", "--out"),
         ("--sequence",),
         "--sequence",
-        "it is about pairs of motions",
+        "it applies to pairs of motions",
         ("simulate",),
     ),
-    Need(("--exaggerate",), ("--film",), "--film", "it is a factor on what the film shows"),
-    Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
+    Need(("--exaggerate",), ("--film",), "--film", "it scales the animation"),
+    Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it applies to a mesh"),
     Need(
-        ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)
+        ("--out",), ("--mesh",), "--mesh", "the table is that of the azimuths of a mesh", ("block",)
     ),
-    Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
-    Need(("--shares",), ("--rockmass",), "--rockmass", "they are shares of its blocks"),
+    Need(
+        ("--n",), ("--rockmass",), "--rockmass", "it is the number of realisations of the rock mass"
+    ),
+    Need(("--shares",), ("--rockmass",), "--rockmass", "it gives fractions of its blocks"),
 )
 
 
@@ -201,19 +223,19 @@ def refuse(command: str, given: Collection[str], known: Collection[str]) -> None
         known: all that the command has; what it cannot be given, nothing needs.
 
     Raises:
-        InputError: the first option that does not go with the others; the message names both.
+        InputError: the first option that cannot be combined with the others, with both names.
     """
     for rule in CONFLICTS:
         if not rule.commands or command in rule.commands:
             one = _first(rule.options, given)
             other = _first(rule.others, given)
             if one and other:
-                raise InputError(f"{one} does not go with {other}: {rule.why}")
+                raise InputError(f"{one} cannot be combined with {other}: {rule.why}")
     for need in NEEDS:
         if (not need.commands or command in need.commands) and _first(need.others, known):
             one = _first(need.options, given)
             if one and not _first(need.others, given):
-                raise InputError(f"{one} goes with {need.goes_with}: {need.why}")
+                raise InputError(f"{one} requires {need.goes_with}: {need.why}")
 
 
 def _first(options: Collection[str], among: Collection[str]) -> str | None:

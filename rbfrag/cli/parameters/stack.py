@@ -1,10 +1,11 @@
-"""Options that travel together as one object: declared once, handed to a command whole."""
+"""Objects of several options, declared once and shared by commands, and the help of commands."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import MISSING, Field, field, fields, is_dataclass
 from functools import partial, update_wrapper
 from typing import Annotated, Any, NamedTuple, get_type_hints
@@ -33,16 +34,16 @@ def option(
     """Declare an option: a field of a dataclass, or a parameter of a command.
 
     Args:
-        help: what it is, with its unit.
-        default: its value where it is not given; ``...`` for an option that must be given.
-        word: what it is called, or all that it is called; None for the name of the field.
-        about: what else typer takes, such as metavar.
+        help: noun phrase with its unit in brackets.
+        default: its value where it is not given; ``...`` for a required option.
+        word: its name, or all its names; None for the name of the field.
+        about: further arguments of typer, such as metavar.
     """
     return _declared(typer.Option, help, default, about | {"word": word})
 
 
 def argument(help: str, default: Any = ..., **about: Any) -> Any:
-    """Declare an argument, likewise; it must be given unless it has a default."""
+    """Declare an argument, which is required unless it has a default."""
     return _declared(typer.Argument, help, default, about)
 
 
@@ -120,13 +121,13 @@ class FieldOptions(NamedTuple):
                 continue
             further = {"rich_help_panel": panel, **FURTHER.get(name, {})}
             kind = bool if type_ is bool else str | None if type_ is str else float | None
-            # the word that people say has the help
+            # the usual name has the help
             *others, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
             help = about.help(option_of)
             own = option(help, False if type_ is bool else None, **further)
             yield _parameter(first, kind, own)
             for word in others:
-                other = option(f"Another word for --{first}.", rich_help_panel="Planes and joints")
+                other = option(f"Same as --{first}", rich_help_panel=panel)
                 yield _parameter(word, kind, other)
 
     def read(self, words: Mapping[str, Any]) -> Given:
@@ -148,9 +149,8 @@ class FieldOptions(NamedTuple):
 
 
 FILES = {
-    "block": "Block file (.toml or .csv); what it states about the planes may be given anew by "
-    "options.",
-    "polygon": "File with the outline of a block (.csv or .toml), read as --block is.",
+    "block": "Block file (.toml or .csv); options about planes and joints replace its values",
+    "polygon": "Outline of a block (.csv or .toml), in the formats of --block",
 }
 """Options that name the file of a block, with their help."""
 
@@ -158,7 +158,27 @@ FURTHER: dict[str, dict[str, Any]] = {
     "model": {"autocompletion": model_names},
     "db": {"metavar": "URL"},
 }
-"""What typer is told of fields beside their help."""
+"""Further arguments of typer for options of fields."""
+
+OUTPUT = (
+    "--out", "--csv", "--plot", "--film", "--exaggerate", "--release", "--template", "--format",
+    "--excel-text", "--verbose", "--json",
+)  # fmt: skip
+"""Options under the heading Output."""
+
+MOST_USED = (
+    "--height", "--width", "--dip", "--phi", "--kind", "--pgv", "--help", "--help-all",
+    "--blocks", "--out", "--json", "--plot", "--age", "--hazard", "--imt", "--component",
+    "--p2", "--kr", "--ky", "--displacement", "--motion", "--rockmass", "--gmf-data",
+    "--weights", "--years", "--joint", "--magnitude", "--rjb", "--vs30", "--pga", "--sa10",
+    "--sites", "--block", "--db", "--level", "--draws", "--vertical", "--rotation",
+    "--age-sd", "--over", "--kr-sigma", "--model", "--units", "--verbose", "--phi-back",
+    "--water", "--polygon", "--restitution", "--s1", "--s2", "--gamma",
+)  # fmt: skip
+"""Options by use, the most used first; those of a command that come first are in its --help."""
+
+LONGEST_HELP = 25
+"""Options that --help shows; --help-all shows the rest."""
 
 
 def fields_of(*names: str, without: tuple[str, ...] = ()) -> FieldOptions:
@@ -250,7 +270,7 @@ def _word(option: inspect.Parameter) -> str | None:
 
 
 _NEEDS: dict[type, str] = {
-    float: "give a number, with a point before its decimals",
+    float: "give a number with a decimal point",
     int: "give a whole number",
 }
 """What to give for an option of a type where its text is none."""
@@ -263,9 +283,14 @@ def read_plainly(command: Any) -> None:
     most answers.
     """
     usual = command.get_params
+    help_all: list[Any] = []  # made once, as a parser takes its options more than once
 
     def params(context: Any) -> list[Any]:
         every: list[Any] = usual(context)  # with --help, which the command itself does not list
+        if len(every) > LONGEST_HELP:
+            if not help_all:
+                help_all.append(_help_all_option(every[-1]))
+            every = [*every, *help_all]
         for each in every:
             each.process_value = partial(_read, each, type(each).process_value)
         return every
@@ -276,13 +301,56 @@ def read_plainly(command: Any) -> None:
         read_plainly(each)
 
 
+ALL_OPTIONS = "rbfrag.all_options"
+"""Key of the metadata of a context whose help shows all options."""
+
+
+def _help_all_option(help: Any) -> Any:
+    """Return the option --help-all of a command from its option --help."""
+    option = copy(help)
+    option.name, option.opts = "help_all", ["--help-all"]
+    option.help = "Show all options and exit."
+
+    def show(context: Any, parameter: Any, value: bool) -> None:
+        context.meta[ALL_OPTIONS] = True
+        help.callback(context, parameter, value)
+
+    option.callback = show
+    return option
+
+
+def _panel(option: Any) -> str:
+    """Return the heading of an option or argument in the help."""
+    if option.param_type_name == "argument":
+        return "Arguments"
+    if panel := getattr(option, "rich_help_panel", None):
+        return str(panel)
+    return "Output" if option.opts[0] in OUTPUT else "Options"
+
+
+def _shown(options: list[Any], context: Any) -> list[Any]:
+    """Return the options that the help shows: all, or the arguments and the most used options."""
+    rank = {name: position for position, name in enumerate(MOST_USED)}
+
+    def position(option: Any) -> tuple[bool, int]:
+        return not option.required, min(rank.get(name, len(rank)) for name in option.opts)
+
+    if context.meta.get(ALL_OPTIONS):
+        return options
+    arguments = [each for each in options if each.param_type_name == "argument"]
+    most_used = sorted((each for each in options if each not in arguments), key=position)
+    chosen = [*arguments, *most_used[:LONGEST_HELP]]
+    return [each for each in options if each in chosen]
+
+
 def _write_panels(command: Any, context: Any, formatter: Any) -> None:
-    """Write the options of a command by what they are about, as their fields declare it."""
-    panels: dict[str, list[Any]] = {name: [] for name in ("Arguments", *PANELS, "Options")}
-    for each in command.get_params(context):
-        if record := each.get_help_record(context):
-            kind = f"{each.param_type_name}s".capitalize()
-            panels[getattr(each, "rich_help_panel", None) or kind].append(record)
+    """Write the options of a command by the headings that their fields declare."""
+    panels: dict[str, list[Any]] = {
+        name: [] for name in ("Arguments", *PANELS, "Options", "Output")
+    }
+    options = [each for each in command.get_params(context) if each.get_help_record(context)]
+    for each in _shown(options, context):
+        panels[_panel(each)].append(each.get_help_record(context))
     for name, records in panels.items():
         if records:
             with formatter.section(name):
@@ -315,9 +383,9 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
             typed.text = value
             return typed if "," in value else read
         if about is not None and about.unit:
-            wanted += f", perhaps with its unit ({about.unit})"
+            wanted += f", optionally with its unit ({about.unit})"
     else:
         if parameter.min is None or number >= parameter.min:
             return number
         wanted = f"give {parameter.min} or more"
-    raise typer.BadParameter(f"{value!r} cannot be used: {wanted}", ctx=context, param=parameter)
+    raise typer.BadParameter(f"invalid value {value!r}: {wanted}", ctx=context, param=parameter)

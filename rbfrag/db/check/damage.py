@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-RESTORE = "restore the database from a copy"
+RESTORE = "restore the database from a backup"
 COMPUTE_AGAIN = (
-    "restore the database from a copy, or add the motions to a new database and run  "
-    "rbfrag simulate  there"
+    "restore the database from a backup, or add the motions to a new database and run  rbfrag "
+    "simulate  there"
 )
-ACCEPT = "restore the database from a copy, or take it as known, by rbfrag db check with accept"
+ACCEPT = "restore the database from a backup, or take it as known, by rbfrag db check with accept"
 FIT_AGAIN = "fit it again in its place, by rbfrag fit"
 
 

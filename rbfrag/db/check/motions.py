@@ -33,7 +33,7 @@ def check_motions(connection: Connection) -> Iterator[Damage]:
         row = connection.execute(query.where(motion.c.id == row_id)).mappings().one()
         for problem in _problems(row):
             file = row["source_file"] or "the file of its record"
-            advice = f"restore the database from a copy, or add {file} to a new database"
+            advice = f"restore the database from a backup, or add {file} to a new database"
             yield Damage("motion", str(row_id), problem, advice)
 
 

@@ -135,7 +135,7 @@ def merge_databases(
         DatabaseError: one of them cannot be used, or the other is damaged.
     """
     if _is_same(locate(other), locate(db)):
-        raise InputError("both are the same database: name another one to merge")
+        raise InputError("both are the same database: give another one to merge")
     with opened_database(other, read_only=True) as theirs, theirs.connect() as source:
         label = database_label(theirs.url)
         findings = check_database(source)
@@ -143,7 +143,7 @@ def merge_databases(
             first = findings[0]
             raise DatabaseError(
                 f"{label} is damaged in {len(findings)} places and was not merged, first "
-                f"{first.table} {first.row}: {first.problem}; rbfrag db check tells of it"
+                f"{first.table} {first.row}: {first.problem}; run  rbfrag db check"
             )
         with opened_database(db, create=True) as ours, ours.begin() as target:
             keep_writers_out(target)

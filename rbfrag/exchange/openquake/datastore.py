@@ -150,7 +150,7 @@ def stored_table(path: Path, what: str) -> StoredTable | None:
         if what == "realizations":
             if node.ndim != 1:
                 raise InputError(
-                    f"{path}, weights: of shape {node.shape}, one a realization wanted"
+                    f"{path}, weights: of shape {node.shape}, one per realization is required"
                 )
             members: dict[str, str | None] = {"rlz_id": None, "weight": ""}
             return _table(path, "weights", node.size, members, stated)
@@ -165,7 +165,7 @@ def _table(
     path: Path, what: str, size: int, members: Mapping[str, str | None], stated: Mapping[str, str]
 ) -> StoredTable:
     if size > _MOST_ROWS * path.stat().st_size:
-        raise InputError(f"{path}, {what}: states {size:,} rows, more than the file can hold")
+        raise InputError(f"{path}, {what}: declares {size:,} rows, more than the file size allows")
     return StoredTable(path, stated, tuple(members), 0, what, size, members)
 
 
@@ -214,7 +214,7 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         import h5py
     except ImportError:
-        raise MissingExtraError("HDF5 files of the OpenQuake engine need h5py", "hdf5") from None
+        raise MissingExtraError("HDF5 files of OpenQuake require h5py", "hdf5") from None
     with reading(path, _WHAT):
         if not h5py.is_hdf5(path):
             raise InputError(f"{path}: not an HDF5 file: name {_WHAT}, calc_N.hdf5")

@@ -79,8 +79,8 @@ class JobFiles:
                 chosen = {**dict.fromkeys(FILES, place), **chosen}
             elif not place.is_dir():
                 raise InputError(
-                    f"{place} is no folder: name the folder with the exports of one OpenQuake job, "
-                    "or its datastore calc_N.hdf5"
+                    f"{place} is not a folder: give the folder with the exports of one OpenQuake "
+                    "job, or its datastore calc_N.hdf5"
                 )
             present = [] if is_store else sorted(path.name for path in place.iterdir())
             for what, pattern in FILES.items():
@@ -90,7 +90,7 @@ class JobFiles:
                 if len(fits) > 1:
                     raise InputError(
                         f"{place} has {' and '.join(fits[:3])}: keep the files of one job in a "
-                        f"folder of their own, or name the file of {what.replace('_', '-')}"
+                        f"folder of their own, or give the file of {what.replace('_', '-')}"
                     )
                 if fits:
                     chosen[what] = place / fits[0]
@@ -101,7 +101,7 @@ class JobFiles:
             where = "" if folder is None else f" in {folder}"
             raise InputError(
                 f"there is no file of {missing[0].replace('_', '-')}{where}: export it (oq export "
-                "… -e csv), or name that file"
+                "… -e csv), or give that file"
             )
         return cls(**chosen)
 
@@ -182,7 +182,7 @@ def read_magnitudes(files: JobFiles) -> FloatArray | None:
         row = int(np.flatnonzero(absent)[0])
         raise InputError(
             f"{events.line(row)}: the rupture {own[of][row]} is not in {files.ruptures.name}, "
-            "which has the magnitudes: are both of one job?"
+            "which has the magnitudes: are both from the same job?"
         )
     return np.asarray(magnitude[order][at][np.argsort(own[event], kind="stable")])
 
@@ -190,7 +190,7 @@ def read_magnitudes(files: JobFiles) -> FloatArray | None:
 def _named(path: Path, what: str) -> Table:
     table = _table(path, what)
     if table is None:
-        raise InputError(f"{path} has no {what.replace('_', '-')}: name the file that has them")
+        raise InputError(f"{path} has no {what.replace('_', '-')}: give the file that has them")
     return table
 
 
@@ -205,8 +205,8 @@ def _refuse_other_jobs(heads: Mapping[str, Table]) -> None:
             one, other = first.stated.get(name), head.stated.get(name)
             if one is not None and other is not None and one != other:
                 raise InputError(
-                    f"{head.top}: {name} is {other}, and that of {first.path.name} is "
-                    f"{one}: these are files of different jobs; name those of one"
+                    f"{head.top}: {name} is {other}, and that of {first.path.name} is {one}: use "
+                    "files of one job"
                 )
 
 
@@ -220,7 +220,7 @@ def _sites(head: Table) -> tuple[str, ...]:
     for row, text in enumerate(ids):
         if text in first:
             raise InputError(
-                f"{head.line(row)}: the site {text!r} is there twice: name the sites apart"
+                f"{head.line(row)}: the site {text!r} occurs twice: name the sites apart"
             )
         first[text] = row
     if not ids:
@@ -243,9 +243,9 @@ def _weights(head: Table) -> tuple[dict[int, float], list[str]]:
     numbers, values = columns[name].tolist(), columns["weight"]
     for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
         if not 0.0 <= value < np.inf:
-            raise InputError(f"{head.line(row)}: the weight {value:g} is none: give 0 to 1")
+            raise InputError(f"{head.line(row)}: the weight {value:g} is invalid: give 0 to 1")
         if numbers.index(number) != row:
-            raise InputError(f"{head.line(row)}: {name} {number} is there twice")
+            raise InputError(f"{head.line(row)}: {name} {number} occurs twice")
     total = float(values.sum())
     if not 0.0 < total < np.inf:
         raise InputError(f"{head.path}: the weights of the realizations sum to {total:g}")
@@ -279,7 +279,7 @@ def _events(head: Table, weights: Mapping[int, float]) -> tuple[IntArray, IntArr
     again = order[1:][np.diff(event_id[order]) == 0]
     if again.size:
         row = int(again.min())
-        raise InputError(f"{head.line(row)}: the event {event_id[row]} is there twice")
+        raise InputError(f"{head.line(row)}: the event {event_id[row]} occurs twice")
     return event_id[order], realization[order], year[order]
 
 
@@ -294,7 +294,7 @@ def _duration(
         if known:
             raise InputError(
                 f"{heads['events'].path}: the events are those of a scenario (year 0), which has "
-                "no rate: leave investigation time and number of event sets out"
+                "no rate: omit investigation_time and ses"
             )
         return None
     for name in given:
@@ -304,12 +304,12 @@ def _duration(
         try:
             value = float(text)
         except ValueError:
-            raise InputError(f"{ruptures.top}: {name} = {text!r} is no number") from None
+            raise InputError(f"{ruptures.top}: {name} = {text!r} is not a number") from None
         if not 0.0 < value < math.inf:
             raise InputError(f"{ruptures.top}: {name} = {text!r} is not above zero")
         if known.setdefault(name, value) != value:
             raise InputError(
-                f"{ruptures.top}: {name} is {value:g}, given is {known[name]:g}: leave it out"
+                f"{ruptures.top}: {name} is {value:g}, given is {known[name]:g}: omit it"
             )
     missing = [name for name in given if name not in known]
     if missing:
@@ -319,14 +319,14 @@ def _duration(
             else f"{ruptures.top} does not state {' and '.join(missing)}"
         )
         raise InputError(
-            f"{where}, which states how long the events took; without it no rate can be given: "
-            "name that file, or give investigation_time and ses as in job.ini",
+            f"{where}, which has the investigation time: give that file, or investigation_time "
+            "and ses as in job.ini",
             fields=("investigation_time", "ses"),
         )
     sets = known["ses_per_logic_tree_path"]
     if not math.isfinite(sets) or sets != int(sets):
         where = "" if ruptures is None or ses is not None else f"{ruptures.top}: "
-        raise InputError(f"{where}ses_per_logic_tree_path = {sets:g} is no whole number")
+        raise InputError(f"{where}ses_per_logic_tree_path = {sets:g} is not a whole number")
     return Duration(known["investigation_time"], int(sets))
 
 
@@ -357,8 +357,8 @@ def _shaking(
                 if wrong.any():
                     first = int(np.flatnonzero(wrong)[0])
                     raise InputError(
-                        f"{head.line(row + first)}: {column} is {values[first]:g}: shaking is a "
-                        "number not below zero"
+                        f"{head.line(row + first)}: {column} is {values[first]:g}: intensities "
+                        "must be 0 or more"
                     )
                 parts[measure].append(factor * values)
             row += part[event_name].size
@@ -374,7 +374,7 @@ def _shaking(
         line = int(again.min())
         raise InputError(
             f"{head.line(line)}: the event {event_id[event[line]]} has a second row for the site "
-            f"{sites[site[line]]!r}: one row an event and site is wanted"
+            f"{sites[site[line]]!r}: one row per event and site is required"
         )
     return event[order], site[order], {name: values[order] for name, values in whole.items()}
 
@@ -411,7 +411,7 @@ def _event_places(head: Table, numbers: IntArray, event_id: IntArray, row: int) 
         first = int(np.flatnonzero(absent)[0])
         raise InputError(
             f"{head.line(row + first)}: the event {numbers[first]} is not in the file of events: "
-            "are both of one job?"
+            "are both from the same job?"
         )
     return places
 
@@ -425,6 +425,6 @@ def _site_places(
         first = int(np.flatnonzero(places < 0)[0])
         raise InputError(
             f"{head.line(row + first)}: the site {texts[first]!r} is not in {mesh.path.name}: are "
-            "both of one job?"
+            "both from the same job?"
         )
     return places

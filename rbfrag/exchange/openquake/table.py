@@ -85,11 +85,9 @@ class Table:
                 names = tuple(cell.strip() for cell in row)
                 for name in names:
                     if names.count(name) > 1:
-                        raise InputError(
-                            f"{path}, line {number}: the column {name!r} is there twice"
-                        )
+                        raise InputError(f"{path}, line {number}: the column {name!r} occurs twice")
                 return cls(path, stated, names, number)
-        raise InputError(f"{path}: ends before the names of the columns: export it again")
+        raise InputError(f"{path}: it ends before the header: export it again")
 
     @property
     def head(self) -> str:
@@ -98,7 +96,7 @@ class Table:
 
     @property
     def top(self) -> str:
-        """The place of what the file states."""
+        """The place of what the file has."""
         return f"{self.path}, line 1"
 
     def column(self, choices: Sequence[str], *, needed: bool = True) -> str | None:

@@ -82,7 +82,7 @@ def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], 
     document, known = toml_document(source_text(path, "a map of columns"), path), {}
     columns, limit = document.get("columns"), document.get("search_limit", SEARCH_LIMIT)
     if not isinstance(columns, dict) or not is_number(limit) or not 0.0 < limit < 1.0:
-        raise InputError(f"{path}: it needs [columns], and a search_limit as k_r/PGA from 0 to 1")
+        raise InputError(f"{path}: [columns] and search_limit (k_r/PGA, from 0 to 1) are required")
     missing = [name for name in NEEDED if name not in columns]
     if missing or len(columns.keys() & set(CRITICAL)) != 1:
         missing = missing or [" or ".join(CRITICAL)]
@@ -91,14 +91,16 @@ def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], 
         about = {"column": stated} if isinstance(stated, str) else stated
         words = ("unit",) if field in UNITS else WORDS.get(field, ())
         if field not in FIELDS:
-            raise InputError(f"{path}: {field[:60]} is no field: there are {', '.join(FIELDS)}")
+            raise InputError(
+                f"{path}: {field[:60]} is not a field; the fields are {', '.join(FIELDS)}"
+            )
         if not (isinstance(about, dict) and {"column"} <= about.keys() <= {"column", *words}):
             keys = ", ".join(f'{word} = "…"' for word in ("column", *words))
             raise InputError(f'{path}: write {field} = "COLUMN" or {field} = {{{keys}}}')
         unit = str(about.get("unit", UNITS.get(field)))
         if field in UNITS and unit_factor(UNITS[field], unit) is None:
             ours = ", ".join(FACTORS[UNITS[field]])
-            raise InputError(f"{path}: the unit {unit[:40]!r} of {field} is none of {ours}")
+            raise InputError(f"{path}: the unit {unit[:40]!r} of {field} is not one of {ours}")
         known[field] = {key: str(value) for key, value in about.items()}
     return known, float(limit)
 

@@ -45,7 +45,7 @@ def dialect_of(origin: Path) -> Dialect:
         start = file.read(_PEEK)
     encoding = encoding_of(start)
     if b"\0" in start and encoding != "utf-16":
-        raise InputError(f"{origin} is binary, not text: name a block table, saved as CSV")
+        raise InputError(f"{origin} is binary, not text: give a block table as CSV")
     lines = start.decode(encoding, "replace").splitlines() or [""]
 
     def rows(delimiter: str) -> list[list[str]]:
@@ -68,7 +68,7 @@ def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
     """Return a CSV file that is open; the stack closes it.
 
     A table of commas is, if it shall be fast, read by pyarrow where that is installed, in a tenth
-    of the time; from the first cell on that is no number, it is read cell by cell as others are.
+    of the time; from the first cell on that is not a number, it is read cell by cell as others are.
     """
     dialect = dialect_of(origin)
     file = stack.enter_context(origin.open(newline="", encoding=dialect.encoding))

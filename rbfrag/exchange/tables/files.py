@@ -71,13 +71,13 @@ def open_table(
         return _of_one_part(read_points(path), "feature")
     if suffix not in (*SUFFIXES, *WORKBOOKS):
         raise InputError(
-            f"{path}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
+            f"{path}: unsupported table: use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
             f"{path.suffix!r}"
         )
     stack.enter_context(_reading(path))
     size = path.stat().st_size
     if size > MOST_BYTES:
-        raise InputError(f"{path} has {size} bytes: no block table is so large")
+        raise InputError(f"{path} has {size} bytes: too large for a block table")
     if suffix in WORKBOOKS:
         return open_workbook(path, stack, sheet)
     if suffix == ".parquet":

@@ -54,7 +54,7 @@ def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
                     try:
                         column = column.cast(arrow.float64()).to_numpy(zero_copy_only=False)
                     except arrow.ArrowException:
-                        raise InputError(f"{origin}: the column {name} holds no numbers") from None
+                        raise InputError(f"{origin}: the column {name} must have numbers") from None
                     cells[name] = np.array(column, dtype=np.float64)
                 else:
                     cells[name] = column

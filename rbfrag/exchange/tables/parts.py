@@ -241,7 +241,7 @@ def pyarrow() -> tuple[Any, Any]:
         import pyarrow as arrow
         import pyarrow.parquet as parquet
     except ImportError:
-        raise MissingExtraError("Parquet files need pyarrow", "parquet") from None
+        raise MissingExtraError("Parquet files require pyarrow", "parquet") from None
     return arrow, parquet
 
 

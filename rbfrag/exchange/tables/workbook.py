@@ -53,7 +53,7 @@ def openpyxl() -> Any:
     try:
         import openpyxl as library
     except ImportError:
-        raise MissingExtraError("Excel workbooks (.xlsx) need openpyxl", "excel") from None
+        raise MissingExtraError("Excel workbooks (.xlsx) require openpyxl", "excel") from None
     return library
 
 
@@ -64,7 +64,7 @@ def _open_document_rows(origin: Path) -> dict[str, Iterable[Sequence[Any]]]:
     try:
         frames = pd.read_excel(origin, engine="odf", sheet_name=None, header=None, dtype=object)
     except ImportError:
-        raise MissingExtraError("OpenDocument spreadsheets (.ods) need odfpy", "excel") from None
+        raise MissingExtraError("OpenDocument spreadsheets (.ods) require odfpy", "excel") from None
     return {
         str(title): [[None if cell != cell else cell for cell in row] for row in frame.to_numpy()]
         for title, frame in frames.items()
@@ -144,7 +144,7 @@ def _check(origin: Path) -> None:
     with zipfile.ZipFile(origin) as archive:
         members = archive.infolist()
         if sum(member.file_size for member in members) > MOST_BYTES:
-            raise InputError(f"{origin}: it unpacks to more than a table of blocks can be")
+            raise InputError(f"{origin}: its uncompressed size is too large for a table of blocks")
         for member in members:
             if not member.filename.startswith("xl/worksheets/sheet"):
                 continue
@@ -220,8 +220,8 @@ def workbook_writer(
         written[0] += len(columns[0]) if columns else 0
         if written[0] > MOST_ROWS:
             raise InputError(
-                f"a sheet of Excel has {MOST_ROWS - 1:,} rows below its names, and the table has "
-                "more: write .csv or .parquet"
+                f"a sheet of Excel has {MOST_ROWS - 1:,} rows below its names, fewer than the "
+                "table: use .csv or .parquet"
             )
         for row in zip(*columns, strict=True):
             sheet.append([cell_of(value) for value in row])

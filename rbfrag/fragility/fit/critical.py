@@ -62,14 +62,13 @@ def fit_lognormal(
     b, jacobian = natural(theta), from_olsen(theta)[1][order]
     if b[1] <= 0.0:
         raise FitError(
-            f"the fitted critical velocity does not rise with {term.title} (exponent "
-            f"{b[1]:.4g}): these motions cannot carry a fragility model in "
-            f"{term.symbol}; use another term or more motions"
+            f"the fitted critical velocity does not rise with {term.title} (exponent {b[1]:.4g}): "
+            f"no fragility model in {term.symbol} can be fitted; use another term or more motions"
         )
     if b[place] < np.log(1e-9):
         raise FitError(
-            "the critical values lie exactly on a power law: without scatter there is no "
-            "probability to fit; use recorded motions instead of scaled copies of one"
+            "the critical values lie exactly on a power law: without dispersion no probability "
+            "can be fitted; use recorded motions instead of scaled copies of one"
         )
     steps = jackknife_steps(rows, theta) @ jacobian.T
     cr1, naive = (np.sqrt(np.diag(jacobian @ c @ jacobian.T)) for c in sandwich(rows, theta))

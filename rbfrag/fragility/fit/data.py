@@ -337,9 +337,9 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     imported = method.block.points == "strengths" and IMPORTED in table.numerics_version
     if of_outcomes and not imported and not np.isfinite(source.failed).any():
         raise FitError(
-            f"method {method.name} fits what blocks did, and no outcomes are stored: simulate kind "
-            f"{named} again, which adds those of the grid, or fit critical values, by method wls "
-            "or lognormal"
+            f"method {method.name} requires outcomes, and none are stored: simulate kind {named} "
+            "again, which adds those of the grid, or fit critical values, by method wls or "
+            "lognormal"
         )
     points = _READERS[method.block.points](source, method, term)
     own = points.combination
@@ -414,15 +414,15 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
     if n < FEWEST_OBSERVED:
         raise FitError(
             f"{n} critical values were found among {data.n_total} combinations with the term "
-            f"{term.name}; a fit needs {FEWEST_OBSERVED}: simulate more motions or more blocks "
+            f"{term.name}; a fit requires {FEWEST_OBSERVED}: simulate more motions or more blocks "
             f"(rbfrag simulate, of kind {data.kind})"
         )
     events = np.unique(data.event[tells]).size
     if events < FEWEST_EVENTS:
         raise FitError(
-            f"the critical values come from {events} earthquake(s); a fit needs "
-            f"{FEWEST_EVENTS}, because points of one earthquake are not independent: add "
-            "motions of other earthquakes, and name the events in a table of metadata"
+            f"the critical values come from {events} earthquake(s); a fit requires "
+            f"{FEWEST_EVENTS}, because points of one earthquake are not independent: add motions "
+            "of other earthquakes, and give the events in a metadata table"
         )
     if any(
         not np.all(np.isfinite(v[data.observed])) for n, v in data.values.items() if n == "y_m_s"
@@ -460,12 +460,12 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     defined = np.isfinite(x)
     if not defined.any() and "tm_s" in term.inputs:
         raise FitError(
-            f"the term {term.name} needs the mean period Tm, which none of the {x.size} "
+            f"the term {term.name} requires the mean period Tm, which none of the {x.size} "
             "combinations has: add the motions again with their samples, or fit the term pgv"
         )
     if not defined.any() and "xp_m_s" in term.inputs:
         raise FitError(
-            "the term xp needs the toppling spectrum X(p), which is stored for none of the "
+            "the term xp requires the toppling spectrum X(p), which is not stored for the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
     searched = table.status == "found"

@@ -132,7 +132,7 @@ def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray)
         FitError: it is not known which motions are of one site.
     """
     if data.recording is None:
-        raise FitError("which motions are components of one recording is not known")
+        raise FitError("the motions have no recordings: their components are unknown")
     shape = data.failed.shape
 
     def each(column: NDArray[np.generic]) -> NDArray[np.generic]:
@@ -213,10 +213,10 @@ class PairTables:
         ):
             if table.pairs < FEWEST_PAIRS or table.event.size < fewest:
                 raise FitError(
-                    f"how failures go together needs {FEWEST_PAIRS} pairs of blocks of {name} in "
-                    f"{fewest} earthquakes: there are {table.pairs} in {table.event.size}; add "
-                    "recordings of more earthquakes, with several sites and both horizontal "
-                    "components"
+                    f"the dependence of failures requires {FEWEST_PAIRS} pairs of blocks of "
+                    f"{name} in {fewest} earthquakes: there are {table.pairs} in "
+                    f"{table.event.size}; add recordings of more earthquakes, with several sites "
+                    "and both horizontal components"
                 )
 
     def likeliest(

@@ -85,9 +85,9 @@ def fit(
     chosen = method_of_kind(kind, method, term, estimate_m=estimate_m)
     _refuse_unfit(chosen, of_term, kind, estimate_m, selection.get("rotation_deg"))
     if seed < 0:
-        raise InputError(f"seed = {seed}: give a whole number from 0 up")
+        raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if name is not None and not name.strip():
-        raise InputError("the name of the model is empty: give a name or leave it out")
+        raise InputError("the name of the model is empty: give a name or omit it")
     refuse_taken(name or _name(chosen, of_term, kind, selection), taken)
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
@@ -120,7 +120,7 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     # of a kind without methods of its own, all that read what describes its block
     suited = tuple(each for each in reading if each.block.kind == kind) or tuple(reading)
     if not suited:
-        raise InputError(f"there is no fragility model of kind {kind}: no method reads its block")
+        raise InputError(f"there is no fragility model of kind {kind}: no method supports it")
     return suited
 
 
@@ -144,7 +144,7 @@ def method_of_kind(
     chosen = method_named(name)
     if chosen not in known:
         raise InputError(
-            f"method {name} fits blocks known by {' and '.join(chosen.block.names)}, not those of "
+            f"method {name} fits blocks with {' and '.join(chosen.block.names)}, not those of "
             f"kind {kind}, which are fitted by {', '.join(each.name for each in known)}"
         )
     return chosen
@@ -245,7 +245,7 @@ def _refuse_unfit(
     if term.name not in method.forms:
         known = (each.name for each in methods_of_kind(kind) if term.name in each.forms)
         raise InputError(
-            f"method {method.name} does not go with the term {term.name}: it fits "
+            f"method {method.name} cannot be combined with the term {term.name}: it fits "
             f"{', '.join(method.forms)}; the term {term.name} of kind {kind} is fitted by "
             f"{', '.join(known) or 'none'}"
         )
@@ -256,7 +256,7 @@ def _refuse_unfit(
         )
     if rotation_deg is not None and method.block.criterion is None:
         raise InputError(
-            f"a rotation is no failure of blocks of kind {kind}: leave rotation_deg out",
+            f"rotation_deg is not a failure criterion of kind {kind}: omit rotation_deg",
             fields=("rotation_deg",),
         )
 

@@ -288,8 +288,8 @@ def most_likely(rows: Binomial) -> FloatArray:
     failed = rows.outcome > 0.5
     if int(failed.sum()) in (0, failed.size):
         raise FitError(
-            f"of {failed.size} outcomes on the grid {int(failed.sum())} toppled: a probability "
-            "cannot be fitted to outcomes that are all alike; add motions or block sizes (p²)"
+            f"of {failed.size} outcomes on the grid {int(failed.sum())} toppled: no probability "
+            "can be fitted to identical outcomes; add motions or block sizes (p²)"
         )
     b, settled = maximise(rows, rows.start(), tolerance=1e-14)
     eta = rows.columns @ b

@@ -269,8 +269,8 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     if fit.parameters[1] <= 0.0:
         raise FitError(
             f"the fitted critical velocity does not rise with {term.title} (slope "
-            f"{fit.parameters[1]:.4g}): these motions cannot carry a fragility model in "
-            f"{term.symbol}; use another term or more motions"
+            f"{fit.parameters[1]:.4g}): no fragility model in {term.symbol} can be fitted; use "
+            "another term or more motions"
         )
     parameters = fit.parameters.tolist()
     variance = variance_m2_s2(parameters, x)
@@ -372,8 +372,8 @@ def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
     residuals = y - np.polynomial.Polynomial.fit(x, y, 1)(x)
     if residuals.std() <= 1e-9 * np.abs(y).max():
         raise FitError(
-            "the critical values lie exactly on a line: without scatter there is no "
-            "probability to fit; use recorded motions instead of scaled copies of one"
+            "the critical values lie exactly on a line: without dispersion no probability can be "
+            "fitted; use recorded motions instead of scaled copies of one"
         )
 
 

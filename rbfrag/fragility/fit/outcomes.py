@@ -76,8 +76,8 @@ def fit_outcomes(
     failures = int((fitted.outcome > 0.5).sum())
     if 0 < failures < FEWEST_FAILURES:
         raise FitError(
-            f"{failures} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
-            "motions or more block sizes (p²)"
+            f"{failures} outcomes on the grid toppled; a fit requires {FEWEST_FAILURES}: add "
+            "stronger motions or more block sizes (p²)"
         )
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
@@ -94,9 +94,9 @@ def fit_outcomes(
         apart = float(np.linalg.cond(naive / np.outer(sd, sd))) < _MOST_ALIKE
     if not apart:
         raise FitError(
-            f"the blocks and {len(data.event_names)} earthquakes do not tell the {len(names)} "
-            f"parameters of method {method.name} apart: simulate more block sizes (p²) or "
-            "earthquakes, or fit a method of fewer parameters, such as logistic"
+            f"the blocks and {len(data.event_names)} earthquakes do not identify the {len(names)} "
+            f"parameters of method {method.name}: simulate more block sizes (p²) or earthquakes, "
+            "or fit a method of fewer parameters, such as logistic"
         )
     steps = jackknife_steps(fitted, b)
 

@@ -69,8 +69,8 @@ def fit(
     UnknownFieldError.refuse(question, FitOptions, "a fit")
     if question.get("term") is None:
         raise InputError(
-            "term is missing: name the measure that the model reads, as fit(db, term='pgv'): one "
-            f"of {', '.join(TERMS)}"
+            "term is missing: give the intensity measure, such as fit(db, term='pgv'), one of "
+            f"{', '.join(TERMS)}"
         )
     place, built_in = data_place(db)
     if built_in:

@@ -213,7 +213,9 @@ def map_failures(
     site, blocks = answer.site[some], answer.block[some]
     draws = _number(draws, site.size)
     if not 0.0 <= between <= 1.0:
-        raise InputError(f"between = {between:g}: a share of the variance is between 0 and 1")
+        raise InputError(
+            f"between = {between:g}: a fraction of the variance must be between 0 and 1"
+        )
     if seed < 0:
         raise InputError(f"seed = {seed}: give 0 or more")
     if range_km is None:

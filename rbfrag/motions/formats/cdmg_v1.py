@@ -66,7 +66,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     channels = [_channel(file, span) for span in spans]
     silent = [channel for channel in channels if not channel.values.any()]
     if len(silent) == len(channels):
-        raise file.error("every sample of every channel is zero: this is no record")
+        raise file.error("every sample of every channel is zero: not a record")
     remarks = file.missing_channels(spans[0], len(spans))
     if silent:
         names = ", ".join(channel.component for channel in silent)

@@ -53,7 +53,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         else:
             yield _trace(file, span, series)
     if len(others) == len(spans):
-        raise file.error(f"the file holds {', '.join(others)}: the acceleration is needed")
+        raise file.error(f"the file has {', '.join(others)}: the acceleration is required")
 
 
 def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
@@ -101,14 +101,12 @@ def _interval(file: RecordFile, header: range) -> tuple[float, int]:
     shown = file.lines[at][place * width : (place + 1) * width].strip()
     milliseconds = finite_number(file.path, shown, at + 1, what)
     if milliseconds <= 0.0:
-        raise file.error(
-            f"{what} is {shown}, which means unknown: the record cannot be used", at + 1
-        )
+        raise file.error(f"{what} is {shown}, that is, unknown: the record is not usable", at + 1)
     return milliseconds / 1000.0, at + 1
 
 
 def _layout(file: RecordFile, field: HeaderField) -> tuple[int, int]:
     layout = field_layout(field.text)
     if layout is None:
-        raise file.error("the line names no format such as (8F10.3)", field.line)
+        raise file.error("the line has no format such as (8F10.3)", field.line)
     return layout

@@ -55,7 +55,7 @@ def recognises(head: str) -> bool:
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the channels of a V2 file in their order, with one recording id."""
     if _SPECTRA.match(file.lines[0]):
-        raise file.error("this is V3, which holds spectra; take the .v2 of the same channel", 1)
+        raise file.error("this is V3, with spectra: use the .v2 of the same channel", 1)
     spans = file.blocks(_BLOCK)
     remarks = file.missing_channels(spans[0], len(spans))
     for index, span in enumerate(spans):

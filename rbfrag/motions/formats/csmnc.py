@@ -46,7 +46,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     words = quantity.text.upper().split()
     if "ACCELERATION" not in words:
         raise file.error(
-            f"this is a record of {quantity.text.lower()}: the acceleration is needed",
+            f"this is a record of {quantity.text.lower()}: the acceleration is required",
             quantity.line,
         )
     unit = file.find(header, _UNIT, "unit of acceleration")

@@ -189,8 +189,8 @@ def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
     for number, fields in rows:
         if len(fields) != width:
             raise file.error(
-                f"{lines[number - 1].strip()[:60]!r} has not {width} columns as the rows above: "
-                "repair the line or export the record again",
+                f"{lines[number - 1].strip()[:60]!r} does not have {width} columns like the rows "
+                "above: repair the line or export the record again",
                 number,
             )
     return rows
@@ -202,20 +202,20 @@ def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     indexed = _indexed_interval(path)
     if indexed is None and dt_s is None:
         raise file.error(
-            "the file holds one column and states no sampling interval: give it in seconds, "
-            f"as in  dt_s 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
+            "the file has one column and no sampling interval: give it in seconds, as in  dt_s "
+            f"0.005, or in a file {INDEX} in the same folder, as in  {path.name} 0.005",
             fields=("dt_s",),
         )
     if indexed is None:
         assert dt_s is not None
-        return dt_s, f"the file states no dt; {dt_s:g} s is what was stated when it was read"
+        return dt_s, f"the file has no dt; {dt_s:g} s is what was stated when it was read"
     if dt_s is not None and dt_s != indexed[0]:
         raise file.error(
-            f"{indexed[1]} beside the file says dt = {indexed[0]:g} s, not {dt_s:g}: "
-            "leave dt_s out, or correct one of them",
+            f"{indexed[1]} next to the file has dt = {indexed[0]:g} s, not {dt_s:g}: omit dt_s, "
+            "or correct one of them",
             fields=("dt_s",),
         )
-    return indexed[0], f"the file states no dt; {indexed[0]:g} s is from {indexed[1]}"
+    return indexed[0], f"the file has no dt; {indexed[0]:g} s is from {indexed[1]}"
 
 
 def _refuse_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
@@ -223,7 +223,7 @@ def _refuse_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
     for (above, _), (number, _) in pairwise(rows):
         if number != above + 1:
             raise file.error(
-                "an empty line among the accelerations may be a missing sample: remove it, or "
+                "empty line among the accelerations, possibly a missing sample: remove it, or "
                 "add a time column",
                 above + 1,
             )
@@ -259,7 +259,7 @@ def _stated_unit(file: RecordFile, header: Header) -> HeaderField | None:
     for field in known[1:]:
         if acceleration_unit(field.text) != acceleration_unit(known[0].text):
             raise file.error(
-                f"the header says {field.text}, but {known[0].text} on line {known[0].line}: "
+                f"the header has {field.text} here, but {known[0].text} on line {known[0].line}: "
                 "correct it",
                 field.line,
             )
@@ -303,10 +303,10 @@ def _check_columns(file: RecordFile, header: Header) -> None:
         acceleration = _ACCELERATION.search(line)
         other = _OTHER_QUANTITY.search(line)
         if other and not acceleration:
-            raise file.error(f"the header names {other[0]!r}: an acceleration is needed", number)
+            raise file.error(f"the header names {other[0]!r}: an acceleration is required", number)
         # a title such as "Accelerations, time series" is no list of columns
         if acceleration and acceleration.start() < time.start() and _TIME_UNIT.search(line):
-            raise file.error("the acceleration stands before the time: swap the columns", number)
+            raise file.error("the acceleration precedes the time: swap the columns", number)
 
 
 def _check_units(file: RecordFile, number: int, units: list[str]) -> None:
@@ -318,4 +318,4 @@ def _check_units(file: RecordFile, number: int, units: list[str]) -> None:
         if unit.lower() in _OTHER_TIMES:
             raise file.error(f"the times are in {unit!r}: convert them to seconds", number)
         if unit.lower() in _SECONDS and place > at:
-            raise file.error("the acceleration stands before the time: swap the columns", number)
+            raise file.error("the acceleration precedes the time: swap the columns", number)

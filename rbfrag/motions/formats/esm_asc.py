@@ -27,7 +27,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     kind = fields.text("DATA_TYPE")
     if kind and kind.upper() != "ACCELERATION":
         raise file.error(
-            f"this is a record of {kind.lower()}: the acceleration is needed",
+            f"this is a record of {kind.lower()}: the acceleration is required",
             fields["DATA_TYPE"].line,
         )
     dt = file.dt(fields["SAMPLING_INTERVAL_S"])

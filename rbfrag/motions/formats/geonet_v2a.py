@@ -72,7 +72,7 @@ def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
             raise file.error(f"{count.number:.12g} points at {dt:g} s {trouble}", count.line)
     elif len(data) != SERIES * rows:
         raise file.error(
-            f"the header of {name} says {count.number} points, which are {SERIES} x {rows} "
+            f"the header of {name} declares {count.number} points, which are {SERIES} x {rows} "
             f"lines of data, but {len(data)} follow: the file is truncated or its header wrong",
             count.line,
         )

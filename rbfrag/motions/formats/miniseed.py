@@ -36,7 +36,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     try:
         import pymseed
     except ImportError:
-        raise MissingExtraError("miniSEED needs pymseed", "mseed") from None
+        raise MissingExtraError("miniSEED requires pymseed", "mseed") from None
     raw, remark = _whole_records(file, pymseed, file.text.encode("latin-1"))
     try:
         traces = pymseed.MS3TraceList.from_buffer(raw, unpack_data=True)
@@ -48,7 +48,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         raise _damaged(file, warnings[0])
     channels = [(each.sourceid, list(each)) for each in traces]
     if not channels:
-        raise file.error("the file holds no samples: request the record again")
+        raise file.error("the file has no samples: request the record again")
     start = min(segments[0].starttime_str() for _, segments in channels)
     stations = sorted({".".join(source.split("_")[:2]) for source, _ in channels})
     several = f"the file holds channels of several stations: {', '.join(stations[:5])}"
@@ -75,7 +75,7 @@ def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, s
         if not (end and file.allow_partial):
             raise _damaged(file, error) from None
     if end < len(raw) and not file.allow_partial:
-        raise _damaged(file, f"{len(raw) - end} bytes at the end are no record")
+        raise _damaged(file, f"{len(raw) - end} bytes at the end are not a record")
     return raw[:end], f"{len(raw) - end} bytes at the end are left out" if end < len(raw) else ""
 
 
@@ -84,20 +84,20 @@ def _channel(
 ) -> ParsedTrace:
     codes = _SOURCE.fullmatch(source)
     if codes is None:
-        raise file.error(f"the source {source!r} is no channel: request the record again")
+        raise file.error(f"the source {source!r} is not a channel: request the record again")
     network, station, location, *channel = codes.groups()
     name = "".join(channel)
     if channel[1] not in ACCELEROMETERS:
         raise file.error(
-            f"{name} is no accelerometer's channel but, by its {channel[1]}, one of velocity or "
-            "another quantity: request the channels HN or EN of the station"
+            f"{name} is not an accelerometer channel (code {channel[1]}): request the channels HN "
+            "or EN of the station"
         )
     if len(segments) > 1:
         gap = f"ends at {segments[0].endtime_str()} and goes on at {segments[1].starttime_str()}"
         raise file.error(f"{name} has {len(segments)} segments: it {gap}; request it without gaps")
     (segment,) = segments
     if segment.sampletype not in {"i", "f", "d"} or segment.numsamples != segment.samplecnt:
-        raise file.error(f"{name} holds no samples, or not as many as its headers say")
+        raise file.error(f"{name} has fewer samples than its headers declare, or none")
     counts = segment.np_datasamples.astype(np.float64)
     offset = float(counts.mean())
     return ParsedTrace(
@@ -123,8 +123,8 @@ def _gain(file: RecordFile, index: int, name: str) -> float:
     if gain is None:
         raise UnitNotStatedError(
             file.path,
-            f"{name} is in counts, and its file states no gain: give it with gain, in "
-            "counts/(m/s2), the sensitivity that the StationXML of the station states",
+            f"{name} is in counts without a gain: give gain in counts/(m/s2), the sensitivity in "
+            "the StationXML of the station",
             fields=("gain",),
         )
     return gain
@@ -133,7 +133,7 @@ def _gain(file: RecordFile, index: int, name: str) -> float:
 def _damaged(file: RecordFile, trouble: object) -> Exception:
     words = " ".join(str(trouble).split())[:150]
     return file.error(
-        f"the file is truncated or damaged ({words}): request the record again, or read what "
-        "there is with allow_partial",
+        f"the file is truncated or damaged ({words}): request the record again, or use "
+        "allow_partial",
         fields=("allow_partial",),
     )

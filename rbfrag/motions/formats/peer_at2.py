@@ -100,7 +100,8 @@ def _unit(file: RecordFile, header: list[str]) -> HeaderField | None:
         quantity = _QUANTITY.search(line)
         if quantity and quantity[1].upper() != "ACCELERATION":
             raise file.error(
-                f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is needed", number
+                f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is required",
+                number,
             )
         if match := _UNIT.search(line):
             return HeaderField(match[1], number)

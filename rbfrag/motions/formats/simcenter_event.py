@@ -31,12 +31,10 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     try:
         content = json.loads(file.text)
     except json.JSONDecodeError as error:
-        raise file.error(
-            f"this is no JSON: {error.msg}; export the event again", error.lineno
-        ) from None
+        raise file.error(f"not JSON: {error.msg}; export the event again", error.lineno) from None
     except (ValueError, RecursionError):
-        raise file.error("this is no JSON that can be read: export the event again") from None
-    file.require_units("files of this format state")
+        raise file.error("not valid JSON: export the event again") from None
+    file.require_units("files of this format have")
     index = 0
     for number, event in enumerate(_list(file, content, "Events", "the file")):
         here = f"event {number}"
@@ -51,7 +49,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
             yield _trace(file, event, series, f"time series {index}", dof_of, first=first)
             index += 1
     if not index:
-        raise file.error("the file holds no event with a time series")
+        raise file.error("the file has no event with a time series")
 
 
 def _trace(
@@ -64,7 +62,7 @@ def _trace(
     first: bool,
 ) -> ParsedTrace:
     if not isinstance(series, dict):
-        raise file.error(f"{what} is no JSON object")
+        raise file.error(f"{what} is not a JSON object")
     component = str(series.get("name", ""))
     what += f" ({component})"
     data = series.get("data")
@@ -83,9 +81,8 @@ def _trace(
     counted = isinstance(steps, int) and not isinstance(steps, bool) and steps > 0
     if not counted or (steps != len(data) and not file.allow_partial):
         raise file.error(
-            f"numSteps says {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
-            "truncated or numSteps is wrong; export the event again, or read what there is with "
-            "allow_partial",
+            f"numSteps is {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
+            "truncated or numSteps is wrong; export the event again, or use allow_partial",
             line,
             fields=("allow_partial",),
         )
@@ -95,7 +92,8 @@ def _trace(
     intervals = [owner["dT"] for owner in (series, event) if "dT" in owner]
     if not intervals or not all(map(_is_number, intervals)) or len(set(intervals)) > 1:
         raise file.error(
-            f"{what} needs one dT, in the series or its event, not {str(intervals)[:60]}", line
+            f"{what} requires a single dT, in the series or its event, not {str(intervals)[:60]}",
+            line,
         )
     dt = file.possible_dt(float(intervals[0]), line)
     name = str(event.get("name", ""))

@@ -34,7 +34,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     assert head is not None, "parse() is called for recognised text only"
     count = file.count(HeaderField(head["npts"], 2), "number of points")
     dt = file.dt(HeaderField(head["dt"], 2))
-    file.require_units("files of this format state")
+    file.require_units("files of this format have")
     yield ParsedTrace(
         file.free_numbers(file.lines[2:], 3, "acceleration"),
         dt,

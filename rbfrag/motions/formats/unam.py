@@ -39,7 +39,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     channels = file.count(fields["NUMERO DE CANALES"], "number of channels").number
     if len(components) != channels or not all(components):
         raise file.error(
-            f"the header says {channels} channels, but orients {len(components)}", orientation.line
+            f"the header declares {channels} channels, but has orientations of {len(components)}",
+            orientation.line,
         )
     unit = fields["UNIDADES DE LOS DATOS"]
     word = _UNIT.match(unit.text)

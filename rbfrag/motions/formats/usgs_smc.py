@@ -42,7 +42,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     lines = file.lines
     kind = _HEAD.match(file.text)
     if kind and kind[1] != "ACCELEROGRAM":
-        raise file.error(f"this is a record of {kind[1].lower()}: the acceleration is needed", 1)
+        raise file.error(f"this is a record of {kind[1].lower()}: the acceleration is required", 1)
     top = next(
         (
             at
@@ -63,7 +63,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     for at in range(above, min(first, len(lines))):
         if not lines[at].startswith("|"):
             raise file.error(
-                f"the header says {comments} comment lines, but this is none: they begin with |",
+                f"the header declares {comments} comment lines, but this line does not begin with "
+                "|",
                 at + 1,
             )
     values = file.fixed_width(file.data(first), first + 1, LAYOUT, "acceleration")
@@ -95,4 +96,4 @@ def _integer(file: RecordFile, top: int, place: int) -> int:
     field = _value(file, top, place, INTEGERS, INTEGER_WIDTH)
     if field.text.isascii() and field.text.isdigit() and len(field.text) < MOST_DIGITS:
         return int(field.text)
-    raise file.error(f"the number of comment lines {field.text!r} is no count", field.line)
+    raise file.error(f"the number of comment lines {field.text!r} is invalid", field.line)

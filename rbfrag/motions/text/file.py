@@ -34,7 +34,7 @@ def read_bytes(path: Path) -> bytes:
     """Return the content of a file of bounded size."""
     try:
         if path.is_dir():
-            raise MotionFileError(path, "this is a folder, not a file: name a file in it")
+            raise MotionFileError(path, "this is a folder: give a file")
         if is_endless(path):
             raise MotionFileError(path, f"this is {NO_FILE}: save the record to a file")
         raw = bounded_bytes(path, LARGEST_FILE_BYTES)
@@ -61,12 +61,12 @@ def decoded(path: Path, raw: bytes) -> str:
         raise MotionFileError(path, "the file is empty: export the record again")
     packed = packed_as(raw[:6])
     if packed is not None:
-        raise MotionFileError(path, f"it is a {packed} file: unpack it, and name a record in it")
+        raise MotionFileError(path, f"it is a {packed} file: unpack it, and give a record")
     encoding = encoding_of(raw)
     if b"\0" in raw and encoding != "utf-16":
         raise MotionFileError(
             path,
-            "the file is binary and no miniSEED: export the record in one of the text formats",
+            "the file is binary and not miniSEED: export the record in one of the text formats",
         )
     try:
         text = raw.decode(encoding)

@@ -99,13 +99,13 @@ def _interval(
     if given is not None and not math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
         by_header, by_caller = (_agreeing(file, trace, traces, each) for each in (dt, given))
         if all(by_header) or not any(by_caller):
-            trouble = f"the header says dt = {dt:g} s, not {given:g}: leave dt_s out"
+            trouble = f"the header says dt = {dt:g} s, not {given:g}: omit dt_s"
             raise file.error(trouble, fields=("dt_s",))
         return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
     stated = _statements(trace, traces, dt)
     for off, text, line in stated:
         if off > DURATION_REFUSED and given is None:
-            advice = "state the right interval with dt_s, or correct the header"
+            advice = "give the correct interval with dt_s, or correct the header"
             raise file.error(f"{text}: {advice}", line, fields=("dt_s",))
     return dt, tuple(f"{DOUBT}{text}" for off, text, _ in stated if off > DURATION_NOTED)
 
@@ -136,7 +136,7 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
     for field in trace.durations:
         seconds = number_or_none(field.text) if field else None
         if field and field.text and seconds is None:
-            text = f"the header's duration {shown(field.text)} is no number"
+            text = f"the header's duration {shown(field.text)} is not a number"
             statements.append((DURATION_REFUSED, text, field.line))
         if field is None or seconds is None:
             continue
@@ -170,7 +170,7 @@ def _unit(
     if file.units is not None and unit_in_g(file.units) != in_g:
         other = unit_in_g(file.units)
         if off < PEAK_REFUSED or _peak(trace, other, file.units)[0] >= PEAK_REFUSED:
-            trouble = f"the header says {field.text}, not {file.units}: leave units out"
+            trouble = f"the header says {field.text}, not {file.units}: omit units"
             raise file.error(trouble, field.line, fields=("units",))
         remark = f"{DOUBT}the header says {field.text}; {file.units} is what was stated"
         return other, field._replace(text=file.units), (remark,)

@@ -224,13 +224,12 @@ class RecordFile:
             return Count(int(digits), field.line, of)
         raise self.error(f"{what} {shown(field.text)} is not a count of samples", field.line)
 
-    def require_units(self, states: str = "the file states") -> None:
+    def require_units(self, states: str = "the file has") -> None:
         """Refuse a file that states no unit of acceleration unless the caller states it."""
         if self.units is None:
             raise UnitNotStatedError(
                 self.path,
-                f"{states} no unit of acceleration, and it is never guessed: give it with units "
-                "g, m/s2, cm/s2 or mm/s2",
+                f"{states} no unit of acceleration: give units g, m/s2, cm/s2 or mm/s2",
                 fields=("units",),
             )
 
@@ -265,13 +264,13 @@ class RecordFile:
         if npts and abs(count.number - npts) <= ROUNDING * npts:
             return ""
         whose = f"the header{f' of {count.of}' if count.of else ''}"
-        says = f"{whose} says {count.number:.12g} samples, but {npts} follow:"
+        says = f"{whose} declares {count.number:.12g} samples, but {npts} follow:"
         if npts and self.allow_partial:
-            return f"{says} the record is partial, and which samples are missing is not told"
-        interval = "" if count.seconds is None else "state the right interval with dt_s, "
+            return f"{says} the record is partial, at an unknown place"
+        interval = "" if count.seconds is None else "give the correct interval with dt_s, "
         raise self.error(
             f"{says} the file is truncated or its header is wrong; export the record again, "
-            f"{interval}or read what there is with allow_partial",
+            f"{interval}or use allow_partial",
             count.line,
             fields=("allow_partial", "dt_s"),
         )
@@ -336,7 +335,7 @@ class RecordFile:
             width = len(row.split())
             if width != columns:
                 raise self.error(
-                    f"the line has {width} values, not {columns} as the header says: repair the "
+                    f"the line has {width} values, not {columns} as in the header: repair the "
                     "line or export the record again",
                     number,
                 )
@@ -391,7 +390,7 @@ class RecordFile:
         numbers = self.fixed_width(rows, first_line, layout, what)
         if numbers.size % layout[0]:
             raise self.error(
-                f"the last row has not {layout[0]} columns: the file is truncated",
+                f"the last row does not have {layout[0]} columns: the file is truncated",
                 first_line - 1 + len(rows),
             )
         return numbers.reshape(-1, layout[0])
@@ -413,8 +412,8 @@ class RecordFile:
         if off.size:
             at = int(off[0])
             raise self.error(
-                f"time {printed[at]:g} s stands where {expected[at]:g} s was expected with the "
-                f"header's dt of {dt:g} s: repair the line or export the record again",
+                f"time {printed[at]:g} s instead of {expected[at]:g} s for the header's dt of "
+                f"{dt:g} s: repair the line or export the record again",
                 first_line + at // per_line,
             )
 

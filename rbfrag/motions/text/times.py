@@ -112,7 +112,7 @@ def sampling_interval(
         if stated_dt_s is None:
             raise MotionFileError(
                 path,
-                "a single row does not tell the sampling interval: give it, as in  dt_s 0.005",
+                "a single row has no sampling interval: give it, as in  dt_s 0.005",
                 line=line_numbers[0],
                 fields=("dt_s",),
             )
@@ -132,7 +132,7 @@ def sampling_interval(
     if not column.reproduced_by(stated_dt_s):
         raise MotionFileError(
             path,
-            f"the time column has dt = {dt_s:g} s, not {stated_dt_s:g}: leave dt_s out",
+            f"the time column has dt = {dt_s:g} s, not {stated_dt_s:g}: omit dt_s",
             line=line_numbers[1],
             fields=("dt_s",),
         )

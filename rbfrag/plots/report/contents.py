@@ -258,7 +258,7 @@ def report_of(
         answering: which model answers.
     """
     if not 0 < len(rows) <= 200:
-        raise InputError(f"a report is of 1 to 200 blocks, and these are {len(rows):,}")
+        raise InputError(f"a report has 1 to 200 blocks, not {len(rows):,}")
     entries, errors = [], []
     for i, row in enumerate(rows, start=1):
         count = row.get("count", 1.0)
@@ -269,7 +269,7 @@ def report_of(
             if "reason" in row:
                 raise InputError(row["reason"])
             if count != int(count) or count < 1:
-                raise InputError(f"count = {count:g}: enter a whole number of blocks from 1 on")
+                raise InputError(f"count = {count:g}: give a whole number of blocks, 1 or more")
             contents = contents_of(given, rate, **answering)
             entries.append(ReportedBlock(name, contents, count=int(count)))
         except InputError as error:

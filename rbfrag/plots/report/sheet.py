@@ -66,7 +66,7 @@ def write_sheet(report: Report, title: str, date: str, target: Path) -> None:
     about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
     is_png = target.suffix.lower() == ".png"
     if len(report.entries) > 1 and is_png:
-        raise InputError(f"{target}: several blocks need several pages: write .pdf or .html")
+        raise InputError(f"{target}: several blocks require .pdf or .html")
     with rc_context(_RC), written_whole(target, "report") as path, path.open("wb") as stream:
         pages = _pages(report, title, date)
         if is_png:

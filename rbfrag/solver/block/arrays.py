@@ -38,14 +38,12 @@ def common_shape(given: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tu
         try:
             arrays[name] = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InputError(
-                f"{name} holds something that is not a number: {value!r:.80}"
-            ) from None
+            raise InputError(f"{name} has an element that is not a number: {value!r:.80}") from None
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise InputError(f"the shapes do not go together: {shapes}") from None
+        raise InputError(f"the shapes of the arrays are not compatible: {shapes}") from None
     return arrays, shape
 
 

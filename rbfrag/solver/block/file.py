@@ -72,14 +72,12 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
     source = Path(path)
     suffix = source.suffix.lower()
     if suffix not in (".toml", ".csv"):
-        raise InputError(f"{source}: a block file ends in .toml or .csv, not {suffix!r}")
+        raise InputError(f"{source}: unsupported block file: use .toml or .csv, not {suffix!r}")
     text = source_text(source, "a block file", _LARGEST_BYTES)
     stated = toml_document(text, source) if suffix == ".toml" else _from_csv(source, text)
     if gamma_deg is not None:
         if "gamma_deg" in stated:
-            raise InputError(
-                f"{source}: gamma_deg is stated in the file and given besides: give it once"
-            )
+            raise InputError(f"{source}: gamma_deg is in the file and given again: give it once")
         stated["gamma_deg"] = gamma_deg
     conditions = {key: stated.pop(key) for key in CONDITIONS if key in stated}
     if not isinstance(conditions.get("back_fracture", True), bool):
@@ -106,12 +104,12 @@ def _block(stated: dict[str, Any]) -> Block:
     unknown = sorted(keys - known)
     if unknown:
         raise InputError(
-            f"unknown key {unknown[0]!r}: a block file knows {', '.join(sorted(known))}, "
-            f"{', '.join(CONDITIONS)}"
+            f"unknown key {unknown[0]!r}: the keys of a block file are "
+            f"{', '.join(sorted(known))}, {', '.join(CONDITIONS)}"
         )
     forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
     given = ", ".join(sorted(keys)) or "none of them"
-    raise InputError(f"a block is given by exactly {forms}; the file states {given}")
+    raise InputError(f"a block is given by exactly one of {forms}; the file has {given}")
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:
@@ -129,12 +127,12 @@ def _from_csv(source: Path, text: str) -> dict[str, Any]:
             if header != ["x_m", "y_m", "contact"]:
                 raise InputError(
                     f"{where}: the columns are {','.join(row)}, but an outline has "
-                    "x_m,y_m,contact (the third one empty where a vertex is no contact)"
+                    "x_m,y_m,contact (contact empty for other vertices)"
                 )
         else:
             _vertex(stated, row, where)
     if header is None:
-        raise InputError(f"{source}: no outline: the first row names the columns x_m,y_m,contact")
+        raise InputError(f"{source}: no outline: the header must be x_m,y_m,contact")
     missing = [name for name in _CONTACTS if name not in stated]
     if missing:
         raise InputError(
@@ -153,7 +151,7 @@ def _comment(stated: dict[str, Any], text: str, where: str) -> None:
             f"{where}: unknown name {key!r}: use gamma_deg or one of {', '.join(CONDITIONS)}"
         )
     if key in stated:
-        raise InputError(f"{where}: {key} is stated twice")
+        raise InputError(f"{where}: {key} is given twice")
     if key == "back_fracture":
         truth = {"true": True, "false": False}
         stated[key] = truth.get(value.strip().lower(), value.strip())

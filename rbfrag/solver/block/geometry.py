@@ -121,9 +121,8 @@ class Block:
         t1, t3 = tan_deg(alpha1_deg, SCALAR), tan_deg(alpha3_deg, SCALAR)
         if not t1 < t3:
             raise InputError(
-                f"alpha1_deg = {alpha1_deg:.10g} is not below alpha3_deg = {alpha3_deg:.10g}: such "
-                "angles belong to no block (equal ones mean a base of no length); the heel lies "
-                "upslope of the toe, -90 < alpha1_deg < alpha3_deg < 90"
+                f"alpha1_deg = {alpha1_deg:.10g} is not below alpha3_deg = {alpha3_deg:.10g}: the "
+                "heel lies upslope of the toe, -90 < alpha1_deg < alpha3_deg < 90"
             )
         return _parallelogram(alpha1_deg, alpha3_deg, t1, t3, r3_m / math.sqrt(1.0 + t3 * t3))
 
@@ -147,9 +146,9 @@ class Block:
         t1, t3 = tangents_from_spacings(s1_m, s2_m, gamma_deg, SCALAR)
         if not (t1 < t3 and math.isfinite(t1) and math.isfinite(t3)):
             raise InputError(
-                f"s1_m = {s1_m:g}, s2_m = {s2_m:g} and gamma_deg = {gamma_deg:.10g} make a sliver "
-                "whose base or thickness vanishes: use spacings of similar size and an angle "
-                "further from 0 and 180"
+                f"s1_m = {s1_m:g}, s2_m = {s2_m:g} and gamma_deg = {gamma_deg:.10g} give a block "
+                "without thickness: use spacings of similar size and an angle further from 0 and "
+                "180"
             )
         alpha1_deg, alpha3_deg = math.degrees(math.atan(t1)), math.degrees(math.atan(t3))
         return _parallelogram(alpha1_deg, alpha3_deg, t1, t3, 0.5 * s1_m, gamma_deg)
@@ -365,7 +364,7 @@ def _parallelogram(
     extremes = (block.area_m2, block.inertia_m2, block.p2, block.r1_m) if h > 0.0 else (h,)
     if not all(math.isfinite(number) and number > 0.0 for number in extremes):
         raise InputError(
-            f"a block with r3 = {block.r3_m:g} m and S1 = {2.0 * h:g} m is beyond arithmetic: "
-            "give metres"
+            f"a block with r3 = {block.r3_m:g} m and S1 = {2.0 * h:g} m is out of range: give "
+            "metres"
         )
     return block

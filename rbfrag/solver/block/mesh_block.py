@@ -360,7 +360,7 @@ def mesh_block(
             inside of the contacts' hull, so that the block would not rest like this.
     """
     if up not in PLAN_AXES:
-        raise InputError(f"up = {up!r}: name the axis of the mesh that points up, x, y or z")
+        raise InputError(f"up = {up!r}: it must be x, y or z, the axis of the mesh that points up")
     contact_mm = positive(contact_mm, "contact_mm", "mm")
     if density_kg_m3 is not None:
         density_kg_m3 = positive(density_kg_m3, "density_kg_m3", "kg/m³")

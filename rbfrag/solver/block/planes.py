@@ -167,8 +167,8 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
             remarks.append(Diagnostic(text, "cross_tilt_neglected"))
             continue
         raise InputError(
-            f"the {name} {plane} strikes {off:.0f} deg off the face {face}, and a section is good "
-            f"to {STRIKE_DEG:g} deg{_wedge(line, face)}",
+            f"the {name} {plane} strikes {off:.0f} deg off the face {face}, more than the "
+            f"{STRIKE_DEG:g} deg allowed for a section{_wedge(line, face)}",
             fields=(name, "face"),
         )
     beta = base.trace_deg(azimuth)
@@ -184,8 +184,8 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
         return Section(beta, None, base.spacing_factor(azimuth), 1.0, tuple(remarks))
     if (between := _between_deg(base, back)) < _APART_DEG:
         raise InputError(
-            f"base {base} and back {back} are {between:.1f} deg apart: with less than "
-            f"{_APART_DEG:g} deg they make no block",
+            f"base {base} and back {back} are {between:.1f} deg apart: at least {_APART_DEG:g} "
+            "deg are required",
             fields=("base", "back"),
         )
     gamma = round(back.trace_deg(azimuth) % 180.0 - beta, 10)

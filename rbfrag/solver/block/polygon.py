@@ -72,7 +72,7 @@ def checked_polygon(vertices: object) -> tuple[Point, ...]:
         raise InputError(f"a polygon block has at least 3 vertices, not {count}")
     size = extent_m(points)
     if not 1e-60 < size < 1e60 or any(abs(number) > 1e60 for point in points for number in point):
-        raise InputError(f"vertices that span {size:g} m are beyond arithmetic: give metres")
+        raise InputError(f"vertices that span {size:g} m are out of range: give metres")
     for i, (a, b) in enumerate(_edges(points)):
         if math.dist(a, b) <= 1e-9 * size:
             j = (i + 1) % count

@@ -60,7 +60,7 @@ def polygon_contacts(
     toe = _vertex(points, toe, "toe")
     if len({heel, back, toe}) < 3:
         raise InputError(
-            f"heel = {heel}, back = {back}, toe = {toe}: the three contacts are three vertices"
+            f"heel = {heel}, back = {back}, toe = {toe}: they must be three different vertices"
         )
     tolerance = CONTACT_TOLERANCE * extent_m(points)
     _check_base(points, heel, toe, tolerance)

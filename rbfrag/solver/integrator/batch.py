@@ -59,7 +59,7 @@ def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Ru
             np.asarray(p2, dtype=np.float64), np.asarray(kr, dtype=np.float64)
         )
     except ValueError as error:
-        raise InputError(f"p2 and kr must be numbers of shapes that go together: {error}") from None
+        raise InputError(f"p2 and kr must be numbers of compatible shapes: {error}") from None
     for name, values in (("p2", sizes), ("kr", strengths)):
         wrong = ~(np.isfinite(values) & (values > 0.0))
         if wrong.any():

@@ -39,10 +39,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
     block = site.block
     assert block is not None
     if not site.back_fracture or not block.confines:
-        raise InputError(
-            "a block that no overhanging plane confines topples freely: the model of toppling "
-            "describes it"
-        )
+        raise InputError("without an overhanging plane the block topples freely: use kind toppling")
     rocking = rocking_equation(block, site.beta_rad, site.phi_rad, site.push)
     # where the base edge is normal to the back plane, and where the front face lies on the base
     square, flat = free_from(block), block.on_front_face_rad

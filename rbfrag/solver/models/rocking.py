@@ -70,11 +70,10 @@ def free_block(site: BlockOnPlanes) -> FreeBlock:
     """
     given = site.settings.get("restitution")
     if given is not None:
-        given = number(given, "restitution", "the ratio of speeds after and before an impact")
+        given = number(given, "restitution", "the coefficient of restitution")
         if not 0.0 < given <= 1.0:
             raise InputError(
-                f"restitution = {given:g}: give the speed after an impact over that before it, "
-                "above 0 and up to 1"
+                f"restitution = {given:g}: give the coefficient of restitution, above 0 and up to 1"
             )
     if site.block is None:
         assert site.p2 is not None
@@ -112,8 +111,8 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
     for falls, name, balance in balances:
         if balance <= 0.0:
             raise InputError(
-                f"the block falls {falls} at rest: {name} = {math.degrees(balance):.6g} degrees is "
-                "not above zero, and no earthquake decides about it"
+                f"the block overturns {falls} at rest: {name} = {math.degrees(balance):.6g} "
+                "degrees is not above zero"
             )
     for _, name, balance in balances:
         if balance >= 0.5 * math.pi:
@@ -209,7 +208,7 @@ class Rocking(Kind):
     def _block(self, site: BlockOnPlanes) -> FreeBlock:
         if site.cohesive:
             raise InputError(
-                f"cohesion_pa does not go with {self.kind}: the block lifts off its base"
+                f"cohesion_pa cannot be combined with {self.kind}: the block lifts off its base"
             )
         return free_block(site)
 

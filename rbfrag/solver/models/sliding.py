@@ -70,7 +70,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
     if two_way and not phi + beta < 0.5 * math.pi:
         raise InputError(
             f"phi + beta = {math.degrees(phi + beta):g} degrees: no acceleration slides the block "
-            "up the base; leave two_way out"
+            "up the base; omit two_way"
         )
     forward = _equation(site, 1.0)
     start = site.centroid_m

@@ -50,11 +50,11 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
     block = site.block
     assert block is not None
     if not site.back_fracture:
-        raise InputError("a block without a plane behind it cannot slump: it turns over backward")
+        raise InputError("a block without a back plane cannot slump")
     if block.lowest_on_back != block.heel:
         raise InputError(
-            "slumping in time is known for blocks whose heel lies on the back plane: the corner "
-            "at the heel of this outline is missing"
+            "slumping in time requires a block whose heel lies on the back plane: this outline "
+            "has no corner at the heel"
         )
     # past recovery: the back edge lies on the base, with a forward angle α1 + γ > φ1
     flat = block.on_back_edge_rad

@@ -100,7 +100,7 @@ class Toppling(Kind):
         if block is not None:
             options["p2"] = block.p2
         if "p2" not in options:
-            raise InputError("p2 is missing: the critical block is searched for one p² [1/s²]")
+            raise InputError("p2 is missing: the critical strength is computed for one p² [1/s²]")
         return critical(motion, kind=self.kind, **options)
 
 

@@ -188,8 +188,7 @@ class ScaledKind(MechanismKind):
         for name in ("block", "beta_deg", "phi_deg"):
             if options.get(name) is None:
                 raise InputError(
-                    f"{name} is missing: shape, friction and dip of a block decide about "
-                    f"{self.kind}"
+                    f"{name} is missing: {self.kind} requires geometry, friction and dip of a block"
                 )
         rules = scan_rules(
             search_limit, options.pop("scan_ratio", SCAN_RATIO), options.pop("bracket", BRACKET)

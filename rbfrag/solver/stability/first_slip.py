@@ -28,7 +28,7 @@ _ENDS = (
     " ends with the first slip (yield {k:.4g} g, {mode}), and no displacement or probability "
     f"follows from it: {STATE_RESIDUAL}"
 )
-ROUGH = f"jrc does not go with a probability or a time history of {{kind}}: roughness{_ENDS}"
+ROUGH = f"jrc cannot be combined with a probability or a time history of {{kind}}: roughness{_ENDS}"
 
 SLIPS_ON = (
     "after its first slip (yield {k:.4g} g, {mode}) the block does not stand on phi_residual_deg: "

@@ -244,7 +244,8 @@ class JointStrength:
 OF_ROUGHNESS = ("jrc", "jcs_mpa")
 
 NO_FRACTURE = (
-    "water_m does not go with a block without a back fracture: that is where the water stands"
+    "water_m cannot be combined with a block without a back fracture: that is where the water "
+    "stands"
 )
 
 NOT_OF_OUTLINES = (

@@ -83,7 +83,7 @@ def ks_after_rotation(
     if block.tan_alpha1 < planes.mu1:
         raise InputError(
             f"alpha1 = {block.alpha1_deg:.6g} degrees is below phi_deg = {phi_deg:.6g}: the block "
-            "does not slump, so that it has no k_s"
+            "does not slump, so it has no k_s"
         )
 
     def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
@@ -131,7 +131,7 @@ def kct_after_rotation(
         raise InputError(
             f"alpha3 = {block.alpha3_deg:.6g}, gamma = {block.gamma_deg:.6g} and phi_deg = "
             f"{phi_deg:.6g} degrees: the block does not topple against its back plane (that takes "
-            "gamma above 90 and alpha3 not above phi_deg), so that it has no k_ct"
+            "gamma above 90 and alpha3 not above phi_deg), so it has no k_ct"
         )
 
     def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:

@@ -313,7 +313,10 @@ def judged(
     Arguments as for :func:`stability`.
     """
     if not isinstance(block, Block):
-        raise InputError(f"block = {block!r}: make one with Block.from_angles or its siblings")
+        raise InputError(
+            f"block = {block!r}: use Block.rectangle, .from_angles, .from_fractures or "
+            ".from_polygon"
+        )
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
     phi_deg = friction_angle(phi_deg, "phi_deg")
     phi_back_deg = phi_deg if phi_back_deg is None else friction_angle(phi_back_deg, "phi_back_deg")
@@ -461,19 +464,19 @@ def refuse_undecided(judged: Stability) -> None:
     """Refuse a block whose fate at rest leaves nothing to a ground motion.
 
     Raises:
-        InputError: it fails at rest, or no horizontal acceleration moves it.
+        InputError: it fails at rest, or it does not move under any horizontal acceleration.
     """
     k = judged.yield_acceleration
     if judged.state == "locked":
         raise InputError(
-            f"the block is locked in its mode, {words_of_mode(judged.mode)}: no horizontal "
-            "acceleration moves it"
+            f"the block is locked in its mode, {words_of_mode(judged.mode)}: it does not move "
+            "under any horizontal acceleration"
         )
     if judged.state == "unstable" or k <= 0.0:
         name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(judged.mode, "k_ct")
         raise InputError(
-            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, "
-            f"{name} = {k:.4g} g): no earthquake decides about it"
+            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, {name} = "
+            f"{k:.4g} g)"
         )
 
 

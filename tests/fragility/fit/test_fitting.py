@@ -214,7 +214,7 @@ def test_no_scatter_is_refused_by_the_method_that_is_chosen_too(draw):
 
 def test_no_mean_period_at_all_is_refused(draw):
     table = draw(events=5)
-    with pytest.raises(FitError, match=r"needs the mean period.*fit the term pgv"):
+    with pytest.raises(FitError, match=r"requires the mean period.*fit the term pgv"):
         fit(replace(table, tm_s=np.full(table.p2.size, np.nan)), term="pga_tm")
 
 

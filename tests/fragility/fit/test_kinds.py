@@ -135,13 +135,13 @@ def test_what_does_not_go_together_is_refused() -> None:
     source = drawn("sliding", "pgv_pga", n=100)
     with pytest.raises(InputError, match="unknown kind 'falling'"):
         fit(source, kind="falling", term="pgv")
-    with pytest.raises(InputError, match=r"method confined does not go with the term pgv:"):
+    with pytest.raises(InputError, match=r"method confined cannot be combined with the term pgv:"):
         fit(source, kind="confined_toppling", term="pgv")
-    with pytest.raises(InputError, match=r"wls fits blocks known by p2 and kr.*by displacement"):
+    with pytest.raises(InputError, match=r"wls fits blocks with p2 and kr.*by displacement"):
         fit(source, kind="sliding", term="pgv", method="wls")
-    with pytest.raises(InputError, match=r"displacement does not go with the term xp"):
+    with pytest.raises(InputError, match=r"displacement cannot be combined with the term xp"):
         fit(source, kind="sliding", term="xp")
-    with pytest.raises(InputError, match="no failure of blocks of kind sliding"):
+    with pytest.raises(InputError, match="not a failure criterion of kind sliding"):
         fit(source, kind="sliding", term="pgv", rotation_deg=2.0)
     with pytest.raises(InputError, match="keeps M = 1"):
         fit(source, kind="sliding", term="pgv", estimate_m=True)

@@ -72,7 +72,7 @@ def test_the_built_in_data_are_fitted_where_there_is_no_database(
     assert (tmp_path / "built-in.db").read_bytes() == before
     assert rbfrag.read_table("motion").equals(rbfrag.read_table("motion", db="built-in.db"))
     said = shell("models", "default", "wls-pgv", expect=2).stderr
-    assert "the built-in data set is read only: name the model with --model wls-pgv" in said
+    assert "the built-in data set is read-only: use --model wls-pgv" in said
 
 
 def test_schema_and_name_are_checked_before_anything_is_computed(
@@ -87,9 +87,9 @@ def test_schema_and_name_are_checked_before_anything_is_computed(
         raise AssertionError("the data were read")
 
     monkeypatch.setattr(fitting, "read_source", read_source)
-    with pytest.raises(SchemaVersionError, match="has schema 0008, this rbfrag needs 0009"):
+    with pytest.raises(SchemaVersionError, match="has schema 0008, this rbfrag requires 0009"):
         rbfrag.fit("older.db", term="pgv")
-    with pytest.raises(rbfrag.InputError, match="there is a model 'wls-pgv' already"):
+    with pytest.raises(rbfrag.InputError, match="the model 'wls-pgv' exists"):
         rbfrag.fit("own.db", term="pgv", method="wls")
     with pytest.raises(AssertionError, match="the data were read"):
         rbfrag.fit("own.db", term="pgv", method="wls", replace=True)

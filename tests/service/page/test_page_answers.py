@@ -142,7 +142,7 @@ def test_what_the_chart_lacks_takes_no_answer_away(open_page):
 def test_a_busy_service_is_asked_again(open_page):
     opened = open_page()
     page = opened.page
-    problem = '{"title": "Busy", "status": 503, "detail": "other requests are being worked on"}'
+    problem = '{"title": "Busy", "status": 503, "detail": "the service is busy"}'
     busy = True
 
     def answer(route):
@@ -153,7 +153,7 @@ def test_a_busy_service_is_asked_again(open_page):
 
     page.context.route("**/v1/**", answer)
     page.fill("#pgv", "1.2")
-    expect(page.locator("#unreachable")).to_contain_text("other requests are being worked on")
+    expect(page.locator("#unreachable")).to_contain_text("the service is busy")
     busy = False
     expect(page.locator("#unreachable")).to_be_hidden()
     opened.settled()
@@ -316,7 +316,7 @@ def test_what_may_be_thousands_is_refused(open_page, typed):
     page = opened.page
     page.fill("#pgv", typed)
     said = page.locator("#pgv-error")
-    expect(said).to_have_text(re.compile("write decimals after a point and nothing"))
+    expect(said).to_have_text(re.compile("use a decimal point and no thousands separator"))
     assert typed in said.text_content()
     expect(page.locator("#probability")).to_have_attribute("data-state", "none")
     page.fill("#pgv", "0.6")

@@ -157,7 +157,7 @@ SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
         ({"heel": -1}, ["heel = -1", "0 to 3"]),
         ({"toe": 1.0}, ["toe = 1.0"]),
         ({"back": True}, ["back = True"]),
-        ({"back": 1}, ["three vertices"]),
+        ({"back": 1}, ["three different vertices"]),
         ({"heel": 1, "toe": 0}, ["downslope"]),
         ({"toe": 2, "back": 3}, ["tolerance", "base plane"]),
         ({"gamma_deg": 0.0}, ["gamma_deg = 0", "0 and 180"]),

@@ -71,7 +71,7 @@ def test_gamma_from_outside(tmp_path: Path) -> None:
     text = CSV.replace("# gamma_deg = 90\n", "")
     path = write(tmp_path, "a.csv", text)
     assert read_block(path, gamma_deg=90.0).block.gamma_deg == 90.0
-    with pytest.raises(InputError, match="the file states back, heel, toe, vertices_m"):
+    with pytest.raises(InputError, match="the file has back, heel, toe, vertices_m"):
         read_block(path)
     with pytest.raises(InputError, match="give it once"):
         read_block(write(tmp_path, "b.csv", CSV), gamma_deg=90.0)

@@ -58,7 +58,7 @@ def test_a_batch_of_none_is_empty() -> None:
 @pytest.mark.parametrize(
     ("p2", "kr", "words"),
     [
-        ([1.0, 2.0], [0.1, 0.2, 0.3], "go together"),
+        ([1.0, 2.0], [0.1, 0.2, 0.3], "compatible shapes"),
         ([1.0, -2.0], 0.1, "p2 must be positive finite numbers, not -2"),
         (1.0, [0.1, math.nan], "kr must be positive finite numbers, not nan"),
         ("x", 0.1, "must be numbers"),

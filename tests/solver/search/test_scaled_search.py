@@ -224,9 +224,12 @@ def test_scales_too_close_to_failure_lie_inside_the_bracket() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"kind": "toppling", "rotation_deg": 2.0}, "rotation_deg does not go with toppling"),
+        (
+            {"kind": "toppling", "rotation_deg": 2.0},
+            "rotation_deg cannot be combined with toppling",
+        ),
         ({"kind": "sliding"}, "displacement_m is missing"),
-        ({"full_map": True}, "full_map does not go with slumping"),
+        ({"full_map": True}, "full_map cannot be combined with slumping"),
         ({"kind": "confined_toppling"}, "its mode is slump"),
         ({"rotation_deg": 0.0}, "above zero"),
         ({"scan_ratio": 1.0}, "above 1"),

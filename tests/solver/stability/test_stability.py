@@ -354,5 +354,5 @@ def test_bad_input(change: dict[str, Any], word: str) -> None:
 
 
 def test_what_is_no_block() -> None:
-    with pytest.raises(InputError, match=r"Block\.from_angles"):
+    with pytest.raises(InputError, match=r"Block\.rectangle"):
         stability((10.0, 40.0, 1.0), beta_deg=0.0, phi_deg=35.0)  # type: ignore[arg-type]
