@@ -70,7 +70,7 @@ def test_an_extrapolation_is_said_and_its_reasons_are_the_services(open_page, as
     ("field", "text", "words"),
     [
         ("pgv", "abc", "Peak ground velocity PGV = 'abc' is not a number"),
-        ("kr", "-0.1", "Rocking acceleration coefficient kr = -0.1 is not above zero"),
+        ("kr", "-0.1", "Uplift acceleration coefficient kr = -0.1 is not above zero"),
         ("p2", "", "Frequency parameter p² is missing"),
         ("level", "2", "level"),
         ("pgv", "-1", "Peak ground velocity PGV = -1 m/s is negative"),
