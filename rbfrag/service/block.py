@@ -38,7 +38,7 @@ def add_routes(routes: APIRouter) -> None:
         shape = on_planes(query.given())
         result = stability(shape.block, **shape.planes)
         warnings = tuple(dict.fromkeys((*shape.remarks, *result.warnings)))
-        return replace(result, warnings=warnings).as_dict()
+        return replace(result, warnings=warnings).document(text=query.text)
 
     @routes.get(
         "/v1/drawing",
@@ -60,7 +60,7 @@ def add_routes(routes: APIRouter) -> None:
         return {
             "kind": kind,
             "numbers": numbers,
-            "block": result.as_dict(),
+            "block": result.document(text=True),
             "rectangle_r3_m": rectangle_r3_m(body.p2),
             "outline_m": lines.outline,
             "contacts_m": lines.contacts,

@@ -198,13 +198,8 @@ class JointAnswer(_Document):
 
 
 @keys_of(Stability, Block, names=KEYS)
-class BlockAnswer(_Document):
-    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply.
-
-    `diagnostics`, the warnings with their codes, are missing in the answer of /v1/drawing.
-    """
-
-    diagnostics: list[DiagnosticDocument] | None = None
+class BlockAnswer(_Answer):
+    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply."""
 
     ky: float | None
     yield_acceleration: float | None

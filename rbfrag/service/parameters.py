@@ -144,7 +144,7 @@ _QUESTION = (*_BLOCK, *SHAKING, *REQUEST)
 
 
 @asking(*_AT_REST, examples={"s1": 1.0, "s2": 0.6, "gamma": 25.0, "beta": 20.0, "phi": 40.0})
-class BlockQuery(Parameters):
+class BlockQuery(Answered):
     """Parameters of `/v1/block`."""
 
 

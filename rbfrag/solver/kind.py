@@ -177,7 +177,5 @@ class Kind(KindFacts):
         """Refuse an option that is not among the kind's own."""
         foreign = sorted(set(given) - set(own))
         if foreign:
-            raise InputError(
-                f"{foreign[0]} cannot be combined with {self.kind}, whose options are "
-                f"{' and '.join(own) or 'none'}"
-            )
+            remedy = f"its options are {' and '.join(own)}" if own else "omit it"
+            raise InputError(f"{foreign[0]} cannot be combined with {self.kind}: {remedy}")

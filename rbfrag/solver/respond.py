@@ -318,10 +318,10 @@ def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
     given = {name: value for name, value in settings.items() if value is not None}
     unknown = sorted(set(given) - set(model.settings))
     if unknown:
-        understood = " and ".join(model.settings) or "no such option"
+        supported = " and ".join(model.settings)
+        remedy = f"its options are {supported}" if supported else "omit it"
         raise InputError(
-            f"{unknown[0]} cannot be combined with kind {model.kind}, whose options are "
-            f"{understood}",
+            f"{unknown[0]} cannot be combined with kind {model.kind}: {remedy}",
             fields=(unknown[0],),
         )
     return given

@@ -204,7 +204,9 @@ def test_refusals(refuses: Callable[..., str], options: tuple[str, ...], words: 
 
 @pytest.mark.usefixtures("database")
 def test_the_suffix_is_checked_first(refuses: Callable[..., str]) -> None:
-    assert "none of .xml" in refuses("export", "nrml", "--p2", "3", "--kr", "1", "--out", "a.csv")
+    assert "unsupported suffix '.csv'; use .xml" in refuses(
+        "export", "nrml", "--p2", "3", "--kr", "1", "--out", "a.csv"
+    )
 
 
 def test_the_measures_that_work_are_named_and_no_others(refuses: Refuses) -> None:

@@ -135,4 +135,6 @@ def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> 
     assert "--template cannot be combined with --height" in refuses(
         "block", "--template", name, "--height", "2"
     )
-    assert "none of .xlsx, .csv" in refuses("block", "--template", "a.parquet")
+    assert "unsupported suffix '.parquet'; use .xlsx, .csv" in refuses(
+        "block", "--template", "a.parquet"
+    )

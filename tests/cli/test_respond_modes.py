@@ -69,9 +69,12 @@ def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> No
         (("--ky", "1e9", "--beta", "80"), "friction angle"),
         (("--ky", "0.1", "--kind", "slumping"), "requires the geometry"),
         (("--p2", "3", "--kr", "0.1", "--kind", "sliding"), "requires the geometry"),
-        (("--p2", "3", "--kr", "0.1", "--two-way"), "--two-way cannot be combined with toppling"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--two-way"),
+            "--two-way cannot be combined with kind toppling",
+        ),
         (("--p2", "3", "--kr", "0.1", "--beta", "3"), "--beta cannot be combined with --p2"),
-        ((*SLUMP, "--two-way"), "--two-way cannot be combined with slumping"),
+        ((*SLUMP, "--two-way"), "--two-way cannot be combined with kind slumping"),
         ((*SLUMP, "--exaggerate", "3"), "--exaggerate requires --film"),
         ((*SLUMP, "--kind", "rolling"), "unknown kind 'rolling'"),
         ((*SLUMP, "--kind", "confined_toppling"), "topples freely"),
@@ -202,4 +205,4 @@ def test_toe_and_modes_are_in_the_answer(shell: Shell, record: Path) -> None:
 def test_yields_over_a_rotation_are_dry(refuses: Refuses) -> None:
     Path("wet.toml").write_text(BLOCK_FILE)
     said = refuses("plot", "rotation", "--block", "wet.toml", "--out", "a.png")
-    assert "cannot be combined with yields over a rotation" in said
+    assert "cannot be combined with the yield over a rotation" in said

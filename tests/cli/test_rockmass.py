@@ -157,7 +157,7 @@ def test_a_chart_of_a_table_is_that_of_its_rock_mass(shell: Shell, mass: Path) -
     shell(*common, "--rockmass", mass, "--out", "a.png")
     result = shell(*common, "--blocks", "blocks.csv", "--out", "b.png")
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
-    assert "5 of 20000 rows are no block" in result.stdout
+    assert "5 of 20000 rows have invalid angles" in result.stdout
     shell(*common, "--out", "c.png")
     assert Path("c.png").read_bytes() != Path("a.png").read_bytes()
 
@@ -187,9 +187,9 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--model", "line"), "--model requires an intensity measure"),
         (("mass.toml", "--db", "a.db"), "--db requires a motion or an intensity measure"),
         (("mass.toml", "--pgv", "1", "--level", "2"), "level = 2.0"),
-        (("mass.toml", "--out", "a.xls"), "none of .csv, .xlsx, .parquet"),
+        (("mass.toml", "--out", "a.xls"), "unsupported suffix '.xls'; use .csv, .xlsx, .parquet"),
         (("mass.toml", "--out", "none/a.csv"), "create the folder none"),
-        (("mass.toml", "--plot", "a.gif"), "none of .png"),
+        (("mass.toml", "--plot", "a.gif"), "unsupported suffix '.gif'; use .png"),
         (("none.toml",), "no such file"),
         (("steep.toml", "--pgv", "1", "--db", "none.db"), "none.db"),
     ],

@@ -140,7 +140,7 @@ def test_no_geotiff_of_what_is_no_grid(shell: Shell, refuses: Refuses, grid: Pat
     pytest.importorskip("rasterio", reason="the extra gis is not installed")
     Path("b.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,20.0,40.5\n")
     message = refuses("shakemap", grid, "--blocks", "b.csv", "--out", "a.tif")
-    assert "places of their own" in message
+    assert "not for blocks with coordinates" in message
     grid.write_text(grid.read_text().replace("20.5 41.0", "20.7 41.0"))
     told = shell("shakemap", grid, *ONE, "--out", "a.tif", expect=2).stderr
     assert "a regular grid" in told.splitlines()[-1]
@@ -182,7 +182,7 @@ def test_nodes_without_a_number_are_left_out_and_counted(shell: Shell, grid: Pat
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--out", "a.jp2"), "none of .geojson"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.jp2"), "unsupported suffix '.jp2'; use .geojson"),
         (
             ("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"),
             "component 'x'",

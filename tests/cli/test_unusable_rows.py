@@ -145,7 +145,7 @@ def test_answers_that_need_every_row_name_all_that_are_bad(
         "export": ("export", "nrml", *UNUSED, "--out", "a.xml"),
     }
     message = refuses(*asked[command], "--blocks", "b.csv")
-    assert "7 of 9 blocks cannot be used" in message
+    assert "7 of 9 blocks are invalid" in message
     assert "line 3 (block B)" in message
     assert "correct or remove these rows" in message
     assert len(message) < 500
@@ -163,7 +163,7 @@ def test_only_a_table_without_a_block_is_refused(shell: Shell, refuses: Refuses)
         ("losses", "job", "--blocks", "b.csv"),
     ):
         message = refuses(*asked)
-        assert "b.csv: none of 7 blocks can be used, the first 6: line 2" in message
+        assert "b.csv: none of 7 blocks is valid, the first 6: line 2" in message
         assert not Path("o.csv").exists()
 
 
@@ -235,7 +235,7 @@ def test_arrays_in_python_are_answered_as_tables() -> None:
     assert "element 1: kr = -0.1 is not above zero" in said
     with pytest.raises(rbfrag.InputError, match=r"^kr = -0\.1 is not above zero"):
         rbfrag.hazard("curve.csv", 3.0, -0.1)
-    with pytest.raises(rbfrag.InputError, match="none of 2 blocks can be used: element 0: p2 = 0"):
+    with pytest.raises(rbfrag.InputError, match="none of 2 blocks is valid: element 0: p2 = 0"):
         rbfrag.hazard("curve.csv", [0.0, np.nan], 0.1)
     with pytest.raises(
         rbfrag.InputError, match=r"2 of 4 blocks.*that all of them stand.*element 1.*element 2"

@@ -223,7 +223,7 @@ class TestRefusals:
     def test_another_kind_of_file(self, tmp_path: Path, content: bytes) -> None:
         path = tmp_path / "x.db"
         path.write_bytes(content)
-        with pytest.raises(NotADatabaseError, match="not SQLite's"):
+        with pytest.raises(NotADatabaseError, match="is not an SQLite database"):
             open_database(path, create=True)
         assert path.read_bytes() == content
 
@@ -239,9 +239,9 @@ class TestRefusals:
         raw.execute("CREATE TABLE motion (id INTEGER)")
         raw.close()
         before = path.read_bytes()
-        with pytest.raises(NotADatabaseError, match="not one of rbfrag's"):
+        with pytest.raises(NotADatabaseError, match="but not of rbfrag"):
             open_database(path, create=True)
-        with pytest.raises(NotADatabaseError, match="not one of rbfrag's"):
+        with pytest.raises(NotADatabaseError, match="but not of rbfrag"):
             upgrade_database(path)
         assert path.read_bytes() == before
 

@@ -128,7 +128,7 @@ def test_bad_rows_leave_the_others_as_they_are(
         with pytest.raises(InputError) as refusal:
             found.whole("all are asked about")
         message = str(refusal.value)
-        assert f"{len(bad)} of {len(rows)} blocks cannot be used, and all are asked" in message
+        assert f"{len(bad)} of {len(rows)} blocks are invalid, and all are asked" in message
         assert len(message) < 500
 
 

@@ -121,7 +121,7 @@ def test_an_ffmpeg_that_fails_is_told(
 @pytest.mark.parametrize(
     ("name", "exaggerate", "word"),
     [
-        ("film.avi", 1.0, "none of .gif, .mp4, .html"),
+        ("film.avi", 1.0, "unsupported suffix '.avi'; use .gif, .mp4, .html"),
         ("nowhere/film.gif", 1.0, "create the folder"),
         ("film.gif", 0.0, "exaggerate = 0"),
     ],

@@ -206,7 +206,7 @@ def test_a_shape_names_its_mode_and_answers_by_it(open_page, ask):
     page.get_by_label("angles", exact=True).check()
     opened.settled()
     block = ask("v1/block", alpha1=-15, alpha3=24, r3=2.5, beta=18, phi=38)
-    expect(page.locator("#block-words")).to_contain_text("topples about its toe")
+    expect(page.locator("#block-words")).to_contain_text("Uplift acceleration")
     expect(page.locator("#block .outline.topple")).to_have_count(1)
     answer = ask("v1/predict", p2=block["p2"], kr=block["kr"], pgv=0.6)
     assert agrees(probability_shown(page), answer["probability"])

@@ -8,25 +8,12 @@ import { writeText } from "./subscripts.js";
 
 const MARGINS = { left: 8, right: 8, top: 14, bottom: 30 };
 
-/** What a block does in each mode. */
-const DOES = {
-  slide: "slides on its base",
-  topple: "topples about its toe (contact 3)",
-  slump: "slumps: it rotates backwards while its toe slides out",
-  confined_topple: "topples under its overhanging back plane (confined toppling)",
-};
-
 /**
- * How a block fails, in one sentence.
- * @param {any} block answer of /v1/block
+ * How a block fails, in the words of `rbfrag block`.
+ * @param {any} block of an answer of /v1/drawing
  */
 function inWords(block) {
-  const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
-  if (block.state === "locked")
-    return `Locked: no horizontal acceleration moves it; else it ${does}.`;
-  if (block.state === "unstable") return `Unstable: it ${does} without an earthquake.`;
-  const from = quantity(block.yield_acceleration, "g");
-  return `It ${does}, from a horizontal acceleration of ${from}.`;
+  return block.text.sentences[0];
 }
 
 /**
@@ -36,7 +23,7 @@ function inWords(block) {
 export function whyNoAnswer({ block, numbers }) {
   if (numbers || block.state === "unstable") return "";
   const words = inWords(block);
-  return block.state === "stable" ? `${words} No fragility model answers for it.` : words;
+  return block.state === "stable" ? `${words}. No fragility model answers for it.` : words;
 }
 
 /**
