@@ -157,7 +157,7 @@ def find_model(
         if name not in given:
             raise InputError(
                 f"model {chosen.name!r} requires {' and '.join(chosen.term.inputs)} "
-                f"({chosen.term.title}), not {_measures(given)}: add it, or choose a model of "
+                f"({chosen.term.title}); given: {_measures(given)}. Add it, or choose a model of "
                 "another term",
                 fields=INTENSITY,
             )
@@ -331,7 +331,7 @@ def _failure(rotation_deg: float | None) -> str:
 
 
 def _measures(given: Collection[str]) -> str:
-    return " and ".join(name for name in given if name in MEASURES) or "nothing about the motion"
+    return " and ".join(name for name in given if name in MEASURES) or "no intensity measure"
 
 
 def _of_row(row: ModelRow) -> FragilityModel:

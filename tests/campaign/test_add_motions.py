@@ -253,7 +253,7 @@ def test_a_file_that_the_metadata_name_is_missing(tmp_path: Path, db: Path) -> N
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ("file,trace_index\na.V1,3\n", "trace 3, but the file holds 2"),
+        ("file,trace_index\na.V1,3\n", "trace_index 3, but the file has 2 traces"),
         ("file,trace_index,units\na.V1,0,g\na.V1,1,m/s2\n", "lines 2, 3 of the metadata"),
         ("file,trace_index,dt_s\na.V1,0,0.02\na.V1,1,0.01\n", "state dt_s 0.01 and 0.02"),
         ("file,trace_index,dt_s\na.V1,0,0.01\n", "not 0.01"),

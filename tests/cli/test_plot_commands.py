@@ -53,8 +53,10 @@ def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_pat
     text = path.read_text(encoding="utf-8")
     assert "peak ground acceleration, PGA [g]" in text
     assert "PGV = 0.6 m/s" in text
-    assert "runs over pgv, pga, pgd, sa10" in refuses("plot", "curve", *block, "--over", "cav")
-    assert "pgv_m_s is what the curve runs over" in refuses("plot", "curve", *block, "--pgv", "0.6")
+    assert "over = cav: use pgv, pga, pgd, sa10" in refuses(
+        "plot", "curve", *block, "--over", "cav"
+    )
+    assert "pgv_m_s is the axis of the curve" in refuses("plot", "curve", *block, "--pgv", "0.6")
 
 
 def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:

@@ -112,8 +112,8 @@ def test_what_does_not_fit_is_refused(
 def test_a_block_of_another_mode_is_refused(refuses: Refuses, block: Path) -> None:
     block.write_text(SLIDE)
     asked = ("predict", "--block", block, *MOTION)
-    assert "its mode is slide" in refuses(*asked, "--kind", "slumping")
-    assert "state --displacement" in refuses(*asked)
+    assert "the failure mode is slide" in refuses(*asked, "--kind", "slumping")
+    assert "give --displacement" in refuses(*asked)
     block.write_text(SLUMP)
     distance = ("--displacement", "0.1")
     assert "its mode is slump" in refuses(*asked, "--kind", "sliding", *distance)

@@ -113,7 +113,7 @@ def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:
         (("--p2", "7", "--kr", "0.2", "--restitution", "1.2"), "restitution = 1.2"),
         (("--p2", "7", "--kr", "0.2", "--restitution", "0"), "restitution = 0"),
         (("--height", "2", "--width", "3.2"), "comes to rest at its first impact"),
-        (("--height", "2", "--width", "1", "--phi", "10"), "its mode is slide"),
+        (("--height", "2", "--width", "1", "--phi", "10"), "the failure mode is slide"),
     ],
 )
 def test_what_is_no_free_standing_block_is_refused(

@@ -69,7 +69,7 @@ class TestStore:
         with engine.begin() as connection:
             save_model(connection, replace(model, is_default=True))
             save_model(connection, replace(model, name="other"))
-            with pytest.raises(InputError, match="already"):
+            with pytest.raises(InputError, match="exists: choose another name"):
                 save_model(connection, replace(model, term="pga_tm"))
             assert load_model(connection).term == "pgv"
             replaced = save_model(connection, replace(model, term="pga_tm"), replace=True)

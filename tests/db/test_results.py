@@ -193,7 +193,7 @@ class TestTables:
     def test_suite(self, filled: Engine) -> None:
         with filled.connect() as connection:
             assert len(combination_table(connection, suite="s").p2) == 4
-            with pytest.raises(InputError, match="no suite 't'"):
+            with pytest.raises(InputError, match="unknown suite 't'"):
                 combination_table(connection, suite="t")
 
     def test_empty(self, engine: Engine) -> None:

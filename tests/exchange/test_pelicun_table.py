@@ -111,7 +111,7 @@ HEAD = (
         (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,1,,\n", "Theta_1: '' is not"),
         (HEAD + "a,0,Peak Ground Velocity,mps,0,0,gamma,1,1,\n", "family 'gamma' is not supported"),
         (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"1,2",,\n', "levels|probab"),
-        (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"2,1|0,1",,\n', "must rise"),
+        (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"2,1|0,1",,\n', "must increase"),
     ],
 )
 def test_bad_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:

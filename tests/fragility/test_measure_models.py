@@ -125,7 +125,7 @@ def test_retired_models_name_their_successors(name: str, successor: str) -> None
 
 def test_a_stored_model_of_a_retired_form_names_its_successor() -> None:
     row = model_row("pgv", name="mine", method="bounded")
-    with pytest.raises(ModelError, match=r"'mine' is of a form .*: use bounded-pgv_kr"):
+    with pytest.raises(ModelError, match=r"'mine' has an obsolete form: use bounded-pgv_kr"):
         FragilityModel.from_row(row)
 
 

@@ -179,7 +179,7 @@ def broken(source: FitSource, kind: str) -> FitSource:
     ("kind", "words"),
     [
         ("none", "none are stored: simulate kind toppling"),
-        ("all alike", "0 toppled.*all alike"),
+        ("all alike", "0 toppled.*identical outcomes"),
         ("separated", "separated without error"),
         ("few", "7 outcomes on the grid toppled; a fit requires 20"),
     ],

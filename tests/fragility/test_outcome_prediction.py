@@ -196,7 +196,7 @@ def test_a_motion_is_answered_by_its_spectrum():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"pgv_m_s": 0.3}, "pgv_m_s given beside a motion"),
+        ({"pgv_m_s": 0.3}, "pgv_m_s cannot be combined with a motion"),
         ({"polarity": "up"}, "polarity = 'up'"),
         ({"p2": [3.0, 1.0]}, "single numbers with a motion"),
         ({"p2": -3.0}, "p2 = -3 1/s² is not above zero"),

@@ -198,10 +198,10 @@ def test_a_motion_answers_for_every_kind() -> None:
         ({"displacement_m": 0.0}, "displacement_m = 0 m is not above zero"),
         ({"displacement_m": None}, "displacement_m is missing"),
         ({"pgv_m_s": -1.0}, "pgv_m_s = -1 m/s is negative"),
-        ({"pga_g": None}, "needs pgv_m_s and pga_g"),
+        ({"pga_g": None}, "requires pgv_m_s and pga_g"),
         ({"level": 2}, "level"),
         ({"ky": "0.1"}, "ky = '0.1' is not a number"),
-        ({"ky": None, "displacement_m": None, **SLUMP}, "of kind sliding: it reads ky and"),
+        ({"ky": None, "displacement_m": None, **SLUMP}, "of kind sliding: it uses ky and"),
         ({"kr": 0.1}, "kr cannot be combined with kind sliding"),
         ({"kind": "slumping"}, "of kind sliding, not slumping"),
         ({"rotation_deg": 2.0}, "rotation_deg is not a failure criterion"),
@@ -215,7 +215,7 @@ def test_what_cannot_be_answered_is_refused(changes: dict[str, Any], words: str)
 
 def test_a_model_of_another_rotation_is_refused() -> None:
     asked: dict[str, Any] = {**SLUMP, "pgv_m_s": 0.5, "pga_g": 1.0, "rotation_deg": 2.0}
-    with pytest.raises(InputError, match="failure past recovery, asked is a rotation of 2°"):
+    with pytest.raises(InputError, match="failure past recovery, not for a rotation of 2°"):
         predict(**asked, model=row_of("slumping"))
     two = row_of("slumping", diagnostics={"rotation_deg": 2.0})
     assert one(**asked, model=two).failure == "a rotation of 2 degrees or failure past recovery"

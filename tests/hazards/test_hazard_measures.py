@@ -123,7 +123,7 @@ def test_no_other_period_is_answered(measures_db: str, period: float) -> None:
 
 @pytest.mark.parametrize("model", ["bounded-pga_sa10", "bounded-pgv_kr"])
 def test_a_model_that_reads_more_is_refused(measures_db: str, model: str) -> None:
-    with pytest.raises(InputError, match="needs"):
+    with pytest.raises(InputError, match="requires"):
         hazard(power_law("pga_g", None), 3.0, 0.1, model=model, db=measures_db)
 
 

@@ -69,7 +69,7 @@ def test_packed(tmp_path: Path) -> None:
 )
 def test_wrongly_labelled(tmp_path: Path, content: str) -> None:
     path = written(tmp_path, content)
-    with pytest.raises(UnknownFormatError, match="known are rbfrag CSV, PEER AT2, GeoNet V2A"):
+    with pytest.raises(UnknownFormatError, match="supported are rbfrag CSV, PEER AT2, GeoNet V2A"):
         read_motions(path, units="g", dt_s=0.01)
 
 

@@ -139,7 +139,7 @@ def test_a_missing_row_beside_a_time_column_is_refused(tmp_path: Path) -> None:
     del lines[-5]
     path = tmp_path / "record"
     path.write_text("".join(lines))
-    with pytest.raises(MotionFileError, match="expected"):
+    with pytest.raises(MotionFileError, match="instead of"):
         read_motions(path, allow_partial=True)
 
 

@@ -105,7 +105,7 @@ def test_taper_is_a_cosine_at_both_ends() -> None:
         (GroundMotion(np.ones(50), 0.01), {"taper_s": 1.0}, "taper of 1 s"),
         (GroundMotion(np.ones(3), 0.01), {"padding_s": 0.0}, "too few"),
         (GroundMotion.from_nodes([0.0, 1.0], [0.0, 1.0]), {}, "equally spaced"),
-        (processed(GroundMotion(ordinary(), DT_S)), {}, "processed before"),
+        (processed(GroundMotion(ordinary(), DT_S)), {}, "already processed"),
     ],
 )
 def test_refused(motion: GroundMotion, settings: dict[str, float], words: str) -> None:

@@ -77,7 +77,7 @@ def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overla
     figures = caught(module)
     names = [f"fragility {i} of a file with rather long names of $ states" for i in range(21)]
     beside = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
-    with pytest.raises(InputError, match=r"21 fragilities .* at most 20"):
+    with pytest.raises(InputError, match=r"21 fragility functions .* maximum is 20"):
         plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", beside=beside)
     assert not list(tmp_path.iterdir())
     del beside[names[-1]]

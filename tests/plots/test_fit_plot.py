@@ -212,5 +212,5 @@ def test_models_of_other_blocks_are_refused(table, tmp_path):
         coefficients={"b0": 1.0, "b_ln_excess": 3.0, "b_ln_z": 2.5, "b_ln_k": 1.2},
         covariance=((0.01, 0.0, 0.0, 0.0),) * 4, domain={}, data_fingerprint="",
     )  # fmt: skip
-    with pytest.raises(InputError, match="blocks known by ks and ps2"):
+    with pytest.raises(InputError, match="blocks with ks and ps2"):
         plot_fit(table, FragilityModel.from_row(row), tmp_path / "fit.png")

@@ -97,8 +97,8 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
 @pytest.mark.parametrize(
     ("model", "given", "words"),
     [
-        (OF_SIZE, {"pga_g": 0.3}, "pga_g = 0.3 changes nothing"),
-        (WITH_PGA, {"tm_s": 0.3}, "tm_s = 0.3 changes nothing"),
+        (OF_SIZE, {"pga_g": 0.3}, "pga_g = 0.3 has no effect"),
+        (WITH_PGA, {"tm_s": 0.3}, "tm_s = 0.3 has no effect"),
         (WITH_TM, {"tm_s": 0.0}, "tm_s = 0 is not above zero"),
         (WITH_TM, {"pga_g": float("nan")}, "pga_g = nan is not above zero"),
         (replace(WITH_TM, row=replace(WITH_TM.row, domain={})), {}, "range of p2"),

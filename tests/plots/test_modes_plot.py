@@ -165,7 +165,7 @@ def test_water_moves_the_regions_of_blocks_of_one_spacing(tmp_path, caught):
     assert len(modes) == 4
     assert afloat > 0
     assert "s1 2 m, water 1 m" in figures[0].get_suptitle()
-    with pytest.raises(InputError, match="water_m needs s1_m"):
+    with pytest.raises(InputError, match="water_m requires s1_m"):
         plot_modes(tmp_path / "a.png", phi_deg=35.0, **on)
 
 

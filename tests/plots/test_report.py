@@ -140,12 +140,12 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
     ("asked", "words"),
     [
         (("--p2", "3", "--pgv", "0.6"), "kr is missing"),
-        (("--p2", "3", "--kr", "0.1"), "nothing about the motion is given"),
+        (("--p2", "3", "--kr", "0.1"), "no intensity measure is given"),
         (("--p2", "-3", "--kr", "0.1", "--pgv", "0.6"), "p2 = -3"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--kind", "sliding"), "kind sliding"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--hazard", "no.csv"), "no.csv: no such"),
         (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--years", "10"), "--years requires"),
-        (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "state --displacement"),
+        (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "give --displacement"),
     ],
 )
 def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], words: str) -> None:

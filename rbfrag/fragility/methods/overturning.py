@@ -62,8 +62,8 @@ BLOCK = BlockParameters(
         Bound(
             lambda v: (v["restitution"] <= 0.0) | (v["restitution"] > 1.0),
             "restitution",
-            "is outside the model: give the coefficient of restitution, above 0 and up to 1 (0 is "
-            "not supported)",
+            "must be above 0 and up to 1 (a block that comes to rest at its first impact is not "
+            "supported)",
         ),
     ),
     support="assumed free-standing: a symmetric rectangle on level ground that rocks about both "

@@ -193,7 +193,7 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
     [
         (lambda t: rows_of(t, slice(0, 0)), "no critical values to fit.*rbfrag simulate"),
         (lambda t: rows_of(t, slice(0, 9)), "9 critical values.*simulate more"),
-        (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*a table of metadata"),
+        (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*a metadata table"),
         (lambda t: replace(t, pgv_m_s=np.full(t.p2.size, 0.3)), "same peak ground velocity, 0.3"),
         (lambda t: replace(t, y_m_s=0.7 * t.pgv_m_s), "exactly on a line"),
         (lambda t: replace(t, y_m_s=2.0 - t.y_m_s), "does not rise"),
