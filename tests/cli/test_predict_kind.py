@@ -68,7 +68,7 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
         (
             ("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"),
-            "nothing about the motion is given: a prediction requires --pgv, or --sa10",
+            "no intensity measure is given: a prediction requires --pgv, or --sa10",
         ),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
         (
@@ -116,7 +116,7 @@ def test_a_block_of_another_mode_is_refused(refuses: Refuses, block: Path) -> No
     assert "give --displacement" in refuses(*asked)
     block.write_text(SLUMP)
     distance = ("--displacement", "0.1")
-    assert "its mode is slump" in refuses(*asked, "--kind", "sliding", *distance)
+    assert "the failure mode is slump" in refuses(*asked, "--kind", "sliding", *distance)
 
 
 def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_planes_in_both_forms(tmp_path: Path) -> None:
         ("realisations = 500", "realisations = 0", "realisations = 0"),
         ("[block]", "[block", "not valid TOML"),
         ("seed = 7", "seed = " + "7" * 5000, "not valid TOML"),
-        ("seed = 7", "seed = " + "[" * 5000, "not valid TOML"),
+        ("seed = 7", "seed = " + "[" * 5000, "unsupported TOML"),
         ("[friction]", "[[friction]]", "friction = .* is not a table"),
     ],
 )

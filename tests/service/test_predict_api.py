@@ -111,7 +111,7 @@ def test_a_list_says_which_element_cannot_be_used(client):
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ("p2=3&kr=0.1", "nothing about the motion is given"),
+        ("p2=3&kr=0.1", "no intensity measure is given"),
         ("p2=3&pgv=0.6", "kr is missing"),
         ("ky=0.1&pgv=0.6", "displacement is missing"),
         ("p2=3&kr=0.1&ky=0.1&pgv=0.6", "ky cannot be combined with kind toppling"),

@@ -112,7 +112,7 @@ def test_the_interval_of_a_count_is_that_of_wilson() -> None:
         ({"ky_sigma": 0.1}, "ky_sigma requires ky"),
         ({"displacement_m": 0.1}, "displacement_m cannot be combined with kind toppling"),
         ({"p2": None, "kr": None, "ky": 0.1}, "displacement_m is missing"),
-        ({"restitution": 0.9}, "restitution cannot be combined with toppling"),
+        ({"restitution": 0.9}, "restitution cannot be combined with kind toppling"),
         ({"restitution": 1.2, "kind": "rocking"}, "restitution = 1.2"),
         ({"kr": [0.1, 0.2], "kr_sigma": 0.1}, "cannot be combined with draws"),
         ({"kr": [0.1, -0.2], "weights": [0.0, 1.0]}, "kr = -0.2"),

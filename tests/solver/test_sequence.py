@@ -219,7 +219,7 @@ def test_a_run_from_a_state() -> None:
         ([], {}, "no motion"),
         (motion(1), {"gap_s": 1.0}, "requires a list"),
         ([motion(1)], {"gap_s": -1.0}, "negative"),
-        ([motion(1), motion(2)], {"vertical": [None]}, "one vertical motion for each"),
+        ([motion(1), motion(2)], {"vertical": [None]}, "give one for each motion"),
         ([motion(1), motion(2)], {"vertical": motion(1)}, "give a list for a list of motions"),
         (motion(1), {"vertical": [motion(1)]}, "one vertical motion"),
     ],

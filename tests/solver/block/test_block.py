@@ -166,8 +166,8 @@ SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
         ({"gamma_deg": 80.0}, ["back plane", "gamma_deg = 80", "tolerance"]),
         ({"gamma_deg": 100.0}, ["back plane", "gamma_deg = 100", "tolerance"]),
         ({"back": 2, "gamma_deg": 90.0}, ["back plane"]),
-        ({"vertices_m": [(0, 0), (1e200, 0), (1e200, 1), (0, 1)]}, ["beyond arithmetic"]),
-        ({"vertices_m": [(3, 3)] * 4}, ["beyond arithmetic"]),
+        ({"vertices_m": [(0, 0), (1e200, 0), (1e200, 1), (0, 1)]}, ["out of range"]),
+        ({"vertices_m": [(3, 3)] * 4}, ["out of range"]),
     ],
     ids=str,
 )
@@ -214,9 +214,9 @@ def test_contact_tolerance_is_a_thousandth_of_the_size() -> None:
         ("a", 20.0, 1.0, "alpha1_deg = 'a'"),
         (10.0, None, 1.0, "alpha3_deg = None"),
         (10.0, 20.0, True, "r3_m = True"),
-        (10.0, 20.0, 1e-200, "beyond arithmetic"),
-        (10.0, 20.0, 1e200, "beyond arithmetic"),
-        (-89.999, 89.9999999, 1e-320, "beyond arithmetic"),
+        (10.0, 20.0, 1e-200, "out of range"),
+        (10.0, 20.0, 1e200, "out of range"),
+        (-89.999, 89.9999999, 1e-320, "out of range"),
     ],
 )
 def test_angles_that_are_no_block(alpha1: Any, alpha3: Any, r3: Any, word: str) -> None:
@@ -234,7 +234,7 @@ def test_angles_that_are_no_block(alpha1: Any, alpha3: Any, r3: Any, word: str) 
         (1.0, 1.0, 0.0, "gamma_deg = 0"),
         (1.0, 1.0, 180.0, "between 0 and 180"),
         (1.0, 1.0, -10.0, "gamma_deg = -10"),
-        (1.0, 1e-30, 60.0, "sliver"),
+        (1.0, 1e-30, 60.0, "without thickness"),
     ],
 )
 def test_fractures_that_are_no_block(s1: Any, s2: Any, gamma: Any, word: str) -> None:

@@ -200,7 +200,7 @@ def test_fractures_that_cut_no_block() -> None:
 def test_arguments_that_do_not_go_together() -> None:
     with pytest.raises(InputError, match="shapes of the arrays are not compatible"):
         BlockArray.from_angles([1.0, 2.0], [3.0, 4.0, 5.0], 1.0)
-    with pytest.raises(InputError, match="alpha1_deg holds something"):
+    with pytest.raises(InputError, match="alpha1_deg has an element"):
         BlockArray.from_angles(["a"], [3.0], 1.0)
     with pytest.raises(InputError, match="'ignore'"):
         stability_arrays(
