@@ -181,7 +181,7 @@ def test_interval_of_a_list_comes_from_its_index(records_dir: Path) -> None:
 
 
 def test_event_whose_counts_disagree(formats_dir: Path) -> None:
-    with pytest.raises(MotionFileError, match=r"line 5: numSteps says 1992, .* 1991 values"):
+    with pytest.raises(MotionFileError, match=r"line 5: numSteps is 1992, .* 1991 values"):
         read_motions(formats_dir / "simcenter_event_rinaldi.json", units="g")
 
 
