@@ -43,7 +43,7 @@ def test_a_link_shows_the_same_in_another_window(open_page, typed):
 def test_a_link_holds_a_shape(open_page):
     opened = open_page()
     page = opened.page
-    page.get_by_label("fractures").check()
+    page.get_by_label("fractures", exact=True).check()
     page.fill("#s1", "4")
     page.get_by_label("free-standing").check()
     opened.settled()

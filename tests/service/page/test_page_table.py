@@ -64,7 +64,7 @@ def test_each_row_comes_back_with_its_answer(open_page, dropped):
         ("", "the table is empty"),
         ("height,width\n2,wide\n", "'wide' is not a number"),
         ("a,c\n1,2\n", "there is no column"),
-        ("height,width,dip quality\n2,1,5\n", "'dip quality' is not understood"),
+        ("height,width,dip quality\n2,1,5\n", "'dip quality' is unknown"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_refused(open_page, text, said):
