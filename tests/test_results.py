@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 import rbfrag
 from rbfrag.errors import spelled
 from rbfrag.question.document import answer_block
-from rbfrag.results.diagnostic import Diagnostic, diagnostics
+from rbfrag.results.diagnostic import diagnostics
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.vocabulary.quantities import QUESTION, option_of, parameter_of
@@ -161,7 +161,8 @@ def test_written_tables_have_every_warning(name: str, shell: Shell) -> None:
     printed = shell(*command, *out).stdout
     lines = [line.removeprefix("Note      ") for line in printed.splitlines()]
     for note in notes:
-        assert spelled(Diagnostic(note["text"], note["code"]), OPTIONS, option_of) in lines
+        # the measures of a map and the columns of a table are no options
+        assert {note["text"], spelled(note["text"], OPTIONS, option_of)} & {*lines}
 
     for suffix in ("csv", "xlsx", "parquet"):
         shell(*command, "--out", f"out.{suffix}")
@@ -190,4 +191,7 @@ def test_a_rate_over_http_has_the_same_warnings(shell: Shell) -> None:
     client = TestClient(make_app(ServiceSettings(db=None, early=False)))
     asked = "/v1/hazard?height=2&width=0.4&phi=38"
     found = client.post(asked, content=CURVE.encode()).json()
-    assert found["diagnostics"] == document["diagnostics"]
+    # rates over HTTP are those of the curve's sites, so that warnings name rows
+    assert [(note["code"], note["text"]) for note in found["diagnostics"]] == [
+        (note["code"], note["text"]) for note in document["diagnostics"]
+    ]

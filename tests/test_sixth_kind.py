@@ -28,7 +28,7 @@ FIELD = (
     '        Quantity("pad_m", "Thickness of the pads", "m", "", POSITIVE, '
     'Input(aliases=("pads",))),\n'
 )
-FACTS = '        KindFacts("padded", None, ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
+FACTS = '        KindFacts("padded", None, "fails", ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
 
 MODEL = '''
 """A block on pads."""

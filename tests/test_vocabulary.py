@@ -79,7 +79,7 @@ def test_every_input_of_the_command_line_has_a_heading() -> None:
 
 def test_help_has_label_unit_detail_and_default() -> None:
     assert QUANTITIES["restitution"].help(option_of) == (
-        "Coefficient of restitution of rocking, 0–1 "
+        "Coefficient of restitution of a rocking block, 0–1 "
         "[default: from conservation of angular momentum]"
     )
     assert QUANTITIES["width_m"].help(option_of) == (

@@ -226,7 +226,7 @@ def test_allow_names_every_method_of_the_path(service, method, path, allowed):
 def test_a_key_is_there_once(service, path, body, headers):
     status, _, text = ask(service, "POST", path, body, headers)
     assert status in (400, 422)
-    assert "there twice" in json.loads(text)["detail"]
+    assert "occurs twice" in json.loads(text)["detail"]
 
 
 def test_a_refused_upload_is_told_why(service):

@@ -138,7 +138,7 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
     export_motions(motions, tmp_path / "two.csv")
     body = (tmp_path / "two.csv").read_bytes()
     refused = client.post("/v1/spectrum", content=body)
-    assert "holds 2 traces: name one of  0 (N), 1 (E)" in refusal(refused)
+    assert "holds 2 traces: give one of  0 (N), 1 (E)" in refusal(refused)
     assert refused.json()["traces"] == ["N", "E"]
     for i, motion in enumerate(motions):
         found = client.post(f"/v1/spectrum?trace={i}", content=body).json()
@@ -152,8 +152,8 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
         ("p2=3", "time_s,acceleration_g\n0,0\n0.1,x\n", "the file, line 3"),
         ("p2=3", "0.1\n0.2\n0.3\n", "unit"),
         ("p2=3&units=g", "0.1\n0.2\n0.3\n", "no sampling interval"),
-        ("p2=3&units=gal", RECORD, "units is 'gal': write g or m/s2 or cm/s2 or mm/s2"),
-        ("p2=3&trace=1", RECORD, "has no trace 1: name one of  0"),
+        ("p2=3&units=gal", RECORD, "units = 'gal': it must be g or m/s2 or cm/s2 or mm/s2"),
+        ("p2=3&trace=1", RECORD, "has no trace 1: give one of  0"),
         ("p2=0", RECORD, "p2"),
         ("p2=", RECORD, "p2 = '' is not"),
         ("p2=3&dt=-1&units=g", "0.1\n0.2\n", "dt = -1 is not above 0"),
