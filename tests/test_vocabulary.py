@@ -83,7 +83,7 @@ def test_help_has_label_unit_detail_and_default() -> None:
         "[default: from conservation of angular momentum]"
     )
     assert QUANTITIES["width_m"].help(option_of) == (
-        "Width of a rectangular block along its base [m], with --height"
+        "Width of a rectangle along its base, with --height [m]"
     )
 
 

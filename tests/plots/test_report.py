@@ -16,8 +16,8 @@ import rbfrag
 from rbfrag.fragility.lookup import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.report import sheet
-from rbfrag.plots.report.contents import RateQuestion, contents_of
-from rbfrag.results.numbers import return_period
+from rbfrag.plots.report.contents import RateQuestion, contents_of, report_of
+from rbfrag.results.numbers import percent, return_period
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 
 __all__ = ["refuses", "shell"]
@@ -188,6 +188,20 @@ def test_reports_of_blocks_that_slide_and_slump(shell: Shell) -> None:
         assert "Design chart" not in page
         for text in words:
             assert text in words_of(Path("a.html")), text
+
+
+def test_a_report_has_the_limit_state_and_the_level_that_are_asked_for(tmp_path: Path) -> None:
+    slumps = {"ks": 0.2, "ps2": 3.0, "kind": "slumping", "pgv_m_s": 0.6, "pga_g": 0.5}
+    path = rbfrag.report(tmp_path / "slump.html", **slumps, rotation_deg=2.0)
+    p = rbfrag.predict(**slumps, rotation_deg=2.0).probability
+    assert f"rotation of 2 degrees or failure past recovery) = {percent(p)}" in words_of(path)
+    (tmp_path / "curve.csv").write_text(CURVE)
+    rows = [{"p2": 3.0, "kr": kr, "pgv_m_s": 0.5, "level": 0.8} for kr in (0.1, 0.15)]
+    meaning = {"component": "rotd50"}
+    found = report_of(rows, RateQuestion(tmp_path / "curve.csv", meaning=meaning))
+    rates = rbfrag.hazard(tmp_path / "curve.csv", p2=3.0, kr=[0.1, 0.15], level=0.8, **meaning)
+    assert found.totals["expected_failures_per_year"] == rates.expected_failures_per_year
+    assert any("80 % confidence" in value for _, value in found.summary)
 
 
 def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:

@@ -50,7 +50,7 @@ def test_an_error_on_purpose_comes_back(pool):
 
 def test_work_beyond_the_limit_is_ended(pool):
     start = time.monotonic()
-    with pytest.raises(RequestRefusedError, match="longer than the 3 s") as refused:
+    with pytest.raises(RequestRefusedError, match="longer than the limit of 3 s") as refused:
         do(pool, slow_work.sleep, 1000.0)
     assert refused.value.status_code == 422
     ready(pool)  # the next piece of work is not kept waiting by it

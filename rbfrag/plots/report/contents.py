@@ -159,7 +159,10 @@ def contents_of(
     numbers = dict(group.numbers)
     medians = {name: about["median"] for name, about in (prediction.shaking or {}).items()}
     measures = {name: value for name, value in read.items() if name in INTENSITY} | medians
-    model = find_model(prediction.model, TERMS[prediction.term].inputs, how.get("db"))
+    model = find_model(
+        prediction.model, TERMS[prediction.term].inputs, how.get("db"),
+        rotation_deg=how.get("rotation_deg"),
+    )  # fmt: skip
     annual = _annual_rate({**numbers, "kind": facts.kind}, rate, how)
     if annual is not None and prediction.drained is not None:
         (dry,) = described(without_water(inputs), options.get("kind")).groups
@@ -324,7 +327,8 @@ def _totals(
     }
     kinds = [contents.prediction.kind for contents, _ in standing]
     count = np.array([number for _, number in standing], dtype=np.float64)
-    how: dict[str, Any] = {n: v for n, v in answering.items() if n in ("level", "db")}
+    request = {**rows[0], **answering}
+    how: dict[str, Any] = {name: request[name] for name in ("level", "db") if name in request}
     how |= {**columns, **rate.meaning, "kind": kinds}
     answer = hazard(
         as_curves(rate.curve, **rate.meaning), weights=rate.weights, joint=True, years=rate.years,
