@@ -90,7 +90,7 @@ def test_a_column_of_restitution_with_empty_cells_is_that_of_each_block(shell: S
     assert float(stated["probability"]) == pytest.approx(given["probability"], rel=1e-12)
     for row in (rests, wrong):
         assert row["probability"] == ""
-        assert "restitution is outside the model" in row["reason"]
+        assert "restitution must be above 0 and up to 1" in row["reason"]
 
 
 def test_draws_of_a_scanned_rock_are_one_block(shell: Shell) -> None:

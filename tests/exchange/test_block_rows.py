@@ -217,7 +217,7 @@ def test_kinds_of_rows() -> None:
     assert own.blocks["row"].tolist() == [0, 3, 4]
     assert own.blocks["kind"].tolist() == ["toppling", "rocking", "toppling"]
     rocking, sliding = own.refused["reason"].tolist()
-    assert rocking.startswith("restitution = 1.2 is outside the model")
+    assert rocking.startswith("restitution = 1.2 must be above 0 and up to 1")
     assert sliding == (
         "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
         "displacement_m"
