@@ -112,7 +112,7 @@ class HazardAnswer(Result):
         reason: why a block cannot be used, shape (m,); empty text elsewhere.
         kinds: how each block fails, shape (m,); empty text where it cannot be used.
         count: number of identical blocks of each row, shape (m,).
-        tau: standard deviation of ln rate between measures, beside all intervals; None where it is
+        tau: standard deviation of ln rate between measures, in no interval; None where it is
             not known.
         drained: rates of the blocks without water pressure [1/a], shape (m,), NaN where they have
             none; None where all blocks are dry.
@@ -376,8 +376,8 @@ class HazardAnswer(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract.
 
-        One block is an object with its contributions. Several are a list in it, beside what they do
-        in common, at several sites beside a list of that; rejected rows have no numbers.
+        One block is an object with its contributions. Several are a list, with their joint
+        rates, at several sites one for each; rejected rows have no numbers.
         """
         sites = [curve.place or None for curve in self.curves]
         columns = self.rate_columns
