@@ -60,7 +60,7 @@ def test_terms_of_pgd_answer_by_name_alone(database):
 def test_a_named_model_is_asked_whatever_the_default(database):
     path = database("pgv", "pga_tm")
     assert predict(3, 0.1, pga_g=0.4, tm_s=0.5, model="wls-pga_tm", db=path).term == "pga_tm"
-    with pytest.raises(InputError, match=r"'wls-pga_tm' requires pga_g and tm_s .*not pgv_m_s"):
+    with pytest.raises(InputError, match=r"'wls-pga_tm' requires pga_g and tm_s .*given: pgv_m_s"):
         predict(3, 0.1, pgv_m_s=0.4, model="wls-pga_tm", db=path)
     with pytest.raises(UnknownModelError, match=r"'nobody'.*wls-pga_tm, wls-pgv"):
         predict(3, 0.1, pgv_m_s=0.4, model="nobody", db=path)
