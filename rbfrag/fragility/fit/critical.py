@@ -42,14 +42,20 @@ def fit_lognormal(
         FitError: the median does not rise with intensity, or there is no scatter.
     """
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
+    # ln y* = a + b ln x + (M - 1) ln p + sigma Z with Z standard normal. A critical value
+    # contributes its density to the likelihood, a censored one the probability to lie below the
+    # search limit.
     usable = (data.x > 0.0) & (data.y > 0.0)
     values = {name: value[usable] for name, value in data.values.items()}
     line, least = _line(form, names, values), None
+    # An undecided interval contributes the probability to lie between its ends.
     if data.least_y_m_s is not None:
         lower = data.least_y_m_s[usable]
         ratio = np.where(np.isfinite(lower), lower / values["y_m_s"], 1.0)
         ends = {name: values[name] * ratio for name in ("y_m_s", "kr")}
         least = _line(form, names, {**values, **ends})[1]
+    # In Olsen's parameters (coefficients/sigma, 1/sigma) the likelihood is concave (Olsen 1978):
+    # Newton's method finds its one maximum, which is then transformed back, errors by the Jacobian.
     rows, start = censored_line(*line, data.observed[usable], data.event[usable], least)
     theta, _ = maximise(rows, start)
     # Olsen's parameters put the scatter last
@@ -81,6 +87,8 @@ def fit_lognormal(
         seed,
         {"cr1_standard_errors": cr1, "naive_standard_errors": naive},
     )  # fmt: skip
+    # Predictions for an earthquake come from the fit to all others: scores are those of unseen
+    # shaking.
     others = left_out(rows.event, lambda rest: maximise(rows.only(rest), theta)[0])
     in_sample = probabilities(method, form, data, b)
     held_out, density = in_sample.copy(), rows.log_likelihood(theta)

@@ -326,6 +326,8 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     Raises:
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
+    # A row is one combination with its measures, its critical value (found, censored or an
+    # interval) and the outcomes of the blocks of its grid.
     table, named = source.table, kind or method.block.kind
     if table.p2.size == 0:
         raise FitError(
@@ -348,6 +350,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     order = np.lexsort((points.order, keys, points.values["intensity_m_s"]))
     chosen = order[points.usable[order]]
     own = own[chosen]
+    # Rows that share an earthquake are one cluster, whatever the number of records.
     names, event = np.unique(table.event_id[own].astype(str), return_inverse=True)
     observed = points.observed[chosen]
     values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
@@ -452,6 +455,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     table = source.table
     simulated = source.failed.shape[1]
     source = _with_safe_blocks(source, method.block.safe_steps)
+    # Strengths scale as y = k_r g/p: the critical k_r of a record is a critical toppling velocity
+    # y*, and a block of the grid has y0 = (k/PGA) PGA g/p.
     p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
     given = {**_measures(source), "p": p}
     x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
@@ -468,6 +473,8 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp requires the toppling spectrum X(p), which is not stored for the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
+    # found: y* is known. below_limit, no_motion: y* is below the search limit. Wide interval: y*
+    # lies between its ends.
     searched = table.status == "found"
     status = table.status.astype(str)
     # a wide interval, which no scan could tighten, has two ends instead of a value
@@ -484,6 +491,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     for name, values in method.block.stored.items():
         if values:
             readable &= np.isin(source.of_block[name], values)
+    # Blocks that a fit uses lie within KR; scores use the grid in y0/PGV that all models share.
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -592,6 +600,8 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of every stored strength: how far each slides."""
     from rbfrag.solver.models.sliding import THRESHOLDS_M
 
+    # A slid distance d is one point of ln d against ln x and strength; below LEAST_DISPLACEMENT_M
+    # it is censored. Outcomes "d exceeds the limit" follow from d for every displacement limit.
     n, m = source.k_over_pga.shape
     own, k = np.repeat(np.arange(n), m), source.k_over_pga.ravel()
     given = source.displacement_m

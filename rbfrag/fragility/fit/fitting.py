@@ -175,11 +175,15 @@ def fit_source(
     Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
     estimated too, which a study of scores has no use for; `why` why this method is taken.
     """
+    # Rows -> coefficients -> what blocks of one earthquake share -> the stored row: each step sees
+    # only the output of the one before.
     table, chosen = source.table, selection or {}
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fit(data, method, term, seed=seed, **options)
     dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
+    # The critical values also give the power law of the dissertation and the ranking of terms by
+    # their correlation with ln y*.
     of_any_strength = method.block.points == "strengths"
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}

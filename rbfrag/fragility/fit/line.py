@@ -261,6 +261,8 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     Raises:
         FitError: the line does not rise with intensity, or there is no scatter.
     """
+    # E[y*] = c0 + c1 x, Var[y*] = v(x). The weights 1/v depend on the residuals and these on the
+    # line, so both are fitted in turn until neither changes (Carroll and Ruppert 1988).
     form, degree = method.forms[term.name], term.variance_degree
     x, y, events = data.x[data.observed], data.y[data.observed], data.event[data.observed]
     bins = Bins.equal_count(x)
@@ -275,6 +277,8 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     parameters = fit.parameters.tolist()
     variance = variance_m2_s2(parameters, x)
     residuals = y - mean_m_s(parameters, x)
+    # The same line by statsmodels, with a covariance clustered by earthquake, as an independent
+    # check.
     clustered = clustered_line(x, y, 1.0 / variance, events)
     samples, unstable = event_bootstrap(
         bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
@@ -400,6 +404,8 @@ def _warnings(data: FitData, fit: LineFit, x: FloatArray, unstable: int) -> list
             f"{unstable} of {REPLICATES} bootstrap fits did not become stable: the standard "
             "errors of the bootstrap are rough"
         )
+    # A normal y* gives negative critical velocities the probability Phi(-mean/sd), which is no
+    # physics.
     doubtful = negative_probability(fit.parameters.tolist(), x, arrays()) > NEGATIVE_LIMIT
     doubtful_part = float(np.mean(doubtful))
     if doubtful_part > 0.0:

@@ -70,6 +70,8 @@ def fit_outcomes(
     data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
     """Fit a method that reads outcomes."""
+    # Maximum likelihood of sum w [f ln P + (1 - f) ln(1 - P)], P = link(eta(block, shaking; b)),
+    # over all blocks of the outcome grid that mechanics allows to fail.
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     rows = outcome_rows(data, method, term, names)
     fitted = rows.data.only(rows.data.weights > 0.0)
@@ -98,6 +100,8 @@ def fit_outcomes(
             f"parameters of method {method.name}: simulate more block sizes (p²) or earthquakes, "
             "or fit a method of fewer parameters, such as logistic"
         )
+    # Outcomes of one earthquake are not independent: the covariance comes from the changes of b
+    # when each earthquake in turn is omitted (CR3), the bootstrap draws whole earthquakes.
     steps = jackknife_steps(fitted, b)
 
     def resampled(times: FloatArray) -> FloatArray:
@@ -110,6 +114,7 @@ def fit_outcomes(
         {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
          "naive_standard_errors": np.sqrt(np.diag(naive))},
     )  # fmt: skip
+    # How far each critical value lies from the block with P = 1/2, as a check on the scale of eta.
     residual = None
     if data.observed.any():
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -192,6 +192,9 @@ def calibration_bins(
 
     Bins with fewer than 20 blocks are left out.
     """
+    # Blocks are counted in a table (earthquake, bin of P). In a calibrated model the fraction that
+    # fails in a bin equals its mean P. The range comes from resampled earthquakes, which, unlike
+    # blocks, are independent.
     used = judged.known & np.isfinite(held_out)
     event = np.broadcast_to(judged.event[:, None], held_out.shape)[used]
     p, failed = held_out[used], judged.failed[used]
