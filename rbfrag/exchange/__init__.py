@@ -1,1 +1,5 @@
-"""Files of other tools, and our own tables of blocks."""
+"""Files of other tools, and tables of blocks.
+
+Public functions that accept a path live here; they read, call the package that computes, and write.
+No statistics and no physics.
+"""

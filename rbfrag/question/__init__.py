@@ -1,1 +1,5 @@
-"""What may be said of blocks and shaking, declared once."""
+"""Questions about blocks and their shaking: from inputs of any interface to the model that answers.
+
+Blocks are classified (shape, contacts, mode, numbers), grouped by kind, answered and put back in
+order. Inputs are declared in `vocabulary`; integration over hazard is in `hazards`.
+"""

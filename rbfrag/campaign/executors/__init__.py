@@ -1,1 +1,1 @@
-"""Who does the work: processes of this machine, or a cluster."""
+"""Executors of a campaign: processes of this machine, or a Dask cluster."""

@@ -1,1 +1,1 @@
-"""Looking for damage."""
+"""Checks of a database for altered, missing or contradictory rows."""

@@ -1,1 +1,1 @@
-"""Bringing two databases together."""
+"""Merge of two databases."""

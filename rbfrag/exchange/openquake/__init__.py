@@ -1,1 +1,1 @@
-"""Jobs of the OpenQuake engine: what it exports, and what it stores."""
+"""Jobs of the OpenQuake engine: its exports and its datastore."""

@@ -1,4 +1,4 @@
-"""The methods of fitting, one file each; :mod:`rbfrag.fragility.method` says what one is."""
+"""Methods of fitting, one file each; :mod:`rbfrag.fragility.method` defines their form."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Failures of the blocks of a map of shaking in its earthquake."""
+"""Failures of the blocks on a map of shaking in one earthquake."""

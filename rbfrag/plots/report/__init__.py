@@ -1,1 +1,4 @@
-"""One block, one question: what was asked and answered, on one page."""
+"""Reports as PDF or HTML: headline, warnings, tables and figures of one question.
+
+The contents are those of the answer's `Result`; here they are only laid out.
+"""

@@ -1,1 +1,1 @@
-"""The block: geometry, arrays of blocks, polygons, files."""
+"""Block geometry: sections, polygons, meshes, and arrays of blocks."""
