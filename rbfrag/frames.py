@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -38,6 +38,13 @@ def frame_of(columns: Mapping[str, Any]) -> pd.DataFrame:
 
     several = any(hasattr(value, "ravel") for value in columns.values())
     return pd.DataFrame(columns, index=None if several else [0])
+
+
+def frame_of_rows(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return rows of values by name as a pandas table."""
+    import pandas as pd
+
+    return pd.DataFrame(rows)
 
 
 def html_of(frame: pd.DataFrame) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, astuple, dataclass, fields
 from functools import cache
 from typing import Any
 
@@ -28,6 +29,8 @@ from rbfrag.db.schema import suite as suite_table
 from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 from rbfrag.motions.quality import PGD_IN_DOUBT, STRUCTURE
+from rbfrag.results.numbers import count_of
+from rbfrag.results.result import Result, ResultList, TextLine, TextTable
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.vocabulary.quantities import MEASURES
 
@@ -35,8 +38,8 @@ _MEASURES = tuple(name for name in CombinationTable.__dataclass_fields__ if name
 _ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 
-@dataclass(frozen=True)
-class DatabaseInfo:
+@dataclass(frozen=True, eq=False, repr=False)
+class DatabaseInfo(Result):
     """What a database holds.
 
     Args:
@@ -54,12 +57,40 @@ class DatabaseInfo:
     numerics_versions: tuple[str, ...]
     default_model: str | None
     last_sound: str | None
+    warnings: tuple[str, ...] = ()
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of motions, earthquakes, combinations and models."""
+        motions, earthquakes, combinations, models = (
+            count_of(self.rows.get(table, 0), noun)
+            for table, noun in (
+                ("motion", "motion"), ("earthquake", "earthquake"),
+                ("combination", "combination"), ("fragility_model", "fitted model"),
+            )
+        )  # fmt: skip
+        yield f"{motions} of {earthquakes}, {combinations} and {models}"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield the schema, the solver, the default model and the last check."""
+        yield TextLine("Schema", f"{self.revision} ({self.dialect})")
+        yield TextLine("Solver", ", ".join(self.numerics_versions) or "none")
+        yield TextLine("Default", self.default_model or "none")
+        yield TextLine("Checked", self.last_sound or "never")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the number of rows by table, and of combinations by status."""
+        yield TextTable(("table", "rows"), [*self.rows.items()])
+        if self.combinations_by_status:
+            yield TextTable(("combinations", "number"), [*self.combinations_by_status.items()])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return asdict(self)
 
 
 @dataclass(frozen=True)
 class SuiteCount:
-    """What a database holds of one suite and one kind of response, as in the dissertation's
-    Table 4.2.
+    """Contents of a database by suite and response kind, as in the dissertation's Table 4.2.
 
     Args:
         suite: name of the suite; None for the motions that are in none.
@@ -78,6 +109,30 @@ class SuiteCount:
     found: int
     below_limit: int
     vertical: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SuiteCounts(ResultList):
+    """Contents of a database by suite and response kind."""
+
+    suites: tuple[SuiteCount, ...]
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of suites."""
+        yield count_of(len({count.suite for count in self.suites} - {None}), "suite")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the contents."""
+        names = [field.name for field in fields(SuiteCount)]
+        yield TextTable(names, [astuple(count) for count in self.suites])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the contents of each suite under the keys of the JSON contract."""
+        return [asdict(count) for count in self.suites]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return {"suites": self.rows()}
 
 
 def combination_table(
@@ -275,7 +330,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
     )
 
 
-def suite_counts(connection: Connection) -> tuple[SuiteCount, ...]:
+def suite_counts(connection: Connection) -> SuiteCounts:
     """Return what the database holds of every suite and kind, by name.
 
     A motion that is in several suites counts in each, so that columns need not add up to the
@@ -319,7 +374,8 @@ def suite_counts(connection: Connection) -> tuple[SuiteCount, ...]:
     ]
     without = motions.keys() - {count.suite for count in counts}
     counts += [SuiteCount(suite, None, motions[suite], 0, 0, 0, 0) for suite in without]
-    return tuple(sorted(counts, key=lambda c: (c.suite is None, c.suite or "", c.kind or "")))
+    counts.sort(key=lambda c: (c.suite is None, c.suite or "", c.kind or ""))
+    return SuiteCounts(tuple(counts))
 
 
 def _pgd_in_doubt(row: RowMapping) -> bool:

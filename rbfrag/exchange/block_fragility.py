@@ -19,6 +19,7 @@ from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.question.components import Component, component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.kinds import mode_of_kind
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import MEASURES
@@ -166,8 +167,11 @@ def block_functions(
         )
     warnings = (
         (
-            f"P of model {model.name} rises again below {measure} = {max(begun):.2g}, where it was "
-            "fitted on too little: the functions begin there, and nothing fails below",
+            Diagnostic(
+                f"P of model {model.name} rises again below {measure} = {max(begun):.2g}, where it "
+                "was fitted on too little: the functions begin there, and nothing fails below",
+                "function_starts",
+            ),
         )
         if begun
         else ()

@@ -6,12 +6,12 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
@@ -26,6 +26,8 @@ from rbfrag.db.location import data_place
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
 from rbfrag.exchange.tables.parts import pyarrow
+from rbfrag.results.numbers import count_of
+from rbfrag.results.result import Result, TextTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,15 +39,15 @@ DICTIONARY = "data_dictionary"
 """Name of the two files that say what the columns mean."""
 
 
-@dataclass(frozen=True)
-class ExportReport:
-    """What :func:`export_database` wrote.
+@dataclass(frozen=True, repr=False)
+class ExportReport(Result):
+    """The files that :func:`export_database` wrote.
 
     Args:
         folder: the folder.
         format: ``parquet`` or ``csv``.
         rows: number of rows by table.
-        warnings: what is to be said of it.
+        warnings: cells that spreadsheets compute.
     """
 
     folder: str
@@ -53,9 +55,17 @@ class ExportReport:
     rows: dict[str, int]
     warnings: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, object]:
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of tables and the folder."""
+        yield f"{count_of(len(self.rows), 'table')} written to {self.folder}"
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the number of rows by table."""
+        yield TextTable(("table", "rows"), [*self.rows.items()])
+
+    def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the JSON contract."""
-        return {"folder": self.folder, "format": self.format, "rows": self.rows}
+        return {**asdict(self), "warnings": list(self.warnings)}
 
 
 def export_database(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.exchange.tables.parts import cells_of
+from rbfrag.results.diagnostic import Diagnostic
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-](inf|nan)", re.ASCII)
 _SUSPECT = r"^'?[=+\-@]"
@@ -48,15 +49,16 @@ def changed_texts(columns: Mapping[str, Any], change: Callable[[str], str]) -> d
     }
 
 
-def formula_warnings(columns: Mapping[str, Any]) -> list[str]:
+def formula_warnings(columns: Mapping[str, Any]) -> list[Diagnostic]:
     """Return a warning that names the first cell that spreadsheets compute, or nothing."""
     for name, column in columns.items():
         for cell in _texts(column) if _suspect(column) else ():
             if is_formula(cell):
-                return [
+                text = (
                     f"the cell {cell[:40]!r} of the column {name} begins with {cell[0]}, which "
                     "Excel takes for a formula; excel_text writes it as text"
-                ]
+                )
+                return [Diagnostic(text, "spreadsheet_formula", fields=("excel_text",))]
     return []
 
 

@@ -25,6 +25,7 @@ from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.question.fields import AnsweringFields, BlockKeywords, V
 from rbfrag.question.keywords import parts_of
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import count_of, percent
 from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.kinds import KindFacts, facts_of
@@ -233,7 +234,7 @@ class _Request(NamedTuple):
         shares = request.get("shares")
         return cls(facts_of(kind), read, names, measure, one_class, shares, meaning, how, remarks)
 
-    def functions(self, refused: tuple[str, str, str]) -> tuple[BlockFunctions, list[str]]:
+    def functions(self, refused: tuple[str, str, str]) -> tuple[BlockFunctions, list[Diagnostic]]:
         """Return the function of each block, their mean or their shares, and names that changed."""
         if self.shares is None:
             of = self.names, self.numbers, self.measure, self.facts.kind
@@ -275,7 +276,7 @@ class _Request(NamedTuple):
         ]
 
     def answer(
-        self, file: str, description: str | None, result: BlockFunctions, renames: list[str]
+        self, file: str, description: str | None, result: BlockFunctions, renames: list[Diagnostic]
     ) -> ExportAnswer:
         """Return the answer on what was written."""
         functions = result.functions

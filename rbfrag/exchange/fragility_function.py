@@ -12,6 +12,7 @@ from scipy.special import ndtr
 
 from rbfrag.errors import InputError
 from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 JUMP = 1e-5
@@ -168,7 +169,7 @@ def _longest(x: FloatArray, p: FloatArray, error: FloatArray, floor: float) -> N
 
 def renamed(
     functions: Sequence[FragilityFunction], refused: str, by: str, why: str
-) -> tuple[list[FragilityFunction], list[str]]:
+) -> tuple[list[FragilityFunction], list[Diagnostic]]:
     """Return the functions with other characters in their names, and a warning where it is so.
 
     Args:
@@ -182,10 +183,11 @@ def renamed(
     changed = [name for name in before if name.strip() != name.strip().translate(to)]
     if not changed:
         return named, []
-    return named, [
+    text = (
         f"{len(changed)} of {len(before)} IDs have {by!r} for what {why}: {changed[0]!r} is "
         f"written as {changed[0].strip().translate(to)!r}; name it so in the exposure"
-    ]
+    )
+    return named, [Diagnostic(text, "renamed")]
 
 
 def assets_of(functions: Sequence[FragilityFunction]) -> dict[str, list[FragilityFunction]]:

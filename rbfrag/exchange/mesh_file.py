@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.files import MOST_BYTES, as_path, bounded_bytes, reading
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.mesh_block import CONTACT_MM, MassProperties, MeshBlock, mesh_block
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def block_from_mesh(
             up=up,
             contact_mm=contact_mm,
             density_kg_m3=density_kg_m3,
-            warnings=notes,
+            warnings=[Diagnostic(note, "mesh_quality") for note in notes],
         )
     except InputError as error:
         raise InputError(f"{source}: {str(error).removeprefix(f'{source.stem}: ')}") from None

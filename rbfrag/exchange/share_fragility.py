@@ -24,6 +24,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.question.components import component_named
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import model_for
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 
@@ -116,13 +117,18 @@ def share_functions(
         for share, row in zip(shares, rows, strict=True)
     ]
     warnings = [
-        f"all {p2.size} blocks are taken to stand at one site and to face one way; probabilities "
-        f"are frequencies of {DRAWS} draws, with a standard error of at most 0.0035"
+        Diagnostic(
+            f"all {p2.size} blocks are assumed to stand at one site and to face one way; "
+            f"probabilities are frequencies of {DRAWS} draws, with a standard error of at most "
+            "0.0035",
+            "single_site",
+        )
     ]
     few = [share for share in shares if share / 100.0 * p2.size < 1.0]
     if few:
-        warnings.append(
+        text = (
             f"{exact_percent(few[0] / 100.0)} of {p2.size} blocks is less than one: that limit "
             "state is one block; give the rock mass more realisations"
         )
+        warnings.append(Diagnostic(text, "fraction_of_block"))
     return BlockFunctions(functions, about_model(chosen), tuple(warnings))

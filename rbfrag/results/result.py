@@ -145,3 +145,23 @@ class Result(Tabular):
             lines = [line._asdict() for line in self.lines()]
             document["text"] = {"sentences": [*self.sentences()], "lines": lines}
         return document
+
+
+class ResultList(Result):
+    """Base of answers that list things: rows under the same names."""
+
+    warnings: Sequence[str] = ()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the rows under the keys of the JSON contract."""
+        raise NotImplementedError
+
+    def as_dict(self) -> Any:
+        """Return the rows, which are the JSON document."""
+        return self.rows()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the rows as a pandas table."""
+        from rbfrag.frames import frame_of_rows
+
+        return frame_of_rows(self.rows())

@@ -15,6 +15,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, source_text
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent
 from rbfrag.solver.block.planes import STRIKE_DEG, Plane, plane_of, section_of
 from rbfrag.solver.results import FloatArray
@@ -141,7 +142,7 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
             planes[name] = plane_of(value, f"{name}.plane")
     face = planes["face"]
     section = section_of(face, planes["base"], planes["back"])
-    notes: list[str] = [*section.remarks]
+    notes: list[str] = []
     assert section.gamma_deg is not None
     dips = {"base": section.beta_deg, "back": section.beta_deg + section.gamma_deg}
     factors = {"base": section.base_factor, "back": section.back_factor}
@@ -167,7 +168,8 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
                 f"{name}: with K below {_WIDE_K:g} the dips in the section scatter a little more "
                 "than the von Mises law drawn from (at K 10 by 3.3 %)"
             )
-    return own, tuple(notes)
+    coded = (Diagnostic(note, "plane_sets") for note in notes)
+    return own, (*section.remarks, *coded)
 
 
 def _scaled(law: Any, factor: float) -> Any:

@@ -16,7 +16,7 @@ from starlette.exceptions import HTTPException
 
 from rbfrag.errors import RbfragError
 from rbfrag.fragility.lookup import stored_rows
-from rbfrag.fragility.model_list import model_list
+from rbfrag.fragility.model_list import ModelList
 from rbfrag.service import block, predict, uploads, vocabulary, work
 from rbfrag.service.documents import Health, ModelListed
 from rbfrag.service.guard import Guard
@@ -118,7 +118,8 @@ def make_app(settings: ServiceSettings) -> FastAPI:
         shipped with rbfrag.
         """
         # read anew each time, and from a server if there is one
-        return model_list(await work.in_thread(settings.time_limit, stored_rows, settings.db))
+        rows = await work.in_thread(settings.time_limit, stored_rows, settings.db)
+        return ModelList(rows).as_dict()
 
     @app.get("/v1/healthz", summary="State of the service", response_model=Health)
     async def healthz() -> Any:

@@ -161,4 +161,4 @@ def test_the_command_line(database: Path, monkeypatch: pytest.MonkeyPatch) -> No
     _change(database, LAST_BITS)
     result = shell("db", "check", "--db", database, expect=1)
     assert "combination" in result.stdout
-    assert "to do: restore the database from a backup" in result.stdout
+    assert "Advice    restore the database from a backup" in result.stdout

@@ -120,7 +120,7 @@ def test_from_files_to_a_probability(shell: Shell, tmp_path: Path) -> None:
     assert (row["suite"], row["kind"], row["combinations"]) == ("made-up", "toppling", 24)
     assert (row["motions"], row["vertical"], row["found"]) == (6, 0, summary["found"])
     printed = shell("db", "info", "--by", "suite").stdout.split()
-    assert printed[:3] == ["suite", "kind", "motions"]
+    assert printed[:5] == ["1", "suite", "suite", "kind", "motions"]
     assert "made-up" in printed
     checked = shell.json("db", "check")
     assert (checked["sound"], checked["findings"]) == (True, [])

@@ -170,7 +170,7 @@ def test_a_database_of_before_is_read_checked_and_upgraded(tmp_path: Path) -> No
 
 def test_the_commands_say_when_it_was_sound(shell: Shell, sqlite_file: Path, fill: Any) -> None:
     at = ("--db", sqlite_file)
-    assert "never checked" in shell("db", "info", *at).stdout
+    assert "Checked   never" in shell("db", "info", *at).stdout
     with opened_database(sqlite_file) as engine, engine.begin() as connection:
         fill(connection, [1, 2])
     assert shell.json("db", "check", "--sample", "0", *at)["sound"]

@@ -84,7 +84,7 @@ class TestTogether:
         assert report.added["combination"] == 6
         assert report.added["simulation"] == 18
         assert report.same == {}
-        assert report.notes == ()
+        assert report.warnings == ()
 
     def test_and_from_a_file_into_any_database(
         self, engine: Engine, theirs: Engine, fill: Callable[..., None]
@@ -305,7 +305,7 @@ class TestGuesses:
         self._motion(theirs, make_motion(1), EarthquakeInfo("header"), component="up")
         before = _digest(engine)
         report = _merge(theirs, engine)
-        assert (report.restated, report.notes) == (0, ())
+        assert (report.restated, report.warnings) == (0, ())
         assert _digest(engine) == before
 
     def test_of_two_guesses_the_one_here_stays(
@@ -322,8 +322,11 @@ class TestGuesses:
         labels = {"source_file": "record.csv", "station": ""}
         self._motion(engine, make_motion(1, **labels), EarthquakeInfo(""))
         self._motion(theirs, make_motion(2, **labels), EarthquakeInfo(""))
-        (note,) = _merge(theirs, engine).notes
-        assert "another, stored as recording" in note
+        (note,) = _merge(theirs, engine).warnings
+        assert (
+            "recording 'record.csv#0' of unknown earthquakes: that of the other is stored as"
+            in note
+        )
         assert len(self._events(engine)) == 2
         assert _merge(theirs, engine).added == {}
 
@@ -333,7 +336,7 @@ class TestGuesses:
         self._motion(engine, make_motion(1), EarthquakeInfo("e", guessed=False))
         said = EarthquakeInfo("e", name="Chi-Chi", magnitude=7.6, time="1999", guessed=False)
         self._motion(theirs, make_motion(1), said)
-        assert _merge(theirs, engine).notes == ()
+        assert _merge(theirs, engine).warnings == ()
         assert _digest(engine) == _digest(theirs)
 
     def test_of_two_names_the_one_here_stays(
@@ -492,10 +495,10 @@ class TestModels:
             save_model(connection, other)
             save_model(connection, replace(model, name="pgd"))
         report = _merge(theirs, engine)
-        assert report.notes == (
-            "there is another model 'pgv-wls' here: theirs is stored as 'pgv-wls-2'",
+        assert report.warnings == (
+            "the databases differ in model 'pgv-wls': that of the other is stored as 'pgv-wls-2'",
         )
-        assert _merge(theirs, engine).notes == ()
+        assert _merge(theirs, engine).warnings == ()
         with engine.connect() as connection:
             assert [m.name for m in model_rows(connection)] == ["pgd", "pgv-wls", "pgv-wls-2"]
             assert load_model(connection).name == "pgv-wls"  # the default stays

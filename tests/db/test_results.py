@@ -271,7 +271,7 @@ class TestTables:
             result = make_result(motion.pga_g)
             store_result(connection, campaign, motion, ids[0], result, vertical=(ids[1], up))
         with filled.connect() as connection:
-            counts = suite_counts(connection)
+            counts = suite_counts(connection).suites
         # Motions 1 and 2 of suite s and motion 3 of none have a found and a censored search each;
         # the new motion, in s and t, has one with its vertical component.
         assert counts == (
@@ -283,7 +283,7 @@ class TestTables:
 
     def test_by_suite_of_an_empty_database(self, engine: Engine) -> None:
         with engine.connect() as connection:
-            assert suite_counts(connection) == ()
+            assert suite_counts(connection).suites == ()
 
 
 class TestEqualDatabases:

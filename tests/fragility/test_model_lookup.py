@@ -10,7 +10,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, ModelError, UnknownModelError
 from rbfrag.fragility.lookup import SHIPPED, find_model, stored_rows
-from rbfrag.fragility.model_list import model_list
+from rbfrag.fragility.model_list import ModelList
 from rbfrag.question.question import predict
 
 
@@ -223,8 +223,8 @@ def test_the_first_fitted_is_no_default_by_being_first(scored):
 
 
 def test_the_number_of_a_model_without_critical_values_is_that_of_its_outcomes():
-    rows = {each.name: each for each in stored_rows(REFERENCE)}
-    listed = {each["name"]: each["n"] for each in model_list(rows.values())}
+    rows = {row.name: row for row in stored_rows(REFERENCE)}
+    listed = {row["name"]: row["n"] for row in ModelList([*rows.values()]).rows()}
     rocking, toppling = (rows[name].diagnostics for name in ("rocking-pgv_pga", "bounded-pgv_pga"))
     assert rocking["n"] == 0
     assert listed["rocking-pgv_pga"] == rocking["n_outcomes"]

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable
-from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
 import typer
 
-from rbfrag.cli.output import (
-    print_json,
-    print_pairs,
-    print_table,
-    print_warnings,
-    say_when_compiling,
-)
+from rbfrag.cli.output import print_json, print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.results.numbers import count_of
 
 if TYPE_CHECKING:
-    from rbfrag.db.merge.databases import MergeReport
-    from rbfrag.db.queries import DatabaseInfo, SuiteCount
+    from rbfrag.results.result import Result
 
 app = command_group(
     "Upgrade, describe, check, export and merge databases, and import tables.",
@@ -62,50 +51,10 @@ def info(
 
     if by not in (None, "suite"):
         raise InputError(f"--by {by!r}: it must be suite")
+    query = database_info if by is None else suite_counts
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        if by is None:
-            _print_info(database_info(connection), json=json)
-        else:
-            _print_suites(suite_counts(connection), json=json)
-
-
-def _print_info(content: DatabaseInfo, *, json: bool) -> None:
-    if json:
-        print_json(asdict(content))
-        return
-    rows = content.rows
-    print(
-        f"{count_of(rows.get('motion', 0), 'motion')} of "
-        f"{count_of(rows.get('earthquake', 0), 'earthquake')}, "
-        f"{count_of(rows.get('combination', 0), 'combination')} and "
-        f"{count_of(rows.get('fragility_model', 0), 'fitted model')}."
-    )
-    print()
-    print_pairs(
-        {
-            "schema": content.revision,
-            "dialect": content.dialect,
-            "numerics": content.numerics_versions,
-            "default model": content.default_model,
-            "last found sound": content.last_sound or "never checked",
-        }
-    )
-    print()
-    print_table(("table", "rows"), content.rows.items())
-    if content.combinations_by_status:
-        print()
-        print_table(("combinations", "number"), content.combinations_by_status.items())
-
-
-def _print_suites(counts: Iterable[SuiteCount], *, json: bool) -> None:
-    from rbfrag.db.queries import SuiteCount
-
-    rows = [asdict(count) for count in counts]
-    if json:
-        print_json({"suites": rows})
-    else:
-        columns = [field.name for field in fields(SuiteCount)]
-        print_table(columns, [tuple(row.values()) for row in rows])
+        content: Result = query(connection)
+    print_result(content, json=json)
 
 
 @app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
@@ -125,63 +74,13 @@ def check(
     The check covers the file, references, samples, keys, brackets, maps, and a random sample
     computed again. The exit status is 1 if damage is found.
     """
-    from rbfrag.db.check.damage import Damage
-    from rbfrag.db.check.database import check_database, coverage
-    from rbfrag.db.check.ledger import accept_rows, mark_sound
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.insert import utc_now
+    from rbfrag.campaign.database_check import check_with_sample
 
-    begun, again = utc_now(), None
-    accepted = accept_rows(db) if accept else []
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        findings = check_database(connection)
-        covered = coverage(connection)
-        if sample:
-            from rbfrag.campaign.resimulate import resimulate
-
-            say_when_compiling()
-            try:
-                again = resimulate(connection, sample=sample, seed=seed)
-                findings += again.findings
-            except Exception as error:
-                if not findings:
-                    raise
-                # what a damaged row can raise there, nobody can list; the row is found already
-                why = f"{type(error).__name__}: {error}"
-                findings.append(Damage("database", "-", f"computing again broke off ({why})"))
-    if not findings:
-        mark_sound(db, begun)
-    if json:
-        computed = None if again is None else asdict(again)
-        if computed is not None:
-            del computed["findings"]
-        print_json(
-            {
-                "sound": not findings,
-                "findings": [asdict(finding) for finding in findings],
-                "accepted": [asdict(each) for each in accepted],
-                "resimulated": computed,
-                "covered": covered,
-            }
-        )
-    else:
-        if again is not None:
-            print(
-                f"computed again: {again.sampled} of {again.eligible} combinations, "
-                f"{again.exact} exact, {again.within_error} within the solver's error"
-            )
-        for each in accepted:
-            print(f"accepted: {each.table} {each.row}: {each.problem}")
-        if findings:
-            print_table(
-                ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]
-            )
-            for advice in dict.fromkeys(finding.advice for finding in findings):
-                print(f"to do: {advice}")
-        else:
-            print("sound: nothing is wrong with this database")
-        print(covered)
-    if findings:
+    if sample:
+        say_when_compiling()
+    result = check_with_sample(db, sample=sample, seed=seed, accept=accept)
+    print_result(result, json=json)
+    if not result.is_sound:
         raise typer.Exit(1)
 
 
@@ -206,12 +105,7 @@ def export(
     report = export_database(
         out, db=db, format=format, tables=names, arrays=arrays, excel_text=excel_text
     )
-    if json:
-        print_json(report.as_dict())
-    else:
-        print_table(("table", "rows"), report.rows.items())
-        print(f"written to {report.folder}")
-        print_warnings(report.warnings)
+    print_result(report, json=json)
 
 
 @app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")
@@ -231,7 +125,7 @@ def merge(
     """
     from rbfrag.db.merge.databases import merge_databases
 
-    _print_merge(merge_databases(other, db=db), json=json)
+    print_result(merge_databases(other, db=db), json=json)
 
 
 @app.command("import", epilog="Example:  rbfrag db import critical.csv --map map.toml")
@@ -250,20 +144,4 @@ def import_(
     """
     from rbfrag.exchange.tables.critical_values import import_critical_values
 
-    _print_merge(import_critical_values(table, map, db=db), json=json)
-
-
-def _print_merge(report: MergeReport, *, json: bool) -> None:
-    """Print what was added to a database, and what was there."""
-    if json:
-        print_json(report.as_dict())
-        return
-    for note in report.notes:
-        print(f"note: {note}", file=sys.stderr)
-    tables = sorted(report.added.keys() | report.same.keys())
-    rows = [(name, report.added.get(name, 0), report.same.get(name, 0)) for name in tables]
-    print_table(("table", "added", "already here"), rows)
-    if report.restated:
-        print(f"earthquakes stated instead of guessed: {report.restated} motions")
-    if report.within_error:
-        print(f"equal within the error of the solver, ours kept: {report.within_error}")
+    print_result(import_critical_values(table, map, db=db), json=json)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
-from rbfrag.cli.output import print_json, print_result, print_table
+from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.completion import model_names
 from rbfrag.cli.parameters.stack import argument, command_group, stacked
-from rbfrag.results.numbers import count_of
 
 app = command_group(
     "List, show and choose fitted fragility models.", "Example:  rbfrag models show logistic-pgv"
@@ -32,28 +30,9 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     by name only. Without a database the built-in models are listed.
     """
     from rbfrag.fragility.lookup import stored_rows
-    from rbfrag.fragility.model_list import model_list
-    from rbfrag.vocabulary.quantities import word_of
+    from rbfrag.fragility.model_list import ModelList
 
-    listed = model_list(stored_rows(db))
-    if json:
-        print_json(listed)
-        return
-    default = ", ".join(f"{each['name']} ({each['kind']})" for each in listed if each["is_default"])
-    print(
-        f"{count_of(len(listed), 'fitted model')}; where none is named, the default of a kind goes "
-        f"first: {default or 'none'}."
-    )
-    print()
-    print_table(
-        ("name", "for", "reads", "log_loss", "default"),
-        [
-            (each["name"], each["kind"], ", ".join(map(word_of, each["reads"])),
-             "" if loss is None else f"{loss:.4f}", "yes" if each["is_default"] else "")
-            for each in listed
-            for loss in [each["log_loss_kr05"] or each["log_loss"]]
-        ],
-    )  # fmt: skip
+    print_result(ModelList(stored_rows(db)), json=json)
 
 
 @app.command("show", epilog="Example:  rbfrag models show logistic-pgv")
@@ -112,11 +91,6 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         checks = check_models(connection, model_rows(connection))
-    if json:
-        print_json([asdict(each) for each in checks])
-    else:
-        print_table(
-            ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in checks]
-        )
-    if any(each.state in ("changed", "unreadable") for each in checks):
+    print_result(checks, json=json)
+    if not checks.is_passed:
         raise typer.Exit(1)

@@ -86,7 +86,7 @@ def coverage(connection: Connection) -> str:
     )
     samples = select(func.count()).where(motion.c.samples.is_not(None))
     return (
-        f"covered: {rows} rows of {len(metadata.tables)} tables, each column but "
+        f"{rows} rows of {len(metadata.tables)} tables, each column but "
         f"{', '.join(NOT_COVERED)} by the digest of its row; samples and measures of "
         f"{connection.scalar(samples)} motions; spectra, keys, brackets, maps, histories, models; "
         f"{_OF_ROWS[has_ledger(connection)]}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,8 @@ from rbfrag.db.schema import (
 )
 from rbfrag.db.shock_pairs import PARTS
 from rbfrag.errors import DatabaseError, InputError, MergeConflictError
+from rbfrag.results.numbers import count_of
+from rbfrag.results.result import Result, TextLine, TextTable
 
 _CONFLICTS_SHOWN = 5
 
@@ -91,9 +94,9 @@ _OTHERS = (
 """Tables whose rows are taken over one by one, each behind those that it refers to."""
 
 
-@dataclass(frozen=True)
-class MergeReport:
-    """What :func:`merge_databases` did.
+@dataclass(frozen=True, repr=False)
+class MergeReport(Result):
+    """The rows that :func:`merge_databases` added.
 
     Args:
         added: rows added by table.
@@ -101,18 +104,38 @@ class MergeReport:
         restated: motions whose guessed earthquake became the stated one of the other.
         within_error: results that differ from those here by no more than the solver's error
             (made on another processor): those here stay.
-        notes: sentences about what was stored under another name.
+        warnings: recordings and models that were stored under another name.
     """
 
     added: dict[str, int]
     same: dict[str, int]
     restated: int
     within_error: int
-    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
-    def as_dict(self) -> dict[str, object]:
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of rows that were added, and of those that were stored before."""
+        added, same = sum(self.added.values()), sum(self.same.values())
+        yield f"{count_of(added, 'row')} added, {same:,} stored before"
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield motions with a new earthquake, and results that differ by numerical error."""
+        if self.restated:
+            motions = count_of(self.restated, "motion")
+            yield TextLine("Changed", f"earthquakes of {motions}: given instead of guessed")
+        if self.within_error:
+            results = count_of(self.within_error, "result")
+            yield TextLine("Kept", f"{results} that differ within the error of the solver")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the number of rows by table."""
+        names = sorted(self.added.keys() | self.same.keys())
+        rows = [(name, self.added.get(name, 0), self.same.get(name, 0)) for name in names]
+        yield TextTable(("table", "added", "stored before"), rows)
+
+    def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the JSON contract."""
-        return {**asdict(self), "notes": list(self.notes)}
+        return {**asdict(self), "warnings": list(self.warnings)}
 
 
 def merge_databases(
@@ -168,7 +191,7 @@ def merge_databases(
         same=dict(sorted(merge.same.items())),
         restated=merge.restated,
         within_error=merge.within_error,
-        notes=tuple(merge.notes),
+        warnings=tuple(merge.warnings),
     )
 
 
@@ -245,10 +268,7 @@ def _recording(merge: Merge, row: Row, place: Row, event: Row) -> int:
         if merge.target.execute(stranger).first() is not None:
             # Files of one name in two folders are no companions: nothing says they are.
             name = row["samples_sha256"][:12]
-            merge.notes.append(
-                f"there is another record {place['name']!r} of no known event here: theirs is "
-                f"another, stored as recording {name!r}"
-            )
+            merge.warn_of_name(f"recording {place['name']!r} of unknown earthquakes", name)
             event = {**event, "id": -row["id"], "event_id": UNKNOWN_EVENT + name}
             place = {**place, "id": -row["id"], "name": name}
     earthquake_id = merge.bring(_EARTHQUAKE, event)
@@ -278,9 +298,7 @@ def _merge_models(merge: Merge) -> None:
         insert_row(merge.target, fragility_model, encode_model(ours[name]))
         merge.added["fragility_model"] += 1
         if name != theirs.name:
-            merge.notes.append(
-                f"there is another model {theirs.name!r} here: theirs is stored as {name!r}"
-            )
+            merge.warn_of_name(f"model {theirs.name!r}", name)
 
 
 def _content(row: ModelRow) -> dict[str, Any]:

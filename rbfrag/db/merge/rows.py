@@ -14,6 +14,7 @@ from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_row, update_rows
 from rbfrag.db.keys import key_of_row
 from rbfrag.db.motions import samples_of_motions
+from rbfrag.results.diagnostic import Diagnostic
 
 Row = RowMapping | Mapping[str, Any]
 
@@ -54,10 +55,20 @@ class Merge:
     same: Counter[str] = field(default_factory=Counter)
     restated: int = 0
     within_error: int = 0
-    notes: list[str] = field(default_factory=list)
+    warnings: list[Diagnostic] = field(default_factory=list)
     conflicts: list[str] = field(default_factory=list)
     ids: dict[str, dict[int, int]] = field(default_factory=lambda: defaultdict(dict))
     other_bits: bool = False
+
+    def warn_of_name(self, subject: str, name: str) -> None:
+        """Add a warning of a row that is stored under another name.
+
+        Args:
+            subject: what the databases have one of each, with the name they share.
+            name: the new name of the other's.
+        """
+        text = f"the databases differ in {subject}: that of the other is stored as {name!r}"
+        self.warnings.append(Diagnostic(text, "renamed"))
 
     def rows(self, table: Table) -> Iterator[Row]:
         """Yield the rows there as they would stand here, apart from their own number."""

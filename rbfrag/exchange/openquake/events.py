@@ -20,6 +20,7 @@ from rbfrag.exchange.openquake.table import Table
 from rbfrag.files import as_path
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
 from rbfrag.hazards.measure_type import IntensityType, is_read, openquake_type, requested_measure
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.results import FloatArray
 
 FILES = {
@@ -143,11 +144,12 @@ def read_events(
     duration = _duration(heads, year, investigation_time, ses)
     event, site, measures = _shaking(heads["gmf_data"], heads["sitemesh"], sites, event_id, imts)
     if duration is not None and year.size and int(year.max()) > duration.years * len(weights) + 0.5:
-        remarks.append(
+        text = (
             f"{files.events}: year {int(year.max())} lies beyond the {duration.years:g} years of "
             f"each of {len(weights)} realizations: are investigation time and number of event "
             "sets those of this job?"
         )
+        remarks.append(Diagnostic(text, "years_of_events"))
     return EventSet(
         event_id, realization, year, event_weights(realization, weights, duration),
         sites, event, site, measures, duration, weights, tuple(remarks),
@@ -249,12 +251,13 @@ def _weights(head: Table) -> tuple[dict[int, float], list[str]]:
     total = float(values.sum())
     if not 0.0 < total < np.inf:
         raise InputError(f"{head.path}: the weights of the realizations sum to {total:g}")
-    remarks = []
+    remarks: list[str] = []
     if abs(total - 1.0) > 1e-3:
-        remarks.append(
+        text = (
             f"{head.path}: the weights of the realizations sum to {total:.4g}; they are divided by "
             "that"
         )
+        remarks.append(Diagnostic(text, "unscaled_weights"))
     return dict(zip(numbers, (values / total).tolist(), strict=True)), remarks
 
 

@@ -3,8 +3,9 @@ say."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rbfrag.db.model_file import ModelRow
@@ -17,6 +18,8 @@ from rbfrag.fragility.fit.scores import CalibrationBins, calibration_bins
 from rbfrag.fragility.measures import intensity_term
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.results.numbers import count_of
+from rbfrag.results.result import ResultList, TextLine, TextTable
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -26,17 +29,52 @@ State = Literal["unchanged", "changed", "no data", "unreadable"]
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """What became of one model's data.
+    """Comparison of the data of a model with those that it was fitted to.
 
     Args:
         state: ``unchanged``; ``changed`` (fit it again); ``no data`` (the database holds models
             without the data they came from, as a reference does); ``unreadable``.
-        remark: what changed or why it cannot be told; empty if unchanged.
+        remark: what changed, or why that is unknown; empty if unchanged.
     """
 
     name: str
     state: State
     remark: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelChecks(ResultList):
+    """Comparison of the data of all models with those that they were fitted to."""
+
+    checks: Sequence[ModelCheck]
+
+    @property
+    def is_passed(self) -> bool:
+        """False where data have changed, or a model is invalid."""
+        return not any(check.state in ("changed", "unreadable") for check in self.checks)
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the number of models by the state of their data."""
+        counts = Counter(check.state for check in self.checks)
+        states = ", ".join(f"{number} {state}" for state, number in counts.items())
+        yield f"{count_of(len(self.checks), 'fitted model')}: {states}".removesuffix(": ")
+
+    def lines(self) -> Iterator[TextLine]:
+        """Yield each remark with its models."""
+        models: dict[str, list[str]] = {}
+        for check in self.checks:
+            if check.remark:
+                models.setdefault(check.remark, []).append(check.name)
+        for remark, names in models.items():
+            yield TextLine("Remark", f"{', '.join(names)}: {remark}")
+
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+        """Yield the models with the state of their data."""
+        yield TextTable(("model", "data"), [(check.name, check.state) for check in self.checks])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the checks under the keys of the JSON contract."""
+        return [asdict(check) for check in self.checks]
 
 
 def selection_of(row: ModelRow) -> Selection:
@@ -63,10 +101,10 @@ def narrow_of(row: ModelRow) -> float:
     return float(cast("float", row.diagnostics.get("narrow", CERTIFIED)))
 
 
-def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
+def check_models(connection: Connection, rows: list[ModelRow]) -> ModelChecks:
     """Compare the fingerprint of each model with that of the data its fit would read today."""
     sources: dict[tuple[Any, ...], FitSource] = {}
-    return [_check(connection, row, sources) for row in rows]
+    return ModelChecks([_check(connection, row, sources) for row in rows])
 
 
 def _check(

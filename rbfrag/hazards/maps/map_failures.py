@@ -30,6 +30,7 @@ from rbfrag.hazards.maps.site_probability import SiteProbability
 from rbfrag.hazards.maps.site_shaking import SiteShaking
 from rbfrag.hazards.maps.spatial_field import SpatialField, correlation_range_km
 from rbfrag.hazards.standing_blocks import COPULA, normals_by_law
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
 
@@ -125,19 +126,21 @@ class MapFailures:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What these numbers take for granted."""
-        texts = []
+        warnings = []
         if self.range_km is not None:
-            texts.append(
+            text = (
                 f"failures and probability_any take {exact_percent(BETWEEN)} of the variance of "
                 "the map's values as common to the earthquake, and the rest as correlated over "
                 f"{self.range_km:g} km (Jayaram and Baker 2009)"
             )
+            warnings.append(Diagnostic(text, "spatial_correlation"))
         if COPULA not in self.by_law:
-            texts.append(
+            text = (
                 "what the blocks share in one earthquake is not known to this model: bounds has "
                 "both under full dependence and if they fail independently"
             )
-        return tuple(texts)
+            warnings.append(Diagnostic(text, "unknown_dependence"))
+        return tuple(warnings)
 
 
 _SAME_SITE_DEG = 0.001
