@@ -247,7 +247,9 @@ def hazard_at_sites(
     ]  # fmt: skip
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
-        edges, contribution = curve_contributions(first[0], reading, [some for _, some in blocks])
+        edges, contribution = curve_contributions(
+            sites[0], branch_weight, reading, [some for _, some in blocks]
+        )
     whole = float(np.nansum(number * result.rate))
     nothing = np.full(result.rate.shape, np.nan)
     low, high = nothing, nothing
@@ -277,6 +279,7 @@ def hazard_at_sites(
         contribution=contribution,
         above=ends[0],
         above_at_most=ends[1],
+        below=result.ends[0],
         measure=first[0].measure,
         joints=joints,
         curve_kind="weighted branches" if weight is not None else first[0].statistic or None,

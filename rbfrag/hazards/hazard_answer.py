@@ -16,6 +16,7 @@ from rbfrag.hazards import between_measures
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_rate import JointRate
 from rbfrag.hazards.mass import Indices
+from rbfrag.hazards.shaking import NOTABLE
 from rbfrag.results.numbers import (
     NEVER,
     SMALLEST,
@@ -97,6 +98,7 @@ class HazardAnswer(Result):
             (1, k); without rows for several blocks.
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.
+        below: probability of failure at the first level of the curve, shape (m,).
         measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
         joints: of each site earthquakes with at least one failure among its blocks; None where
             that is not asked for, or there is one block.
@@ -139,6 +141,7 @@ class HazardAnswer(Result):
     contribution: FloatArray
     above: FloatArray
     above_at_most: FloatArray
+    below: FloatArray
     measure: str
     joints: tuple[JointRate | None, ...]
     curve_kind: str | None
@@ -186,10 +189,48 @@ class HazardAnswer(Result):
         return float(np.nansum(self.count * self.annual_rate))
 
     @property
+    def upper_bound(self) -> FloatArray:
+        """Upper bounds of the rates [1/yr], shape (m,), of which `annual_rate` are the lower ones.
+
+        Shaking above the last level of a curve fails a block each time at most. NaN where a block
+        fails below the first level, too: a curve gives no rate of weaker shaking.
+        """
+        bound = self.annual_rate + self.above_at_most - self.above
+        return np.where(self.below > NOTABLE, np.nan, bound)
+
+    @property
+    def expected_failures_upper_bound(self) -> float | None:
+        """Upper bound of `expected_failures_per_year`; None where that of a block is unknown."""
+        known = ~np.isnan(self.annual_rate)
+        return finite_or_none(float((self.count * self.upper_bound)[known].sum()))
+
+    @property
+    def _is_truncated(self) -> NDArray[np.bool_]:
+        """Whether the rate is a range, as the curve ends or begins too early, shape (m,)."""
+        rate, bound = self.annual_rate, self.upper_bound
+        return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
+
+    def return_period_text(self, index: int) -> str:
+        """Return the return period of a block, "840 years", or its range if the curve is too short.
+
+        Args:
+            index: which of the blocks.
+        """
+        rate, bound = float(self.annual_rate[index]), float(self.upper_bound[index])
+        if not self._is_truncated[index]:
+            return return_period(rate)
+        if math.isnan(bound):
+            return f"at most {return_period(rate)}"
+        if rate > NEVER:
+            return f"between {years(bound)} and {return_period(rate)}"
+        return f"at least {return_period(bound)}"
+
+    @property
     def rate_columns(self) -> dict[str, FloatArray]:
         """The rates and their uncertainty under the names of tables and JSON, shape (m,) each."""
         columns = {
             "annual_rate": self.annual_rate,
+            "annual_rate_upper_bound": self.upper_bound,
             "ci_low": self.ci_low,
             "ci_high": self.ci_high,
             "numerical_error": self.numerical_error,
@@ -206,10 +247,9 @@ class HazardAnswer(Result):
     def fractions_between(self, levels: FloatArray) -> FloatArray:
         """Return the fractions of the first block's rate from shaking between levels.
 
-        Of several branches they are those of the first, as `contribution` is.
+        Of weighted branches they are those of the mean rate.
         """
-        rates = self.branches[0].annual_rate if self.branches else self.annual_rate
-        rate = max(float(rates[0]), np.finfo(float).tiny)
+        rate = max(float(self.annual_rate[0]), np.finfo(float).tiny)
         below = np.append(0.0, self.contribution[0].cumsum()) / rate
         return np.diff(np.interp(np.log(levels), np.log(self.edges), below))
 
@@ -223,57 +263,57 @@ class HazardAnswer(Result):
         if self.tau is not None:
             yield between_measures.in_words(self.tau)
 
-    def _most(self, rates: FloatArray) -> FloatArray:
-        """Return rates with the most that shaking above the last level may add [1/yr]."""
-        return rates + self.above_at_most - self.above
-
     def _of_one_block(self) -> Iterator[str]:
-        rate, low, high, chance, most = (
+        rate, bound, low, high, chance = (
             float(values[0])
             for values in (
-                self.annual_rate, self.ci_low, self.ci_high, self.probability,
-                self._most(self.annual_rate),
+                self.annual_rate, self.upper_bound, self.ci_low, self.ci_high, self.probability,
             )
         )  # fmt: skip
         in_years = f"P(failure in {self.years:g} years)"
-        if most > max(NOTABLE_FACTOR * rate, NEVER):
-            end = f"the hazard curve ends at {self.curves[0].level_text(-1)}"
-            most_chance = 1.0 - math.exp(-most * self.years)
-            most_chance = 1.0 if most_chance > 1.0 - SMALLEST else most_chance
-            if rate > NEVER:
-                yield (
-                    f"Return period of failure between {years(most)} and {return_period(rate)}: "
-                    f"{end}"
-                )
-                yield (
-                    f"Mean annual rate {annual_rates(rate, most)} /yr; {in_years} = "
-                    f"{interval(chance, most_chance)}"
-                )
-            else:
-                yield f"Return period of failure at least {return_period(most)}: {end}"
-                yield (
-                    f"Mean annual rate at most {annual_rate(most)} /yr; {in_years} at most "
-                    f"{percent(most_chance)}"
-                )
-        else:
+        period = f"Return period of failure {self.return_period_text(0)}"
+        if not self._is_truncated[0]:
             ends = confidence(self.level, return_periods(low, high))
-            period = return_period(rate)
-            yield f"Return period of failure {period}" + (f"   ({ends})" if high > NEVER else "")
             chances = [1.0 - math.exp(-end * self.years) for end in (low, high)]
+            yield period + (f"   ({ends})" if high > NEVER else "")
             yield (
                 f"Mean annual rate {annual_rate(rate)} /yr; "
                 f"{equals(in_years, with_interval(chance, *chances))}"
+            )
+        elif math.isnan(bound):
+            yield f"{period}: the hazard curve begins at {self.curves[0].level_text(0)}"
+            yield (
+                f"Mean annual rate at least {annual_rate(rate)} /yr; {in_years} at least "
+                f"{percent(chance)}"
+            )
+        else:
+            yield f"{period}: the hazard curve ends at {self.curves[0].level_text(-1)}"
+            most = 1.0 - math.exp(-bound * self.years)
+            most = 1.0 if most > 1.0 - SMALLEST else most
+            yield (
+                f"Mean annual rate {annual_rates(rate, bound)} /yr; {in_years} = "
+                f"{interval(chance, most)}"
+                if rate > NEVER
+                else f"Mean annual rate at most {annual_rate(bound)} /yr; {in_years} at most "
+                f"{percent(most)}"
             )
         if self.drained is not None and self.drained[0] >= 0.0:
             yield f"Drained return period {return_period(float(self.drained[0]))}"
 
     def _of_all_blocks(self) -> Iterator[str]:
         size, sites = int(self.count.sum()), len(self.curves)
-        expected = self.expected_failures_per_year
+        expected, bound = self.expected_failures_per_year, self.expected_failures_upper_bound
         blocks = f"{size:,} blocks{f' at {sites:,} sites' if sites > 1 else ''}"
-        most = float(np.nansum(self.count * self._most(self.annual_rate)))
-        if most > NOTABLE_FACTOR * expected:
-            text = annual_rates(expected, most)
+        at_most = ""
+        if bound is None:
+            at_most = "at most "
+            yield (
+                f"Expected failures at least {annual_rate(expected)} /yr of {blocks}: a block "
+                "fails below the first level of its hazard curve"
+            )
+        elif bound > NOTABLE_FACTOR * expected:
+            at_most = "at most "
+            text = annual_rates(expected, bound)
             yield f"Expected failures {text} /yr of {blocks}: the hazard curve ends too early"
         else:
             ends = confidence(self.level, annual_rates(self.total_low, self.total_high))
@@ -281,16 +321,15 @@ class HazardAnswer(Result):
         for curve, joint in zip(self.curves, self.joints, strict=True):
             if joint is not None:
                 place = f"{curve.place}: at" if curve.place else "At"
-                yield f"{place} least one failure: {self._of_any_failure(joint)}"
-        rates, names = np.nan_to_num(self.annual_rate), self._names()
+                yield f"{place} least one failure: {self._of_any_failure(joint, at_most)}"
+        names, order = self._names(), np.argsort(-np.nan_to_num(self.annual_rate), kind="stable")
         shortest = [
-            f"{names[i] or f'block {i + 1}'} ({return_period(rates[i])})"
-            for i in np.argsort(-rates, kind="stable")[:SHORTEST_SHOWN].tolist()
+            f"{names[i] or f'block {i + 1}'} ({self.return_period_text(i)})"
+            for i in order[:SHORTEST_SHOWN].tolist()
         ]
-        bound = " at most" if most > NOTABLE_FACTOR * expected else ""
-        yield f"Shortest return periods{bound}: {', '.join(shortest)}"
+        yield f"Shortest return periods: {', '.join(shortest)}"
 
-    def _of_any_failure(self, joint: JointRate) -> str:
+    def _of_any_failure(self, joint: JointRate, at_most: str) -> str:
         in_years = f"P in {self.years:g} years"
         rate, chance, ends = joint.annual_rate_any, joint.probability_any, joint.annual_rate_any_ci
         if rate is None or chance is None or ends is None:
@@ -299,6 +338,8 @@ class HazardAnswer(Result):
                 for name in ("fully_dependent", "independent")
             )
             return f"{in_years} from {least} (full dependence) to {most} (independence)"
+        if at_most:
+            return f"return period at most {return_period(rate)}"
         period = f"return period {return_period(rate)}; {equals(in_years, percent(chance))}"
         return f"{period}   ({confidence(self.level, f'{return_periods(*ends)} years')})"
 
@@ -337,21 +378,25 @@ class HazardAnswer(Result):
             yield TextTable.of_values(document)
         if self._is_single and self.annual_rate[0] > 0.0:
             curve = self.curves[0]
-            branch = f" of {self.branches[0].name}" if self.branches else ""
-            headers = (f"{curve.imt} [{curve.unit}]", f"percentage of the rate{branch}")
+            headers = (f"{curve.imt} [{curve.unit}]", "percentage of the rate")
             yield TextTable(headers, self._contributions())
+        omitted = {"numerical_error"}
+        if not self._is_truncated.any():
+            omitted.add("annual_rate_upper_bound")
+        if verbose:
+            omitted.clear()
         shown = [
             {
                 name if name != "drained" else "drained_annual_rate": (
                     value["annual_rate"] if name == "drained" and value else value
                 )
                 for name, value in row.items()
-                if verbose or name != "numerical_error"
+                if name not in omitted
             }
             for row in (rows if verbose else rows[:ROWS_SHOWN])
         ]
         counts = [
-            {name: value for name, value in row.items() if verbose or name != "numerical_error"}
+            {name: value for name, value in row.items() if name not in omitted}
             for row in document.get("annual_rate_at_least") or ()
         ]
         for table in (counts, document.get("branches"), shown):
@@ -370,7 +415,8 @@ class HazardAnswer(Result):
         ]
         beyond = float(self.above[0] / self.annual_rate[0])
         if beyond >= SMALLEST_FRACTION:
-            rows.append([f"> {levels[-1]:.3g}", round(100.0 * beyond, 1)])
+            last = f"{levels[-1]:.3g}"
+            rows.append([f"> {last}, with P(failure) at {last}", round(100.0 * beyond, 1)])
         return rows
 
     def as_dict(self) -> dict[str, Any]:
@@ -450,6 +496,7 @@ class HazardAnswer(Result):
         return {
             **common,
             "expected_failures_per_year": self.expected_failures_per_year,
+            "expected_failures_upper_bound": self.expected_failures_upper_bound,
             "expected_failures_low": self.total_low,
             "expected_failures_high": self.total_high,
         }

@@ -443,25 +443,36 @@ def _off_by(values: FloatArray) -> FloatArray:
 
 
 def curve_contributions(
-    curve: HazardCurve, shaking: LevelShaking, blocks: Sequence[KernelBlocks]
+    branches: Sequence[HazardCurve],
+    weight: FloatArray,
+    shaking: LevelShaking,
+    blocks: Sequence[KernelBlocks],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return which levels of a curve the mean rate of some blocks comes from.
+    """Return which shaking the mean rate of some blocks comes from.
+
+    Args:
+        branches: curves of one site.
+        weight: weights of these, which sum to 1.
 
     Returns:
-        Edges between levels, shape (k + 1,), and the part of the rate from each interval [1/a],
-        shape (1, k); what lies beyond the last level is in none.
+        Edges between levels, shape (k + 1,), and the part of the rate from each interval [1/yr],
+        the weighted mean of the branches, shape (1, k); what lies beyond their last levels is in
+        none.
     """
-    mass = curve_mass([[curve]], np.ones(1), shaking)
+    used = np.flatnonzero(weight).tolist()
+    curves, weight = [branches[i] for i in used], weight[used]
+    mass = curve_mass([[curve] for curve in curves], weight, shaking)
     grid, total = mass.grid, np.zeros(mass.grid.size)
     for some in blocks:
         p = table_of(some, grid, 0, some.allowed_from(grid), slopes=False).probability
         total += p.sum(axis=0)
     mean = mass.smoothing.of(total / sum(some.size for some in blocks))
-    part = under([curve], grid, beyond=False)[0] * mean
-    low, high = np.log(curve.levels[[0, -1]])
-    starts = np.flatnonzero((grid.u > low) & (grid.u < high))[_EDGE_EVERY::_EDGE_EVERY]
+    part = weight @ under(curves, grid, beyond=False) * mean
+    low, high = min(c.levels[0] for c in curves), max(c.levels[-1] for c in curves)
+    starts = np.flatnonzero((grid.u > np.log(low)) & (grid.u < np.log(high)))
+    starts = starts[_EDGE_EVERY::_EDGE_EVERY]
     edges = np.exp(grid.u[starts] - 0.5 * grid.step)
     return (
-        np.concatenate([curve.levels[:1], edges, curve.levels[-1:]]),
+        np.concatenate([[low], edges, [high]]),
         np.add.reduceat(part, np.append(0, starts))[None],
     )

@@ -146,7 +146,8 @@ class SiteMass:
         branches: the same of each, branches x sites x nodes; empty for one.
         weight: weights of the branches, which sum to 1.
         smoothing: the scatter that is on the masses.
-        ends: of the curves that have most weight; None of event sets.
+        ends: levels of the curves that have most weight, with the mean rates of all; None of
+            event sets.
     """
 
     grid: Grid
@@ -197,7 +198,7 @@ def curve_mass(
         masses if len(branches) > 1 else np.empty((0, *masses.shape[1:])),
         weight,
         smoothing,
-        _ends(branches[int(np.argmax(weight))], grid, smoothing),
+        _ends(branches, weight, grid, smoothing),
     )
 
 
@@ -257,7 +258,10 @@ TINY = float(np.finfo(np.float64).tiny)
 ROUNDING = 1e-12
 
 
-def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> CurveEnds:
+def _ends(
+    branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, grid: Grid, smoothing: Smoothing
+) -> CurveEnds:
+    curves = branches[int(np.argmax(weight))]
     keys: dict[tuple[float, float, float | None], int] = {}
     group = np.array(
         [keys.setdefault((c.levels[0], c.levels[-1], c.end_level), len(keys)) for c in curves]
@@ -272,7 +276,7 @@ def _ends(curves: Sequence[HazardCurve], grid: Grid, smoothing: Smoothing) -> Cu
     first, last, end = zip(*keys, strict=True)
     return CurveEnds(
         group, unit(first), unit(last), unit(end), np.array([level is None for level in end]),
-        np.array([float(curve.annual_rate[-1]) for curve in curves]),
+        weight @ [[float(curve.annual_rate[-1]) for curve in each] for each in branches],
     )  # fmt: skip
 
 

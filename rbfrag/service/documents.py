@@ -304,6 +304,7 @@ class SiteRate(_Document):
     site: str | None
     block_id: str | None
     annual_rate: float
+    annual_rate_upper_bound: float | None
     ci_low: float
     ci_high: float
     numerical_error: float
@@ -332,6 +333,7 @@ class HazardDocument(_Answer):
     warnings: list[str]
     site: str | None = None
     annual_rate: float | None = None
+    annual_rate_upper_bound: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
     numerical_error: float | None = None
@@ -340,6 +342,7 @@ class HazardDocument(_Answer):
     contributions: list[Contribution] | None = None
     annual_rate_any: float | None = None
     expected_failures_per_year: float | None = None
+    expected_failures_upper_bound: float | None = None
     expected_failures_low: float | None = None
     expected_failures_high: float | None = None
     blocks: list[SiteRate] | None = None

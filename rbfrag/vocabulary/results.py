@@ -47,6 +47,11 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("blocks", "Blocks with their answers, or their number"),
         ("expected_failures", "Expected number of failures"),
         ("expected_failures_per_year", "Mean annual number of failures", "/yr"),
+        (
+            "expected_failures_upper_bound",
+            "Upper bound of that number by the ends of the hazard curve; null if unknown",
+            "/yr",
+        ),
         ("expected_failures_low", "Lower end of the confidence interval of that number", "/yr"),
         ("expected_failures_high", "Upper end of the confidence interval of that number", "/yr"),
         ("failures_low", "Lower end of the prediction interval of the number of failures"),
@@ -181,6 +186,11 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "Annual rates and losses": (
         ("annual_rate", "Mean annual rate of failure", "1/yr", "λ"),
+        (
+            "annual_rate_upper_bound",
+            "Upper bound of the annual rate by the ends of the hazard curve; null if unknown",
+            "1/yr",
+        ),
         ("annual_rate_any", "Mean annual rate of earthquakes with at least one failure", "1/yr"),
         ("years", "Period of the probability", "yr"),
         ("numerical_error", "Bound of the integration error of the annual rate", "1/yr"),

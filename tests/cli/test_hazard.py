@@ -109,9 +109,9 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     assert set(found) == {
         "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "annual_rate_at_least",
-        "joint_law", "bounds", "expected_failures_per_year", "expected_failures_low",
-        "expected_failures_high", "years", "level", "how", "model", "term",
-        "method", "imt", "curve_kind", "between_measures", "blocks", "warnings",
+        "joint_law", "bounds", "expected_failures_per_year", "expected_failures_upper_bound",
+        "expected_failures_low", "expected_failures_high", "years", "level", "how", "model",
+        "term", "method", "imt", "curve_kind", "between_measures", "blocks", "warnings",
     }  # fmt: skip
     assert found["how"] == f"model {found['model']}"
     each = [row["annual_rate"] for row in found["blocks"]]

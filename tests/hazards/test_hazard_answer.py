@@ -56,7 +56,43 @@ def test_a_curve_that_ends_early_gives_a_range() -> None:
     assert second == "Mean annual rate at most 0.4 /yr; P(failure in 50 years) at most 100 %"
     first, *_, last, _ = answered([3.0, 3.0], 0.1, last=0.7).sentences()
     assert first.endswith(" /yr of 2 blocks: the hazard curve ends too early")
-    assert last.startswith("Shortest return periods at most: ")
+    assert re.search(r"periods: block 1 \(between 490 and [\d,]+ years\), block 2", last)
+
+
+def test_the_range_of_a_truncated_curve_is_in_tables_and_documents() -> None:
+    complete, truncated = answered([3.0, 3.0], 0.1), answered([3.0, 3.0], 0.1, last=0.7)
+    for answer, factor in ((complete, 1.01), (truncated, 4.0)):
+        bounds, rates = answer.upper_bound, answer.annual_rate
+        np.testing.assert_array_equal(answer.rate_columns["annual_rate_upper_bound"], bounds)
+        assert ((bounds >= rates) & ((bounds < factor * rates) == (answer is complete))).all()
+        document = answer.as_dict()
+        assert [row["annual_rate_upper_bound"] for row in document["blocks"]] == bounds.tolist()
+        assert document["expected_failures_upper_bound"] == pytest.approx(bounds.sum())
+        *_, table = answer.tables()
+        assert ("annual_rate_upper_bound" in table.headers) == (answer is truncated)
+    (rate,) = (alone := answered(last=0.7)).annual_rate
+    assert alone.as_dict()["annual_rate_upper_bound"] == alone.upper_bound[0] > 4.0 * rate
+
+
+def test_a_curve_that_begins_too_late_gives_no_upper_bound() -> None:
+    x = np.geomspace(1.0, 10.0, 20)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
+    asked: dict[str, Any] = {"model": model_row(dependence=SHARED), "component": "single"}
+    alone = hazard(curve, 3.0, 0.1, **asked)
+    first, second, *_ = alone.sentences()
+    period, rate = return_period(alone.annual_rate[0]), annual_rate(alone.annual_rate[0])
+    assert first == (
+        f"Return period of failure at most {period}: the hazard curve begins at PGV = 1 m/s"
+    )
+    assert second.startswith(f"Mean annual rate at least {rate} /yr; P(failure in 50 years) at ")
+    assert alone.as_dict()["annual_rate_upper_bound"] is None
+    several = hazard(curve, [3.0, 3.0], 0.1, joint=True, **asked)
+    assert several.as_dict()["expected_failures_upper_bound"] is None
+    first, second, *_ = several.sentences()
+    assert re.fullmatch(
+        r"Expected failures at least .* /yr of 2 blocks: a block fails below .*", first
+    )
+    assert second.startswith("At least one failure: return period at most ")
 
 
 def test_a_rate_of_never_has_no_interval() -> None:
@@ -88,6 +124,27 @@ REJECTED = {"block_id": "bad", "reason": "no number"}
 def test_the_table_of_contributions_adds_up() -> None:
     *_, table = answered().tables()
     assert sum(row[-1] for row in table.rows) == pytest.approx(100.0, abs=0.5)
+    *_, table = answered(last=0.7).tables()
+    assert table.rows[-1][0] == "> 0.7, with P(failure) at 0.7"
+
+
+def test_the_contributions_of_weighted_branches_are_those_of_their_mean() -> None:
+    x, weights = np.geomspace(0.01, 1.0, 20), [0.5, 0.3, 0.2]
+    curves = [
+        hazard_curve("pgv_m_s", x, rate * x**-slope, statistic=f"rlz-{i:03d}")
+        for i, (rate, slope) in enumerate(((1e-3, 2.0), (2e-3, 1.5), (1e-4, 3.0)))
+    ]
+    asked: dict[str, Any] = {"model": model_row(), "component": "rotd50"}
+    found = hazard(curves, 3.0, 0.1, weights=weights, **asked)
+    branches = [hazard(curve, 3.0, 0.1, **asked) for curve in curves]
+    for name in ("contribution", "above", "above_at_most", "annual_rate"):
+        mean = sum(w * getattr(one, name) for w, one in zip(weights, branches, strict=True))
+        np.testing.assert_allclose(getattr(found, name), mean, rtol=1e-9, atol=1e-18)
+    whole = found.contribution.sum() + found.above[0]
+    assert whole == pytest.approx(found.annual_rate[0], rel=1e-3)
+    assert found.fractions_between(found.edges).sum() == pytest.approx(
+        found.contribution.sum() / found.annual_rate[0]
+    )
 
 
 def test_a_long_table_is_cut_for_a_terminal() -> None:

@@ -222,7 +222,7 @@ class ReportedBlock:
         if contents.is_unstable:
             answer = ["1   unstable without shaking", ""]
         rate = contents.hazard
-        period = "" if rate is None else return_period(float(rate.annual_rate[0]))
+        period = "" if rate is None else rate.return_period_text(0)
         return (name, mode, *answer, period)
 
 
