@@ -243,9 +243,9 @@ def of_sums() -> list[list[str]]:
             (drawn,) = found.exceedance.values()
             known = {each.value: each.annual_rate for each in drawn}
             reached.append([known.get(count, np.nan) for count in COUNTS])
-    low, high = answer.uncertainty["average_annual_failures"].knowledge or (np.nan, np.nan)
+    low, high = answer.uncertainty["average_annual_failures"].fragility or (np.nan, np.nan)
     names = ["failures a year", *(f"{count} or more fail" for count in COUNTS)]
-    ends = [(low, high), *(by_count[count].knowledge for count in COUNTS)]
+    ends = [(low, high), *(by_count[count].fragility for count in COUNTS)]
     sds = [np.log(total).std(), *np.nanstd(np.log(reached), axis=0)]
     rows = [
         [name, f"{0.5 * np.log(end[1] / end[0]):.3f}", f"{sd:.3f}"]

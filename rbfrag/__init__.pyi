@@ -25,7 +25,7 @@ from rbfrag.hazards.hazard_answer import BranchRate as BranchRate
 from rbfrag.hazards.hazard_answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.joint_rate import CountRate as CountRate
 from rbfrag.hazards.joint_rate import JointRate as JointRate
-from rbfrag.hazards.losses import LossAnswer as LossAnswer
+from rbfrag.hazards.loss_answer import LossAnswer as LossAnswer
 from rbfrag.hazards.survival import BranchSurvival as BranchSurvival
 from rbfrag.hazards.survival import SurvivalAnswer as SurvivalAnswer
 from rbfrag.hazards.survival import survival as survival

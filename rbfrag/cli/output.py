@@ -113,6 +113,8 @@ def print_result(
         if not is_first:
             print()
         is_first = False
+        if table.title:
+            print(table.title)
         if table.headers:
             print_table(table.headers, table.rows, width=width)
         else:

@@ -31,7 +31,8 @@ from rbfrag.hazards.between_measures import (
     velocity_of,
 )
 from rbfrag.hazards.event_set import EventSet
-from rbfrag.hazards.losses import LossAnswer, Run, event_losses
+from rbfrag.hazards.loss_answer import LossAnswer
+from rbfrag.hazards.losses import Run, event_losses
 from rbfrag.hazards.measure_type import requested_measure
 from rbfrag.hazards.portfolio import Portfolio
 from rbfrag.question.components import Component, component_named

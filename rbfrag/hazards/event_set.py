@@ -89,7 +89,7 @@ class EventSet:
 
     @property
     def effective_years(self) -> float | None:
-        """Length of one catalogue whose rates have the same counting error [a]; None of a scenario.
+        """Length of one catalogue with the same sampling error [yr]; None of a scenario.
 
         T/Σw² of realizations of T years with the weights w.
         """

@@ -81,9 +81,9 @@ class HazardAnswer(Result):
             cannot be used.
         ci_low: lower end of the interval from the uncertain parameters of the model.
         ci_high: upper end of it.
-        branches_low: rate that 5 % of the branches of a logic tree do not exceed, by their
+        logic_tree_low: rate that 5 % of the branches of a logic tree do not exceed, by their
             weights; NaN without weights.
-        branches_high: the same of 95 %.
+        logic_tree_high: the same of 95 %.
         numerical_error: how far quadrature may be off, relative to the rates, shape (m,).
         probability: probability of at least one failure in `years`, shape (m,).
         years: the period [a].
@@ -126,8 +126,8 @@ class HazardAnswer(Result):
     annual_rate: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
-    branches_low: FloatArray
-    branches_high: FloatArray
+    logic_tree_low: FloatArray
+    logic_tree_high: FloatArray
     numerical_error: FloatArray
     probability: FloatArray
     years: float
@@ -239,7 +239,10 @@ class HazardAnswer(Result):
         if self.drained is not None:
             columns["drained_annual_rate"] = self.drained
         if self.quantiles:
-            columns |= {"branches_low": self.branches_low, "branches_high": self.branches_high}
+            columns |= {
+                "logic_tree_low": self.logic_tree_low,
+                "logic_tree_high": self.logic_tree_high,
+            }
         for q, values in self.quantiles.items():
             columns[f"annual_rate_p{round(100.0 * q):02d}"] = values
         return columns
@@ -354,7 +357,7 @@ class HazardAnswer(Result):
         curve_parts = (curve.imt, source, place, self.curve_kind)
         yield TextLine("Curve", ", ".join(filter(None, curve_parts)))
         if self.quantiles and self._is_single:
-            low, high = float(self.branches_low[0]), float(self.branches_high[0])
+            low, high = float(self.logic_tree_low[0]), float(self.logic_tree_high[0])
             periods = return_periods(low, high)
             yield TextLine(
                 "Branches", f"return period {periods} years (5th–95th percentile of the logic tree)"

@@ -1,9 +1,11 @@
-"""What is not known of a rate of an event set, in three numbers that are never added up."""
+"""Uncertainty of a rate of an event set by its sources, which are never added up."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,109 +18,160 @@ from rbfrag.solver.results import FloatArray
 
 Ends = tuple[float, float]
 
+LOGIC_TREE_LEVEL = 0.9
+"""Fraction of the weights between the ends of an interval of the logic tree."""
+
 QUANTILES = (0.05, 0.5, 0.95)
 """Quantiles over branches, and over these and the parameters of the model together."""
 
+SOURCES = {
+    "event_set_sampling": "event-set sampling",
+    "fragility": "fragility",
+    "logic_tree": "logic tree",
+}
+"""Sources of uncertainty: as keys begin, and in words."""
+
 _SEPARABLE = 0.5
-"""Part of the scatter between realizations that counting may make for it to be one of branches."""
+"""Part of the variance between realizations that event-set sampling may make for the rest to be
+that of the logic tree."""
 
 
 @dataclass(frozen=True)
 class MeanUncertainty:
-    """What is not known of a mean of an event set.
+    """Uncertainty of a mean of an event set by its sources.
 
     Args:
-        counting: interval from the number of events: another event set as long gives another mean.
-        knowledge: interval from the parameters of the model that the data leave open; None where
-            it is not computed, as of models of several measures.
-        branches: means that 5 and 95 % of the realizations of the logic tree do not exceed, by
-            their weights; None of one realization, and where counting alone makes most of what
-            they differ by: curves tell that better.
-        together: quantiles of branches and parameters at 5, 50 and 95 %; None likewise.
+        event_set_sampling: interval from the number of events: another event set as long gives
+            another mean.
+        fragility: interval from the parameters of the fragility model; None where it is not
+            computed, as of models of several measures.
+        logic_tree: 5th and 95th percentile over the realizations, by their weights; None of one
+            realization, and where event-set sampling makes most of the differences between them:
+            hazard curves show these better.
+        combined: quantiles of logic tree and fragility together at 5, 50 and 95 %; None likewise.
+        level: confidence level of the first two.
     """
 
-    counting: Ends
-    knowledge: Ends | None
-    branches: Ends | None
-    together: tuple[float, float, float] | None
+    event_set_sampling: Ends
+    fragility: Ends | None
+    logic_tree: Ends | None
+    combined: tuple[float, float, float] | None
+    level: float
 
     @classmethod
-    def of(cls, events: EventSet, values: FloatArray, half: float, level: float) -> MeanUncertainty:
-        """Return what is not known of the weighted sum of some values.
+    def of(
+        cls,
+        events: EventSet,
+        values: FloatArray,
+        half: float,
+        level: float,
+        *,
+        are_probabilities: bool = False,
+    ) -> MeanUncertainty:
+        """Return the uncertainty of the weighted sum of some values.
 
         Args:
             values: of each event, shape (n,).
-            half: what the interval from the parameters reaches to; NaN where it is not known.
+            half: half width of the interval from the parameters; NaN where it is unknown.
             level: confidence level of the intervals.
+            are_probabilities: the values are at most 1, as is the mean of a scenario.
         """
         parts = events.weight * values
         mean, squares = float(parts.sum()), float((parts**2).sum())
-        if events.is_scenario:
+        if are_probabilities:
+            sampling = reached_interval(events, mean, squares, level)
+        elif events.is_scenario:
             spread = float(((events.weight * (values - mean)) ** 2).sum())
             reach = quantiles_of(level).normal * float(np.sqrt(spread))
-            counting = max(mean - reach, 0.0), mean + reach
+            sampling = max(mean - reach, 0.0), mean + reach
         else:
-            counting = rate_interval(mean, squares, float(parts.max(initial=0.0)), level)
-        knowledge = None
+            sampling = rate_interval(mean, squares, float(parts.max(initial=0.0)), level)
+        fragility = None
         if half == half:
             low, high = (float(interval_end(np.array(mean), half, side)) for side in (-1.0, 1.0))
-            knowledge = low, high
+            fragility = low, min(high, 1.0) if are_probabilities and events.is_scenario else high
         sums = np.zeros((2, len(events.realization_weights)))
         for power in (1, 2):
             np.add.at(sums[power - 1], events.branch, parts**power)
         ends = branch_ends(events, sums)
         if ends is None:
-            return cls(counting, knowledge, None, None)
+            return cls(sampling, fragility, None, None, level)
         rates, weight = _branch_rates(events, sums)[::2]
         log_sd = np.zeros(1)
         if half == half and mean > 0.0:
             log_sd[0] = half / mean / quantiles_of(level).normal
         mixed = mixture_quantiles(rates[:, None], weight, log_sd, QUANTILES)[:, 0].tolist()
-        return cls(counting, knowledge, ends, (mixed[0], mixed[1], mixed[2]))
+        return cls(sampling, fragility, ends, (mixed[0], mixed[1], mixed[2]), level)
 
-    def as_dict(self) -> dict[str, float | None]:
-        """Return the numbers under the keys of the JSON contract."""
-        names = (f"p{round(100.0 * q):02d}" for q in QUANTILES)
-        together = self.together or (None, None, None)
-        return {
-            **ends_by_name(
-                counting=self.counting, knowledge=self.knowledge, branches=self.branches
-            ),
-            **dict(zip(names, together, strict=True)),
-        }
+    def intervals(self) -> Iterator[tuple[str, float, Ends]]:
+        """Yield each source that is quantified, the level of its interval, and its ends."""
+        for name, source in SOURCES.items():
+            if (ends := getattr(self, name)) is not None:
+                yield source, LOGIC_TREE_LEVEL if name == "logic_tree" else self.level, ends
+        if self.combined is not None:
+            yield "fragility and logic tree", LOGIC_TREE_LEVEL, self.combined[::2]
+
+    def as_dicts(self, quantity: str) -> list[dict[str, Any]]:
+        """Return the intervals under the keys of the JSON contract.
+
+        Args:
+            quantity: key of the mean.
+        """
+        return [
+            {"quantity": quantity, "source": source, "level": level, "low": low, "high": high}
+            for source, level, (low, high) in self.intervals()
+        ]
 
 
-def ends_by_name(**intervals: Ends | None) -> dict[str, float | None]:
-    """Return the ends of intervals as name_low and name_high."""
+def ends_by_name(uncertainty: object) -> dict[str, float | None]:
+    """Return the ends of the intervals by source as name_low and name_high.
+
+    Args:
+        uncertainty: has an interval, or None, under each name of :data:`SOURCES`.
+    """
     return {
         f"{name}_{side}": None if ends is None else ends[i]
-        for name, ends in intervals.items()
+        for name, ends in ((name, getattr(uncertainty, name)) for name in SOURCES)
         for i, side in enumerate(("low", "high"))
     }
 
 
-def branch_ends(events: EventSet, sums: FloatArray) -> Ends | None:
-    """Return the means that 5 and 95 % of the realizations do not exceed, by their weights.
+def reached_interval(events: EventSet, rate: float, squares: float, level: float) -> Ends:
+    """Return both ends of the interval, by event-set sampling, of how often something is reached.
 
-    None of a scenario and of one realization, and where counting makes more than half of the
-    variance between them: they cannot be told apart then.
+    Args:
+        rate: rate of events that reach it [1/yr]; of a scenario its probability.
+        squares: sum of the squared parts of it.
+        level: confidence level.
+    """
+    if events.is_scenario:
+        alike = float((events.weight**2).sum())
+        return share_interval(rate, squares - rate * rate * alike, alike, level)
+    return rate_interval(rate, squares, float(events.weight.max()), level)
+
+
+def branch_ends(events: EventSet, sums: FloatArray) -> Ends | None:
+    """Return the 5th and 95th percentile of the means of the realizations, by their weights.
+
+    None of a scenario and of one realization, and where event-set sampling makes more than half of
+    the variance between them: they cannot be distinguished then.
 
     Args:
         sums: sum over the events of each realization of weight times value, and of its square,
             2 x realizations.
     """
-    rates, counting, weight = _branch_rates(events, sums)
+    rates, variance, weight = _branch_rates(events, sums)
     if events.is_scenario or weight.size < 2:
         return None
     raw = float(weight @ (rates - weight @ rates) ** 2)
-    if float((weight * (1.0 - weight)) @ counting) > _SEPARABLE * raw:
+    if float((weight * (1.0 - weight)) @ variance) > _SEPARABLE * raw:
         return None
     low, high = weighted_quantiles(rates[:, None], weight, QUANTILES[::2])[:, 0].tolist()
     return low, high
 
 
 def _branch_rates(events: EventSet, sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the mean of each realization, its variance from counting, and the weights."""
+    """Return the means of the realizations, their sampling variances, and the weights."""
     weight = np.array(list(events.realization_weights.values()), dtype=np.float64)
     share = np.maximum(weight, np.finfo(np.float64).tiny)
     return sums[0] / share, sums[1] / share**2, weight

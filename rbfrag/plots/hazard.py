@@ -60,7 +60,7 @@ def plot_contribution(
 def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: HazardAnswer) -> None:
     """Draw both parts of :func:`plot_contribution` into axes that share their abscissa."""
     top.loglog(curve.levels, curve.annual_rate, "o-", color="black", ms=3.5, lw=1.4)
-    top.set_ylabel("exceedances a year, λ [1/a]")
+    top.set_ylabel("annual rate of exceedance, λ [yr⁻¹]")
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
     edges = curve.levels
     fractions = 100.0 * answer.fractions_between(edges)
@@ -68,7 +68,7 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
         edges[:-1], fractions, width=np.diff(edges), align="edge",
         color="#2b6cac", edgecolor="white", linewidth=0.3,
     )  # fmt: skip
-    bottom.set_ylabel("share of the rate [%]\nbetween levels of the curve")
+    bottom.set_ylabel("fraction of the rate [%]\nbetween levels of the curve")
     bottom.set_ylim(0.0, None if fractions.any() else 1.0)
     bottom.set_xlabel(measure_title(curve))
     seen = fractions > _SHOWN * max(float(fractions.max()), np.finfo(float).tiny)

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.losses import Exceedance, LossAnswer
+from rbfrag.hazards.loss_answer import Exceedance, LossAnswer
+from rbfrag.hazards.uncertainty import LOGIC_TREE_LEVEL, SOURCES
 from rbfrag.plots import canvas
 from rbfrag.results.numbers import exact_percent
 
@@ -22,9 +23,9 @@ _LOWEST = 0.05  # of one event in the effective time
 def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     """Draw the curves of exceedance of failures and, where there is one, of the loss.
 
-    Bands are those of the counting error of the event set, of the model's parameters and of the
-    branches of the logic tree, each by itself. Of years, the sum is drawn beside the
-    events; what happens less than once in the time that the events cover is shaded.
+    Bands are those of event-set sampling, of the parameters of the fragility and of the logic tree,
+    each by itself. Of years, the sum is drawn next to the events; what happens less than once in
+    the time that the events cover is shaded.
 
     Args:
         answer: of :func:`rbfrag.losses`, with samples.
@@ -45,19 +46,21 @@ def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
     for axes, (title, curves) in zip(all_axes, panels, strict=True):
         _draw(axes, answer, curves)
         axes.set_xlabel(f"{title}, at least")
-        axes.set_ylabel("probability given the event" if scenario else "times a year [1/a]")
+        axes.set_ylabel(
+            "probability given the event" if scenario else "annual rate of exceedance [yr⁻¹]"
+        )
         canvas.open_corner(axes)
     canvas.light_grid(*all_axes)
     canvas.legend_below(figure, 4)
     return canvas.save_figure(figure, out)
 
 
-_BANDS: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("counting", "by the number of events", {"fc": "#00000014", "ec": "#777777", "ls": ":"}),
-    ("branches", "over the logic tree", {"fc": "#c2410c30", "ec": "none"}),
-    ("knowledge", "by the model's parameters", {"fc": "#2b6cac66", "ec": "none"}),
-)
-"""What is not known: its name, its words, and how its band is drawn."""
+_BANDS: Mapping[str, Mapping[str, Any]] = {
+    "event_set_sampling": {"fc": "#00000014", "ec": "#777777", "ls": ":"},
+    "logic_tree": {"fc": "#c2410c30", "ec": "none"},
+    "fragility": {"fc": "#2b6cac66", "ec": "none"},
+}
+"""How the bands of the sources of uncertainty are drawn, the widest first."""
 
 
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
@@ -77,14 +80,15 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
             continue
         x = [one.value for one in curve]
         of = f" ({law})" if several else ""
-        for what, words, style in _BANDS:
-            ends = [getattr(one, what) or (math.nan, math.nan) for one in curve]
+        for source, style in _BANDS.items():
+            ends = [getattr(one, source) or (math.nan, math.nan) for one in curve]
             low, high = zip(*ends, strict=True)
             if not all(map(math.isnan, low)):
-                level = exact_percent(0.9 if what == "branches" else answer.level)
+                level = LOGIC_TREE_LEVEL if source == "logic_tree" else answer.level
                 axes.fill_between(
                     x, low, high, lw=0.9, **style,
-                    label=f"{level} {words}" if first and law == next(iter(curves)) else None,
+                    label=f"{exact_percent(level)} {SOURCES[source]}"
+                    if first and law == next(iter(curves)) else None,
                 )  # fmt: skip
         axes.plot(
             x, [one.annual_rate for one in curve], "o-", color=colour, ms=3.0, lw=1.5,
@@ -100,7 +104,7 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
     if drawn and effective is not None:
         years = f"{effective:,.0f}" if effective >= 100.0 else f"{effective:.3g}"
         lowest = 0.3 * min(curve[-1].annual_rate for curve in drawn)
-        highest = 2.0 * max(max(curve[0].counting[1], curve[0].knowledge[1]) for curve in drawn)
+        highest = 2.0 * max(max(x[0].event_set_sampling[1], x[0].fragility[1]) for x in drawn)
         axes.set_ylim(min(max(lowest, _LOWEST / effective), 0.5 / effective), highest)
         axes.axhspan(
             axes.get_ylim()[0], 1.0 / effective, color="#dddddd", alpha=0.6, lw=0.0,

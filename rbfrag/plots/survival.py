@@ -94,7 +94,7 @@ def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnsw
     lowest = min(float(curve.annual_rate.min()) for curve in curves)
     axes.set_ylim(max(lowest, _LEAST_RATE), 2.0 * highest)
     axes.set_xlabel(measure_title(curves[0]))
-    axes.set_ylabel("exceedances a year, λ [1/a]")
+    axes.set_ylabel("annual rate of exceedance, λ [yr⁻¹]")
     axes.set_title("hazard curves", fontsize=10)
 
 

@@ -25,10 +25,11 @@ class TextLine(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """A table for a terminal; without headers its rows are names and values."""
+    """A table for a terminal with its title; without headers its rows are names and values."""
 
     headers: Sequence[str]
     rows: Sequence[Sequence[object]]
+    title: str = ""
 
     @classmethod
     def of_values(cls, document: Mapping[str, Any]) -> TextTable:
@@ -42,19 +43,22 @@ class TextTable(NamedTuple):
         return cls((), rows)
 
     @classmethod
-    def of_rows(cls, rows: Sequence[Mapping[str, object]], *, verbose: bool = False) -> TextTable:
+    def of_rows(
+        cls, rows: Sequence[Mapping[str, object]], *, verbose: bool = False, title: str = ""
+    ) -> TextTable:
         """Return rows under their names, without the columns that are empty in all of them.
 
         Args:
             rows: values by name, the same names in each.
             verbose: with all digits; else three significant digits.
+            title: title of the table.
         """
         names = [name for name in rows[0] if any(row[name] not in (None, "") for row in rows)]
 
         def printed(value: object) -> object:
             return value if verbose or not isinstance(value, float) else float(f"{value:.3g}")
 
-        return cls(names, [[printed(row[name]) for name in names] for row in rows])
+        return cls(names, [[printed(row[name]) for name in names] for row in rows], title)
 
 
 class Tabular:

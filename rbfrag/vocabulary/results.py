@@ -229,13 +229,14 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         *(
             (f"{source}_{end}", f"{place} end of the interval from {words}")
             for source, words in (
-                ("counting", "sampling of events"),
-                ("knowledge", "parameter uncertainty of the fragility"),
-                ("branches", "the logic tree, 5th–95th percentile"),
+                ("event_set_sampling", "event-set sampling"),
+                ("fragility", "the parameters of the fragility model"),
+                ("logic_tree", "the logic tree, 5th–95th percentile"),
             )
             for end, place in (("low", "Lower"), ("high", "Upper"))
         ),
-        *((f"p{level}", f"{int(level)}th percentile") for level in ("05", "50", "95")),
+        ("quantity", "Key of the number that an interval belongs to"),
+        ("source", "Source of the uncertainty"),
     ),
     "Survival": (
         ("age_years", "Age of the blocks", "yr"),

@@ -232,8 +232,8 @@ def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree:
                        logic_tree / "realizations_7.csv")  # fmt: skip
     each = [shell.json("hazard", one, *asked)["annual_rate"] for one in branches]
     assert found["annual_rate"] == pytest.approx(np.dot((0.5, 0.3, 0.2), each), rel=1e-6)
-    assert found["branches_low"] == pytest.approx(min(each), rel=1e-9)
-    assert found["branches_high"] == pytest.approx(max(each), rel=1e-9)
+    assert found["logic_tree_low"] == pytest.approx(min(each), rel=1e-9)
+    assert found["logic_tree_high"] == pytest.approx(max(each), rel=1e-9)
     # the branches and what is not known of the model together
     assert found["annual_rate_p05"] < min(each) < found["annual_rate_p50"]
     assert max(each) < found["annual_rate_p95"]

@@ -51,6 +51,13 @@ def test_the_contract(shell: Shell, job: Path) -> None:
     assert [row["count"] for row in curve] == [1.0, 2.0, 3.0]
     assert curve[0]["annual_rate"] == pytest.approx(answer["annual_rate_any"])
     assert 0.0 < answer["annual_rate_any"] < answer["average_annual_failures"]
+    intervals = {
+        (row["quantity"], row["source"]): (row["low"], row["high"]) for row in answer["uncertainty"]
+    }
+    # the rate of any failure is that of one or more, and so is its interval
+    for source, key in (("event-set sampling", "event_set_sampling"), ("fragility", "fragility")):
+        ends = curve[0][f"{key}_low"], curve[0][f"{key}_high"]
+        assert intervals["annual_rate_any", source] == pytest.approx(ends)
     low, high = (
         answer["bounds"][law]["annual_rate_any"] for law in ("fully_dependent", "independent")
     )
@@ -70,7 +77,10 @@ def test_table_of_events_and_plot(shell: Shell, job: Path) -> None:
     files = ("--out", "events.csv", "--plot", "curve.svg")
     printed = shell("losses", job, "--blocks", "blocks.csv", *files).stdout
     assert "/yr    4 blocks, 263-year event set" in printed
-    assert "return_period_years" in printed
+    assert "Annual rate of events with at least so many failures" in printed
+    assert "Annual rate of events with at least such a loss" in printed
+    assert "(beyond: rarer than the 263-year event set resolves)" in printed
+    assert re.search(r"\d \(beyond\) +\S+–", printed)
     with Path("events.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == [

@@ -170,8 +170,8 @@ def test_branches_of_a_logic_tree() -> None:
     chance = sum(w * one.probability for w, one in zip((0.5, 0.3, 0.2), each, strict=True))
     np.testing.assert_allclose(found.probability, chance, rtol=1e-12)
     assert found.curve_kind == "weighted branches"
-    np.testing.assert_allclose(found.branches_low, each[0].annual_rate)
-    np.testing.assert_allclose(found.branches_high, each[2].annual_rate)
+    np.testing.assert_allclose(found.logic_tree_low, each[0].annual_rate)
+    np.testing.assert_allclose(found.logic_tree_high, each[2].annual_rate)
     assert [one.weight for one in found.branches] == [0.5, 0.3, 0.2]
     np.testing.assert_allclose(found.branches[1].annual_rate, each[1].annual_rate)
     assert found.annual_rate_any == pytest.approx(

@@ -25,7 +25,7 @@ from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import EventYears, SomeYears, count_years
-from rbfrag.hazards.losses import LossAnswer
+from rbfrag.hazards.loss_answer import LossAnswer
 from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.components import COMPONENT_SIGMA

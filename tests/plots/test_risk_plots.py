@@ -10,7 +10,7 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import hazard_curve
-from rbfrag.hazards.losses import Exceedance
+from rbfrag.hazards.loss_answer import Exceedance
 from rbfrag.plots import hazard as hazard_module
 from rbfrag.plots import losses as losses_module
 from rbfrag.plots import shakemap as map_module
@@ -57,7 +57,7 @@ def test_every_axis_of_losses_has_numbers_and_a_unit(values, tmp_path, caught):
         ]
         assert written
         assert not [text for text in written if "e+" in text]
-        assert "[1/a]" in axes.get_ylabel()
+        assert "[yr⁻¹]" in axes.get_ylabel()
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "less than once in 1,000 years" in words
 
@@ -79,7 +79,7 @@ def test_shares_of_a_rate_are_those_of_the_shell(tmp_path, caught):
     whole = 100.0 * answer.contribution[0].sum() / answer.annual_rate[0]
     assert sum(heights) == pytest.approx(whole)
     assert 50.0 < whole <= 100.0
-    assert figures[0].axes[1].get_ylabel().startswith("share of the rate [%]")
+    assert figures[0].axes[1].get_ylabel().startswith("fraction of the rate [%]")
 
 
 def test_names_of_sites_and_events_are_letters_and_stay_on_the_sheet(tmp_path, caught, overlapping):
