@@ -14,7 +14,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, is_number, json_document, number_at, source_text
 from rbfrag.fragility.measures import ALONE
-from rbfrag.hazards.conversions import velocity_conversion
+from rbfrag.hazards.between_measures import velocity_conversion
 from rbfrag.hazards.curve import (
     ANSWERED,
     CurveKeywords,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import scatter_steps
-from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
+from rbfrag.hazards.between_measures import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 from rbfrag.question.components import SINGLE_COMPONENT, Component, component_named
 from rbfrag.results.diagnostic import Diagnostic

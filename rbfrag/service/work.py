@@ -128,7 +128,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     import numpy as np
 
     from rbfrag.hazards.answer import hazard_at_sites, with_drained_rates
-    from rbfrag.hazards.conversions import velocity_conversion
+    from rbfrag.hazards.between_measures import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
 
     try:

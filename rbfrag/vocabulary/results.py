@@ -237,6 +237,8 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ),
         ("quantity", "Key of the number that an interval belongs to"),
         ("source", "Source of the uncertainty"),
+        ("low", "Lower end of the interval"),
+        ("high", "Upper end of the interval"),
     ),
     "Survival": (
         ("age_years", "Age of the blocks", "yr"),

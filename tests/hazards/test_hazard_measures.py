@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.hazards.answer import hazard
-from rbfrag.hazards.conversions import CONVERSIONS
+from rbfrag.hazards.between_measures import CONVERSIONS
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from tests.hazards.conftest import measure_row
 
