@@ -40,25 +40,25 @@ def main() -> None:
         )
         print(f"  {name:<28} {worst:.1e}")
     a = closed.AMPLITUDE_G
-    for name, lobes, samples, closed_form in (
+    for name, pulses, samples, closed_form in (
         ("half-sine, 2000 samples", (a,), 2000, closed.half_sine),
         ("sine cycle, 6000 samples", (a, -a), 3000, closed.full_sine),
     ):
         worst = max(
-            deviation(sine_lobes(f / closed.P, lobes, samples), closed_form(f)) for f in closed.F
+            deviation(sine_lobes(f / closed.P, pulses, samples), closed_form(f)) for f in closed.F
         )
         print(f"  {name:<28} {worst:.1e}")
     print("Half-sine of f = 1 by the number of samples")
     for samples in (50, 100, 200, 400):
         pulse = sine_lobes(1.0 / closed.P, (a,), samples)
         print(f"  {samples:<28} {deviation(pulse, closed.half_sine(1.0)):.1e}")
-    print("Critical k_r of reversal pulses, non-linear, p2 = 2, lobes of 0.25 s, 1 g and -r g")
+    print("Critical k_r of reversal pulses, non-linear, p2 = 2, pulses of 0.25 s, 1 g and -r g")
     for r in (0.0, 0.35, 0.65, 1.0, 1.25):
         print(f"  r = {r:<24g} {critical(reversal.reversal(r), p2=2.0).kr:.7f}")
     print("Peak over the critical angle of the weakest block that stays")
     for r in (0.88, 0.9, 1.0):
         print(f"  r = {r:<24g} {reversal.boundary_peak(r):.5f}")
-    print("Rectangular full cycle, 1 g, lobes of 1/6 s: linear theta_c, non-linear k_r/PGA")
+    print("Rectangular full cycle, 1 g, pulses of 1/6 s: linear theta_c, non-linear k_r/PGA")
     for p2 in (1.0, 4.6, 21.5, 100.0):
         wave = closed.rectangular_cycle(1.0 / 6.0, 1.0)
         linear = critical(wave, p2=p2, linear=True).kr

@@ -9,9 +9,9 @@ from benchmarks.claims.claim import Claim
 from benchmarks.claims.pulses import pulses_scatter_like_records
 from benchmarks.claims.records import (
     exponent_one,
-    lobes_as_bounds,
     motion_set,
     one_to_one,
+    pulses_as_bounds,
     rank_of_terms,
     variance_linear,
 )
@@ -70,7 +70,7 @@ def tested(db: str, seed: int) -> tuple[list[Claim], str]:
         *exponent_one(table, seed=seed),
         *variance_linear(table, seed=seed),
         *motion_set(table, sets, seed=seed),
-        *lobes_as_bounds(table, seed=seed),
+        *pulses_as_bounds(table, seed=seed),
         *vertical_is_irrelevant(table, with_vertical, seed=seed),
         *pulses_scatter_like_records(table, seed=seed),
     ]

@@ -34,22 +34,22 @@ def _triangular_cycle(amplitude_g: float, period_s: float) -> GroundMotion:
 
 
 PULSES: Mapping[str, Callable[[float, float], GroundMotion]] = {
-    "rectangular lobe": lambda a, t: rectangle(0.5 * t, a),
-    "half-sine lobe": lambda a, t: sine_lobes(0.5 * t, (a,), _SAMPLES_PER_LOBE),
-    "triangular lobe": lambda a, t: triangle(0.5 * t, a),
+    "rectangular pulse": lambda a, t: rectangle(0.5 * t, a),
+    "half-sine pulse": lambda a, t: sine_lobes(0.5 * t, (a,), _SAMPLES_PER_LOBE),
+    "triangular pulse": lambda a, t: triangle(0.5 * t, a),
     "rectangular cycle": lambda a, t: rectangular_cycle(0.5 * t, a),
     "sine cycle": lambda a, t: sine_lobes(0.5 * t, (a, -a), _SAMPLES_PER_LOBE),
     "triangular cycle": _triangular_cycle,
 }
-"""Pulses by name, of an amplitude [g] and a period [s]; a lobe is half a period long."""
+"""Pulses by name, of an amplitude [g] and a period [s]; a pulse is half a period long."""
 
-GROUPS = (("single lobes", "lobe"), ("full cycles", "cycle"))
+GROUPS = (("single pulses", "pulse"), ("full cycles", "cycle"))
 
 
 def pulses_scatter_like_records(
     table: CombinationTable, *, seed: int, periods: int = PERIODS
 ) -> list[Claim]:
-    """Test that single lobes, and full cycles, lie about the line on PGV as the records do.
+    """Test that single pulses, and full cycles, lie about the line on PGV as the records do.
 
     Every pulse has the records' median PGA; its period takes the range of their mean periods.
 

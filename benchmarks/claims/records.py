@@ -21,7 +21,7 @@ from rbfrag.errors import FitError
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.intervals import student_half_width
 from rbfrag.fragility.measures import TERMS
-from rbfrag.plots.critical_strength import lobe_line
+from rbfrag.plots.critical_strength import pulse_line
 
 FEWEST_EVENTS = 5
 
@@ -229,8 +229,8 @@ def _most_frequent(names: NDArray[np.str_]) -> str:
     return str(found[np.argmax(count)])
 
 
-def lobes_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
-    """Test the lines of single lobes as bounds of k_r/PGA against ω_m/p."""
+def pulses_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
+    """Test the lines of single pulses as bounds of k_r/PGA against ω_m/p."""
     points = Points(table)
     stated = (
         ("rectangular", "is an upper bound", 0.0),
@@ -239,7 +239,7 @@ def lobes_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
     )
     claims = []
     for name, words, expected in stated:
-        above = points.kr_over_pga > lobe_line(name, points.frequency_ratio)
+        above = points.kr_over_pga > pulse_line(name, points.frequency_ratio)
 
         def share(i: IntArray, above: NDArray[np.bool_] = above) -> float:
             return float(above[i].mean())
@@ -257,7 +257,7 @@ def lobes_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
             holds = low <= expected <= high
         claims.append(
             Claim(
-                f"the line of the {name} lobe {words}",
+                f"the line of the {name} pulse {words}",
                 "share of critical values above it",
                 value,
                 low,
@@ -271,7 +271,7 @@ def lobes_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
     logarithm = np.log(points.frequency_ratio)
     edges = np.linspace(logarithm.min(), logarithm.max(), BINS + 1)
     number = np.clip(np.searchsorted(edges, logarithm, side="right") - 1, 0, BINS - 1)
-    lines = np.array([lobe_line(name, points.frequency_ratio) for name, _, _ in stated])
+    lines = np.array([pulse_line(name, points.frequency_ratio) for name, _, _ in stated])
 
     def nearest(i: IntArray) -> float:
         nearer = []
@@ -284,7 +284,7 @@ def lobes_as_bounds(table: CombinationTable, *, seed: int) -> list[Claim]:
     value, low, high = cluster_interval(points.event, nearest, seed=seed)
     claims.append(
         Claim(
-            "the line of the triangular lobe is closer to the mean than those of other lobes",
+            "the line of the triangular pulse is closer to the mean than those of other pulses",
             f"share of {BINS} bins of ω_m/p in which it is",
             value,
             low,

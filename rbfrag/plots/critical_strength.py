@@ -1,8 +1,8 @@
 """Figures of critical strengths: over frequency, and with vertical motion over that without.
 
-In the linear model a lobe of amplitude A and duration t_p topples blocks of critical angle up
+In the linear model a pulse of amplitude A and duration t_p topples blocks of critical angle up
 to c·A, c a function of f = p t_p alone (docs/theory/toppling-spectrum.md, properties). Against
-the records a lobe stands for half a mean period, t_p = T_m/2, so that f = π/(ω_m/p): the lines of
+the records a pulse stands for half a mean period, t_p = T_m/2, so that f = π/(ω_m/p): the lines of
 figure 4.20 of Gibson's dissertation.
 """
 
@@ -24,16 +24,16 @@ from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
 
 
-def rectangular_lobe(f: ArrayLike) -> FloatArray:
-    """Return the critical angle over the amplitude of a rectangular lobe, f = p t_p > 0."""
+def rectangular_pulse(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a rectangular pulse, f = p t_p > 0."""
     line: FloatArray = -np.expm1(-np.asarray(f, dtype=np.float64))
     return line
 
 
-def triangular_lobe(f: ArrayLike) -> FloatArray:
+def triangular_pulse(f: ArrayLike) -> FloatArray:
     """Return the critical angle over the amplitude of a symmetric triangle, f = p t_p > 0."""
     of = np.asarray(f, dtype=np.float64)
-    # ln(2 - e) as ln(1 + (1 - e)): no cancellation for short lobes; the rest of it by series
+    # ln(2 - e) as ln(1 + (1 - e)): no cancellation for short pulses; the rest of it by series
     half = 0.5 * of
     exact = 1.0 - np.log1p(-np.expm1(-half)) / half
     series = half * (1.0 - half + 13.0 / 12.0 * half * half)
@@ -41,7 +41,7 @@ def triangular_lobe(f: ArrayLike) -> FloatArray:
     return line
 
 
-def half_sine_lobe(f: ArrayLike) -> FloatArray:
+def half_sine_pulse(f: ArrayLike) -> FloatArray:
     """Return the critical angle over the amplitude of a half-sine, f = p t_p > 0.
 
     sin s with x sin s − cos s = exp(−(π − s)/x), x = π/f.
@@ -55,22 +55,22 @@ def half_sine_lobe(f: ArrayLike) -> FloatArray:
     return np.asarray(np.sin(root.x), dtype=np.float64)
 
 
-LOBES: Mapping[str, Callable[[ArrayLike], FloatArray]] = {
-    "rectangular": rectangular_lobe,
-    "half-sine": half_sine_lobe,
-    "triangular": triangular_lobe,
+PULSES: Mapping[str, Callable[[ArrayLike], FloatArray]] = {
+    "rectangular": rectangular_pulse,
+    "half-sine": half_sine_pulse,
+    "triangular": triangular_pulse,
 }
-"""The lobes by name, the one that topples most first."""
+"""The pulses by name, the one that topples most first."""
 
 
-def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
-    """Return the k_r/PGA of a lobe of half a mean period over ω_m/p, > 0.
+def pulse_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
+    """Return the k_r/PGA of a pulse of half a mean period over ω_m/p, > 0.
 
     Args:
-        name: one of :data:`LOBES`.
+        name: one of :data:`PULSES`.
         frequency_ratio: ω_m/p = 2π/(T_m p).
     """
-    return LOBES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
+    return PULSES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
 
 
 STYLES = {
@@ -84,7 +84,7 @@ STYLES = {
 def plot_sensitivity(
     table: CombinationTable, path: canvas.Out, *, data: str = ""
 ) -> canvas.Picture:
-    """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
+    """Draw critical k_r/PGA against ω_m/p with the lines of pulses half a mean period long.
 
     The legend says how many of the critical values lie above each line.
 
@@ -111,11 +111,11 @@ def plot_sensitivity(
     canvas.logarithmic(axes)
     canvas.density(figure, axes, x, y, (left, right), (bottom, top))
     line_x = np.geomspace(left, right, 300)
-    for name in LOBES:
+    for name in PULSES:
         style, colour = STYLES[name]
-        above = int(np.sum(y > lobe_line(name, x)))
-        label = f"{name} lobe: {above} above ({percent(above / x.size)})"
-        axes.plot(line_x, lobe_line(name, line_x), style, color=colour, lw=1.8, label=label)
+        above = int(np.sum(y > pulse_line(name, x)))
+        label = f"{name} pulse: {above} above ({percent(above / x.size)})"
+        axes.plot(line_x, pulse_line(name, line_x), style, color=colour, lw=1.8, label=label)
     if below:
         axes.axhline(limit, color="black", lw=1.0, ls=":", label=f"search limit: {below} below it")
     axes.set_xlabel(r"frequency of the motion over that of the block, $\omega_m/p$")

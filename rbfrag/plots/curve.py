@@ -48,7 +48,7 @@ AXIS = {
 EVENT = "#b8b8b8"
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
 _STYLES = ("-", "--", "-.", ":")
-MOST_BESIDE = len(_COLOURS) * len(_STYLES)
+MOST_COMPARED = len(_COLOURS) * len(_STYLES)
 _LETTERS, _LINE_IN = 45, 0.18
 """Of a line of the legend: how many it holds, and its height [inch]."""
 _POINTS = 241
@@ -70,7 +70,7 @@ def plot_curve(
     over: str | None = None,
     fixed: Mapping[str, float] | None = None,
     level: float = LEVEL,
-    beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
+    compared: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     sites: float | None = None,
 ) -> Picture:
     """Draw the fragility curve of one block with the interval of P.
@@ -83,7 +83,7 @@ def plot_curve(
         over: the measure along the abscissa, by name; None for the one that the model's term
             names first.
         fixed: the other measures that the term reads, by name, held at one value.
-        beside: other fragilities of the same measure to be drawn for comparison, by name:
+        compared: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
         sites: number of sites of one earthquake; None for no band.
 
@@ -105,14 +105,15 @@ def plot_curve(
             f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in others}
-    if len(beside or {}) > MOST_BESIDE:
+    if len(compared or {}) > MOST_COMPARED:
         raise InputError(
-            f"{len(beside or {})} fragility functions for comparison: the maximum is {MOST_BESIDE}"
+            f"{len(compared or {})} fragility functions for comparison: the maximum is "
+            f"{MOST_COMPARED}"
         )
-    lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in beside or {}), default=0)
-    figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(beside or {}) / 2))
+    lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in compared or {}), default=0)
+    figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(compared or {}) / 2))
     axes = figure.add_subplot()
-    draw_curve(axes, model, block, varied, held, level=level, beside=beside, sites=sites)
+    draw_curve(axes, model, block, varied, held, level=level, compared=compared, sites=sites)
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", describe.labelled_values(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
@@ -147,7 +148,7 @@ def draw_curve(
     held: Mapping[str, float],
     *,
     level: float = LEVEL,
-    beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
+    compared: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     at: float = 0.0,
     sites: float | None = None,
 ) -> None:
@@ -177,7 +178,7 @@ def draw_curve(
         axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
     fitted = np.where(known, answer.probability, np.nan)
     axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: share over all earthquakes and sites")
-    for i, (name, other) in enumerate((beside or {}).items()):
+    for i, (name, other) in enumerate((compared or {}).items()):
         colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
         axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, _LETTERS))
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))

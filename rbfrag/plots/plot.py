@@ -197,7 +197,7 @@ def curve(
     /,
     *,
     over: str | None = None,
-    beside: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
+    compared: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
     **question: Unpack[FragilityCurveKeywords],
 ) -> Picture:
     """Draw the fragility curve of one block over a measure of the shaking, with its interval.
@@ -208,7 +208,7 @@ def curve(
         out: as for :func:`fit`; it may be given by name.
         over: what the curve runs over: pgv, pga, pgd or sa10; None for pgv, or
             what the model reads first.
-        beside: gives other fragilities to compare with, by name, for the measure that the curve
+        compared: gives other fragilities to compare with, by name, for the measure that the curve
             runs over.
         question: fields of the block, with ``kind``, the measures that are held, and ``model``,
             ``level``, ``sites`` and ``db``, as :func:`rbfrag.predict` has them.
@@ -234,10 +234,10 @@ def curve(
         chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
     if varied in held:
         raise InputError(f"{varied} is the axis of the curve: omit its value, or give another axis")
-    others = {} if beside is None else beside(varied)
+    others = {} if compared is None else compared(varied)
     picture = plot_curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
-        level=answering.get("level", LEVEL), beside=others, sites=answering.get("sites"),
+        level=answering.get("level", LEVEL), compared=others, sites=answering.get("sites"),
     )  # fmt: skip
     return replace(picture, warnings=blocks.remarks)
 
@@ -245,7 +245,7 @@ def curve(
 def sensitivity(
     out: Out = None, *, suite: str | None = None, db: str | PathLike[str] | None = None
 ) -> Picture:
-    """Draw critical k_r/PGA over the frequency ratio ω_m/p, with the lines of single lobes.
+    """Draw critical k_r/PGA over the frequency ratio ω_m/p, with the lines of single pulses.
 
     Args:
         out: as for :func:`fit`.
@@ -263,7 +263,7 @@ def sensitivity(
 def vertical(
     out: Out = None, *, suite: str | None = None, db: str | PathLike[str] | None = None
 ) -> Picture:
-    """Draw critical strengths with vertical motion beside those without it.
+    """Draw critical strengths with vertical motion and without it.
 
     Args:
         out: as for :func:`fit`.
@@ -289,7 +289,7 @@ def calibration(
     seed: int = 0,
     db: str | PathLike[str] | None = None,
 ) -> Picture:
-    """Draw predicted probabilities beside the shares that toppled, earthquakes left out in turn.
+    """Draw predicted and observed fractions that topple, with earthquakes held out in turn.
 
     Args:
         out: as for :func:`fit`.

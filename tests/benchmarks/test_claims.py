@@ -13,16 +13,16 @@ from benchmarks.claims.claim import cluster_interval
 from benchmarks.claims.pulses import PULSES, pulses_scatter_like_records
 from benchmarks.claims.records import (
     exponent_one,
-    lobes_as_bounds,
     motion_set,
     one_to_one,
+    pulses_as_bounds,
     rank_of_terms,
     variance_linear,
 )
 from benchmarks.claims.vertical import vertical_is_irrelevant
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
-from rbfrag.plots.critical_strength import lobe_line, vertical_pairs
+from rbfrag.plots.critical_strength import pulse_line, vertical_pairs
 from rbfrag.solver.results import NUMERICS_VERSION
 from tests.synthetic import unknown_spectrum
 
@@ -120,7 +120,7 @@ def test_doubtful_displacements_cost_only_the_claim_about_them() -> None:
     by_pgv, by_pgd = rank_of_terms(doubtful, seed=1)
     assert (by_pgv.n, by_pgd.n) == (data.p2.size, data.p2.size - 10 * P2.size)
     assert by_pgv == rank_of_terms(data, seed=1)[0]
-    for claims in (one_to_one, exponent_one, variance_linear, lobes_as_bounds):
+    for claims in (one_to_one, exponent_one, variance_linear, pulses_as_bounds):
         assert claims(doubtful, seed=1) == claims(data, seed=1)
 
 
@@ -171,18 +171,18 @@ def test_motion_set_does_not_depend_on_the_order_of_rows() -> None:
     assert here.value == pytest.approx(there.value)
 
 
-def test_lobes_as_bounds() -> None:
+def test_pulses_as_bounds() -> None:
     data = table()
     ratio = 2.0 * np.pi / (data.tm_s * np.sqrt(data.p2))
-    below = replace(data, kr_over_pga=0.999 * lobe_line("rectangular", ratio))
-    rectangular, half_sine, triangular, nearer = lobes_as_bounds(below, seed=1)
+    below = replace(data, kr_over_pga=0.999 * pulse_line("rectangular", ratio))
+    rectangular, half_sine, triangular, nearer = pulses_as_bounds(below, seed=1)
     assert rectangular.verdict == "confirmed"
     assert 0.0 < rectangular.high < 0.2  # 24 earthquakes cannot exclude more
     assert half_sine.value == triangular.value == 1.0
     assert (triangular.verdict, nearer.verdict, nearer.value) == ("refuted", "refuted", 0.0)
     random = np.random.default_rng(0).normal(size=data.p2.size)
-    about = replace(data, kr_over_pga=lobe_line("triangular", ratio) * np.exp(0.1 * random - 0.1))
-    assert [claim.verdict for claim in lobes_as_bounds(about, seed=1)[2:]] == ["confirmed"] * 2
+    about = replace(data, kr_over_pga=pulse_line("triangular", ratio) * np.exp(0.1 * random - 0.1))
+    assert [claim.verdict for claim in pulses_as_bounds(about, seed=1)[2:]] == ["confirmed"] * 2
 
 
 def test_vertical_pairs_are_matched_not_aligned() -> None:
@@ -218,7 +218,10 @@ def test_vertical_verdicts() -> None:
 
 def test_pulses_beside_records() -> None:
     claims = pulses_scatter_like_records(table(slope=0.77, scatter=0.28), seed=1, periods=2)
-    assert {claim.claim.split(" scatter")[0] for claim in claims} == {"single lobes", "full cycles"}
+    assert {claim.claim.split(" scatter")[0] for claim in claims} == {
+        "single pulses",
+        "full cycles",
+    }
     for claim in claims:
         assert 0.0 <= claim.low <= claim.value <= claim.high <= 1.0
         assert claim.clusters == 6

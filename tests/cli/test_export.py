@@ -101,10 +101,10 @@ def test_an_exported_curve_is_drawn_beside_its_origin(
 ) -> None:
     block = ("--p2", "3", "--kr", "0.1")
     shell("export", "nrml", *block, "--name", "boulder", "--out", "a.xml")
-    shell("plot", "curve", *block, "--beside", "a.xml", "--out", "a.svg")
+    shell("plot", "curve", *block, "--compare", "a.xml", "--out", "a.svg")
     assert "boulder, toppled" in Path("a.svg").read_text()
     shell("export", "pelicun", *block, "--imt", "PGA", "--out", "a.csv")
-    message = refuses("plot", "curve", *block, "--beside", "a.csv", "--out", "b.svg")
+    message = refuses("plot", "curve", *block, "--compare", "a.csv", "--out", "b.svg")
     assert "no fragility over pgv_m_s; there are PGA" in message
 
 

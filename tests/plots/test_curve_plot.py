@@ -76,12 +76,12 @@ def test_a_missing_measure_is_named(tmp_path) -> None:
 def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overlapping) -> None:
     figures = caught(module)
     names = [f"fragility {i} of a file with rather long names of $ states" for i in range(21)]
-    beside = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
+    compared = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
     with pytest.raises(InputError, match=r"21 fragility functions .* maximum is 20"):
-        plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", beside=beside)
+        plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", compared=compared)
     assert not list(tmp_path.iterdir())
-    del beside[names[-1]]
-    plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", beside=beside)
+    del compared[names[-1]]
+    plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", compared=compared)
     (figure,) = figures
     axes = figure.axes[0]
     drawn = [line for line in axes.lines if line.get_label().startswith("fragility")]

@@ -9,7 +9,7 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.plots import critical_strength as module
-from rbfrag.plots.critical_strength import lobe_line, plot_sensitivity
+from rbfrag.plots.critical_strength import plot_sensitivity, pulse_line
 from tests.plots.critical_values import N, critical_values
 
 
@@ -27,8 +27,8 @@ def test_every_critical_value_is_shown_and_counted(tmp_path, caught) -> None:
     *legend, limit = [text.get_text() for text in figures[0].legends[0].get_texts()]
     assert limit == "search limit: 40 below it"
     for name, words in zip(("rectangular", "half-sine", "triangular"), legend, strict=True):
-        above = int(np.sum(table.kr_over_pga[found] > lobe_line(name, x[found])))
-        assert words.startswith(f"{name} lobe: {above} above")
+        above = int(np.sum(table.kr_over_pga[found] > pulse_line(name, x[found])))
+        assert words.startswith(f"{name} pulse: {above} above")
 
 
 def test_nothing_covers_anything(tmp_path, caught, overlapping) -> None:

@@ -112,7 +112,7 @@ def plot_curve(
         "the first predictor of --model]"
     ),
     answering: options.Ranging,
-    beside: str | None = option(
+    compare: str | None = option(
         "Fragility functions of the same intensity measure for comparison: NRML 0.4 or 0.5 "
         "(.xml), or a pelicun table (.csv)",
         metavar="FILE",
@@ -127,15 +127,15 @@ def plot_curve(
     from rbfrag.plots import plot
 
     def others(measure: str) -> Any:
-        if beside is None:
+        if compare is None:
             return {}
         from rbfrag.exchange.other_fragilities import of_measure
 
-        return of_measure(beside, measure)
+        return of_measure(compare, measure)
 
     question: dict[str, Any] = {**given, **held, **answering}
     with given.named():
-        picture = plot.curve(out=out, over=over, beside=others, **question)
+        picture = plot.curve(out=out, over=over, compared=others, **question)
     print_warnings(picture.warnings)
     print(out)
 
