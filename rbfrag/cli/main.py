@@ -19,7 +19,7 @@ try:
 
     from rbfrag.cli.parameters.stack import read_plainly
     from rbfrag.cli.streams import end_unwritten, write_plainly
-    from rbfrag.errors import InputError, RbfragError, one_paragraph
+    from rbfrag.errors import InputError, RbfragError
     from rbfrag.version import __version__
     from rbfrag.vocabulary.quantities import option_of
 except KeyboardInterrupt:  # Ctrl-C while libraries load
@@ -75,6 +75,16 @@ def _option(name: str) -> str:
     return _OPTIONS.get(name) or option_of(name)
 
 
+def _ended(error: Any) -> Any:
+    """Return what ends a wrong command line after its message; help in place of it stays."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        return error
+    from rbfrag.cli.usage import usage_message
+
+    print(f"rbfrag: {usage_message(error)}", file=sys.stderr)
+    return typer.Exit(error.exit_code)
+
+
 class _Commands(TyperGroup):
     """Loads a command when it is called, and turns every error raised on purpose into a message."""
 
@@ -116,8 +126,14 @@ class _Commands(TyperGroup):
             print(f"rbfrag: {InputError(f'{error.filename}: {error.strerror}')}", file=sys.stderr)
             raise typer.Exit(InputError.exit_status) from None
         except _UsageError as error:
-            error.message = one_paragraph(error.message)
-            raise
+            raise _ended(error) from None
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Read the words before the command."""
+        try:
+            return super().parse_args(ctx, args)
+        except _UsageError as error:
+            raise _ended(error) from None
 
 
 app = typer.Typer(

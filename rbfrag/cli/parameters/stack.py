@@ -269,11 +269,8 @@ def _word(option: inspect.Parameter) -> str | None:
     return None
 
 
-_NEEDS: dict[type, str] = {
-    float: "give a number with a decimal point",
-    int: "give a whole number",
-}
-"""What to give for an option of a type where its text is none."""
+_NEEDS: dict[type, str] = {float: "a number with a decimal point", int: "a whole number"}
+"""What the value of an option of a type must be."""
 
 
 def read_plainly(command: Any) -> None:
@@ -387,5 +384,12 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
     else:
         if parameter.min is None or number >= parameter.min:
             return number
-        wanted = f"give {parameter.min} or more"
-    raise typer.BadParameter(f"invalid value {value!r}: {wanted}", ctx=context, param=parameter)
+        wanted = f"{parameter.min} or more"
+    raise InputError(f"{name_in_errors(parameter)} must be {wanted}, not {value!r}")
+
+
+def name_in_errors(parameter: Any) -> str:
+    """Return what an option is called, ``--height``, or an argument, ``CURVE``."""
+    if parameter.param_type_name == "option":
+        return str(max(parameter.opts, key=len))
+    return str(parameter.metavar or parameter.human_readable_name).strip("[]{}.")
