@@ -59,7 +59,19 @@ def one_paragraph(message: str) -> str:
 
 
 def spelled(text: str, fields: Collection[str], spell: Callable[[str], str]) -> str:
-    """Return a text with fields as a door spells them."""
+    """Return a text with fields as an interface spells them.
+
+    Args:
+        text: a message, in which a field with a value stands as in Python: ``kind='rocking'``.
+        fields: names that are spelled where they stand without a value, too.
+        spell: returns the name of a field in the interface, ``--kind`` or ``kind``.
+    """
+
+    def with_value(match: re.Match[str]) -> str:
+        name = spell(match[1])
+        return f"{name}{' ' if name.startswith('-') else '='}{match[2]}"
+
+    text = re.sub(r"\b([a-z]\w*)='(\w+)'", with_value, text)
     if not fields:
         return text
     names = "|".join(sorted(map(re.escape, fields), key=len, reverse=True))

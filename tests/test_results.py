@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 import rbfrag
 from rbfrag.errors import spelled
 from rbfrag.question.document import answer_block
-from rbfrag.results.diagnostic import diagnostics
+from rbfrag.results.diagnostic import by_severity, diagnostics, labelled
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import ServiceSettings
 from rbfrag.vocabulary.quantities import QUESTION, option_of, parameter_of
@@ -81,9 +81,14 @@ def test_each_interface_has_the_headline_and_every_warning(name: str, shell: She
     assert notes or name == "below yield"
 
     printed = shell("predict", *words(question)).stdout
-    lines = [line.removeprefix("Note      ") for line in printed.splitlines()]
+    lines = printed.splitlines()
     assert headline in lines
-    assert {spelled(note, OPTIONS, option_of) for note in notes} <= {*lines}
+    shown = [note for note in by_severity(notes) if note not in headline]
+    assert [line for line in lines if line.startswith(("Warning ", "Note "))] == [
+        f"{note.label:<10}{spelled(note, OPTIONS, option_of)}"
+        for note in shown
+        if note.code != "check_unit"
+    ]
 
     document = json.loads(shell("predict", *words(question), "--json").stdout)
     assert document["warnings"] == [*notes]
@@ -104,11 +109,10 @@ def test_each_interface_has_the_headline_and_every_warning(name: str, shell: She
         shown = plain(words_of(Path(f"answer.{suffix}")))
         for text in (headline, *answer.sentences(), *(line.text for line in answer.lines())):
             assert plain(text) in shown
-        for note in notes:
-            assert plain(note)[1:] in shown  # a sentence begins with a capital letter
+        assert all(plain(text) in shown for text in labelled(notes))
 
     html_text = answer._repr_html_()
-    assert all(plain(text) in plain(html_text) for text in (headline, *notes))
+    assert all(plain(text) in plain(html_text) for text in (headline, *labelled(notes)))
 
 
 @pytest.mark.parametrize("name", ["shape", "water", "rocking", "slumping"])
@@ -127,7 +131,7 @@ def test_the_page_shows_the_same_text(name: str, open_page: Any) -> None:
     expected = [line.text.replace(str(answer.data), "models.db") for line in answer.lines()]
     assert [plain(text) for text in lines] == [plain(text) for text in expected]
     notes = page.locator("#warnings li").all_text_contents()
-    assert notes == [*diagnostics(answer.warnings)]
+    assert notes == [*labelled(answer.warnings)]
 
 
 CURVE = "pgv_m_s,annual_rate\n0.05,0.08\n0.1,0.03\n0.2,0.009\n0.4,0.0022\n0.8,0.0004\n1.6,5e-5\n"
@@ -159,10 +163,12 @@ def test_written_tables_have_every_warning(name: str, shell: Shell) -> None:
     assert len(notes) > 1
 
     printed = shell(*command, *out).stdout
-    lines = [line.removeprefix("Note      ") for line in printed.splitlines()]
+    lines = printed.splitlines()
     for note in notes:
+        label = note["severity"].capitalize()
         # the measures of a map and the columns of a table are no options
-        assert {note["text"], spelled(note["text"], OPTIONS, option_of)} & {*lines}
+        texts = (spelled(note["text"], fields, option_of) for fields in ((), OPTIONS))
+        assert {f"{label:<10}{text}" for text in texts} & {*lines}
 
     for suffix in ("csv", "xlsx", "parquet"):
         shell(*command, "--out", f"out.{suffix}")

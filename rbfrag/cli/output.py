@@ -12,7 +12,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError, spelled
-from rbfrag.results.diagnostic import diagnostics, with_diagnostics
+from rbfrag.results.diagnostic import Diagnostic, by_severity, with_diagnostics
 from rbfrag.vocabulary.quantities import QUESTION, option_of
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _cut(text: str, size: int) -> str:
 def print_result(
     result: Result, *, json: bool, verbose: bool = False, fields: Collection[str] = _FIELDS
 ) -> None:
-    """Print an answer: the number that decides, labelled lines, notes, tables.
+    """Print an answer: the number that decides, labelled lines, warnings, notes, tables.
 
     Args:
         result: the answer.
@@ -99,14 +99,15 @@ def print_result(
     if json:
         print_json(result.as_dict())
         return
-    notes = diagnostics(result.warnings)
+    notes = by_severity(result.warnings)
     questions = [note for note in notes if note.code == "check_unit"]
-    print_sentences((*questions, *result.sentences()))
+    sentences = [*result.sentences()]
+    print_sentences((*questions, *sentences))
     for label, text in result.lines():
         print_labelled(label, text)
     for note in notes:
-        if note not in questions:
-            print_note(note, fields)
+        if note not in questions and not any(note in sentence for sentence in sentences):
+            print_warning(note, fields)
     width = get_terminal_size().columns if sys.stdout.isatty() else None
     is_first = not notes and not any(result.lines())
     for table in result.tables(verbose=verbose):
@@ -123,20 +124,20 @@ def print_result(
 
 def print_labelled(label: str, text: str) -> None:
     """Print a line of an answer with its label: "Model     bounded-pgv_kr, …"."""
-    print(f"{label:<10}{text}")
+    print(f"{label:<10}{spelled(text, (), option_of)}")
 
 
 def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
-    """Print warnings as notes below an answer, one a line, with fields as options."""
-    for i, warning in enumerate(warnings):
+    """Print warnings below an answer, one a line, with fields as options."""
+    for i, warning in enumerate(by_severity(warnings)):
         if i == 0:
             print()
-        print_note(warning, fields)
+        print_warning(warning, fields)
 
 
-def print_note(warning: str, fields: Collection[str] = ()) -> None:
-    """Print a warning as a note, with fields as options."""
-    print_labelled("Note", spelled(warning, ("excel_text", *fields), option_of))
+def print_warning(warning: Diagnostic, fields: Collection[str] = ()) -> None:
+    """Print a warning or note with its label, and with fields as options."""
+    print_labelled(warning.label, spelled(warning, ("excel_text", *fields), option_of))
 
 
 def write_table(

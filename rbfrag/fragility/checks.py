@@ -18,12 +18,17 @@ from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
-from rbfrag.vocabulary.quantities import INTENSITY, NUMBERS, QUANTITIES, SPECTRAL
+from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES, SPECTRAL
 
 
 def _unit(name: str) -> str:
     unit = QUANTITIES[name].unit if name in QUANTITIES else ""
     return "°" if unit == "deg" else unit
+
+
+def _word(name: str) -> str:
+    """Return the name of an input, or of a value that is derived the label."""
+    return name if name in INPUTS or name not in QUANTITIES else QUANTITIES[name].noun
 
 
 def _prompt(name: str) -> str:
@@ -62,11 +67,11 @@ class Remark:
         if not self.name:
             return self.text
         unit = _unit(self.name)
-        return f"{self.name} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
+        return f"{_word(self.name)} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
 
     def in_general(self) -> str:
         """Return the sentence for many values."""
-        return f"{self.name} {self.text}" if self.name else self.text
+        return f"{_word(self.name)} {self.text}" if self.name else self.text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,11 +103,11 @@ NOTABLE_SHARE = 0.05
 """From this share of an uncertain block, or of P, outside the fitted ranges on it is told."""
 
 PARTLY_OUTSIDE = (
-    f"{exact_percent(NOTABLE_SHARE)} or more of what the uncertain block may be lies outside the "
-    "fitted ranges, or of P where the shaking is uncertain: the answer is an extrapolation there"
+    f"at least {exact_percent(NOTABLE_SHARE)} of P, or of the block uncertainty, comes from "
+    "outside the fitted range: the answer is in part an extrapolation"
 )
 
-NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
+NO_SHAKING = "no shaking"
 
 
 def refusals(
@@ -199,8 +204,9 @@ def answer_with_findings(
     ruled = unanswered
     for bound in model.bounds(given):
         holds = bound.holds(values) & _not(ruled)
-        value = values.get(bound.about)
-        say(holds, Remark(holds, bound.about, value, bound.text, bound.how, "by_mechanics"))
+        # of many values one text, which names none
+        text = bound.reason(values if nothing is False else {})
+        say(holds, Remark(holds, "", 0.0, text, bound.how, "by_mechanics"))
         ruled = ruled | holds
     answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
     if answer.outside is not None:

@@ -226,8 +226,8 @@ class Spread(NamedTuple):
         """What is said outside of it."""
         *others, last = self.names
         return (
-            f"{', '.join(others)} and {last} together lie further from the fitted ones than "
-            f"{exact_percent(INSIDE)} of those do: the answer is an extrapolation"
+            f"the combination of {', '.join(others)} and {last} is farther from the centre of the "
+            f"fitted data than {exact_percent(INSIDE)} of them: the answer is an extrapolation"
         )
 
 

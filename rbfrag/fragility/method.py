@@ -8,6 +8,7 @@ and how it is fitted. Formulas are written once over a namespace: :data:`SINGLE`
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -18,6 +19,7 @@ from rbfrag.fragility.dependence import normal_quantile, normal_share
 from rbfrag.fragility.measures import Term
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.kinds import BY_MECHANICS
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 _LARGEST_EXPONENT = 709.0
 
@@ -148,12 +150,13 @@ LOGLOG = Link(
 
 
 class Bound(NamedTuple):
-    """A case that mechanics forbids: P is 0 whatever the model says.
+    """A limit to the values of a question: P is 0 beyond it by mechanics, or they are rejected.
 
     Args:
         holds: whether (where) it is so, from values by name.
-        about: name of the value that it is said of.
-        text: what is said.
+        about: name of the value that decides.
+        text: of a rejected value what it must be; of P = 0 the reason, with the names of values
+            in braces: "k_r{kr} is not below PGA{pga_g}".
         how: what answers then, in place of the model.
     """
 
@@ -162,12 +165,21 @@ class Bound(NamedTuple):
     text: str
     how: str = BY_MECHANICS
 
+    def reason(self, values: Mapping[str, Any]) -> str:
+        """Return the reason of P = 0 with values by name, or in general where there are none."""
+        equal = {
+            name: f" = {value:.3g} {QUANTITIES[name].unit}".rstrip()
+            for name, value in values.items()
+            if f"{{{name}}}" in self.text
+        }
+        return self.text.format_map(defaultdict(str, equal))
+
 
 ABOVE_TWICE_PGV = Bound(
     lambda v: v["y_m_s"] >= 2.0 * v["intensity_m_s"],
     "y_m_s",
-    "is not below 2 PGV, which no excursion from rest exceeds: P = 0 by mechanics, not by the "
-    "model",
+    "PGV{intensity_m_s} is at most half the toppling velocity k_r g/p{y_m_s}: no excursion from "
+    "rest topples the block",
 )
 _STRONG_KR = 0.3
 """k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
@@ -181,8 +193,8 @@ def log_strength(v: Mapping[str, Any], ns: Numbers) -> Any:
 ABOVE_SPECTRUM = Bound(
     lambda v: v["y_m_s"] >= v["intensity_m_s"],
     "y_m_s",
-    "is not below the toppling spectrum X(p) of the motion, which no excursion from rest exceeds: "
-    "P = 0 by mechanics, not by the model",
+    "the toppling spectrum X(p){intensity_m_s} of the motion is at most the toppling velocity "
+    "k_r g/p{y_m_s}: no excursion from rest topples the block",
     "by the spectrum bound",
 )
 
@@ -282,15 +294,14 @@ class BlockParameters:
 NOT_LIFTED = Bound(
     lambda v: v["kr"] >= v["pga_g"],
     "kr",
-    "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
-    "mechanics, not by the model",
+    "k_r{kr} is not below PGA{pga_g}: the block cannot uplift without vertical motion",
 )
 TOPPLING_BLOCK = BlockParameters(
     ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
     # the stored grid ends at 4 PGV, and no excursion from rest exceeds 2 PGV
     safe_steps=10,
     support="assumed backed by a rock face; a free-standing block overturns in weaker shaking "
-    "(kind rocking)",
+    "(kind='rocking')",
 )  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 

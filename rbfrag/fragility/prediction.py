@@ -17,8 +17,8 @@ from rbfrag.fragility.lookup import check_numbers
 from rbfrag.fragility.measures import ABOUT_SCATTER
 from rbfrag.fragility.method import SINGLE
 from rbfrag.fragility.model import AT_REST, NO_EVENT_RANGE, FragilityModel
-from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.results.numbers import confidence, equals, exact_percent, interval, percent
+from rbfrag.results.diagnostic import Diagnostic, diagnostics
+from rbfrag.results.numbers import TINY, confidence, equals, exact_percent, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.solver.kinds import BY_MECHANICS, by_model, mode_of_kind
 
@@ -122,13 +122,24 @@ class Prediction(Result):
 
     def sentences(self) -> Iterator[str]:
         """Yield the probability with its interval: "P(toppling) = 15 %   (95 % confidence …)"."""
-        p, state = self.probability, self.failure.replace("_", " ")
-        if p in (0.0, 1.0) and self.how == BY_MECHANICS:
-            reason = "   the block is unstable without shaking" if p == 1.0 else ""
-            yield f"P({state}) = {p:g}{reason}   (by mechanics)"
+        p, name = self.probability, f"P({self.failure.replace('_', ' ')})"
+        if self._is_by_mechanics:
+            reason = "the block is unstable without shaking" if p == 1.0 else self._reason()
+            yield "   ".join(filter(None, (f"{name} = {p:g}", reason, f"({self.how})")))
             return
-        ends = confidence(self.level, interval(self.ci_low, self.ci_high))
-        yield f"{equals(f'P({state})', percent(p))}   ({ends})"
+        # a model forbids nothing: where its P is 0 to rounding, a bound is printed
+        p, low, high = (min(max(v, TINY), 1.0 - TINY) for v in (p, self.ci_low, self.ci_high))
+        yield f"{equals(name, percent(p))}   ({confidence(self.level, interval(low, high))})"
+
+    @property
+    def _is_by_mechanics(self) -> bool:
+        """Whether mechanics gives P = 0 or 1 in place of the model."""
+        return self.probability in (0.0, 1.0) and self.how != by_model(self.model)
+
+    def _reason(self) -> str:
+        """Return why P = 0."""
+        codes = ("by_mechanics", "no_shaking")
+        return next((str(text) for text in diagnostics(self.warnings) if text.code in codes), "")
 
     def lines(self) -> Iterator[TextLine]:
         """Yield what was asked, the prediction interval, the drained bound and the model."""
@@ -144,9 +155,11 @@ class Prediction(Result):
             yield TextLine("", f"block uncertainty: standard deviation of P {self.block_sd:.2g}")
         if self.drained is not None:
             yield TextLine("Drained", describe.drained_bound(self.drained))
+        if self._is_by_mechanics:
+            yield TextLine("Model", "mechanics; no fitted model is used")
+            return
         inside = "within" if self.in_domain else "outside"
-        model = self.model if self.how != BY_MECHANICS else "mechanics, not the model"
-        yield TextLine("Model", f"{model}, {self.data}; inputs {inside} the fitted range")
+        yield TextLine("Model", f"{self.model}, {self.data}; inputs {inside} the fitted range")
 
     def _at_sites(self, sites: int) -> str:
         where = f"in one earthquake at {sites:,g} such site{'s' if sites > 1 else ''}"

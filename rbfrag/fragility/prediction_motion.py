@@ -108,8 +108,11 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
         return None if one is None or other is None else 0.5 * (float(one) + float(other))
 
     warnings = [
-        text.replaced(text=f"{polarity}: {text}")
-        for polarity, answer in (("forward", forward), ("reverse", reverse))
+        text if text in other.warnings else text.replaced(text=f"{polarity}: {text}")
+        for polarity, answer, other in (
+            ("forward", forward, reverse),
+            ("reverse", reverse, forward),
+        )
         for text in diagnostics(answer.warnings)
     ]
     means: dict[str, Any] = {
@@ -121,7 +124,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
             **means,
             "how": max(forward.how, reverse.how, key=lambda how: how.startswith("model")),
             "in_domain": forward.in_domain and reverse.in_domain,
-            "warnings": tuple(warnings),
+            "warnings": diagnostics(warnings),
         },
         forward=forward,
         reverse=reverse,

@@ -94,7 +94,7 @@ class LevelShaking:
 
 SINGLE_CURVE = Diagnostic(
     "the hazard curve is assumed to be of a single horizontal component; hazard tools mostly give "
-    "RotD50: use component rotd50",
+    "RotD50: use component='rotd50'",
     "single_component",
     fields=("component",),
 )

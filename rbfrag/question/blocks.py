@@ -175,7 +175,7 @@ def _listed_numbers(value: Any) -> list[float]:
 
 
 FREE_NEEDS_NONE = (
-    "; for a free-standing rectangular block no friction angle is required with kind rocking"
+    "; for a free-standing rectangular block no friction angle is required with kind='rocking'"
 )
 
 

@@ -113,7 +113,7 @@ _NAMES = f"{', '.join([*COMPONENTS][:-1])} or {[*COMPONENTS][-1]}"
 
 SINGLE_ASSUMED = Diagnostic(
     "the shaking is assumed to be of a single horizontal component; for RotD50, as hazard tools "
-    "give it, use component rotd50",
+    "give it, use component='rotd50'",
     "single_component",
     fields=("component",),
 )

@@ -36,8 +36,8 @@ _RANGES = {"magnitude": (3.0, 8.5), "rjb_km": (0.0, 400.0), "vs30_m_s": (150.0, 
 _MOST_OF_NORMAL = 7.0
 
 ANOTHER_MODEL = Diagnostic(
-    "the choice of ground-motion model changes P by a factor of up to 3: predict with the medians "
-    "and sigmas of another one, too (gmm), and average the probabilities, not the medians",
+    "P varies by a factor of up to 3 with the ground-motion model: repeat with others "
+    "(gmm='FILE') and average the probabilities, not the medians",
     "single_gmm",
     fields=("gmm",),
 )

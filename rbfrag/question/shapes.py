@@ -108,9 +108,10 @@ STEEP = (
 )
 
 TAKEN_TO_TOPPLE = Diagnostic(
-    "no friction angle is given: the rectangle is assumed to topple, backed by a rock face; with "
-    "phi the failure mode is checked",
+    "no friction angle is given: the rectangle is assumed to topple, backed by a rock face; "
+    "phi_deg determines the failure mode",
     "friction_not_given",
+    fields=("phi_deg",),
 )
 
 TAKEN_NOT_TO_SLIP = Diagnostic(

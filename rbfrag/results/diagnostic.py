@@ -163,6 +163,11 @@ class Diagnostic(str):
         """``note`` or ``warning``."""
         return CODES[self.code][0]
 
+    @property
+    def label(self) -> str:
+        """``Note`` or ``Warning``, before the text of an answer's line."""
+        return self.severity.capitalize()
+
     def replaced(self, **about: Any) -> Diagnostic:
         """Return the warning with another text, or for other rows."""
         return Diagnostic(**{"text": str(self), **vars(self), **about})
@@ -193,6 +198,16 @@ def _merged(warnings: Sequence[Diagnostic]) -> Diagnostic:
     return first.replaced(rows=np.concatenate(parts))
 
 
+def by_severity(warnings: Iterable[str]) -> list[Diagnostic]:
+    """Return warnings in the order in which people read them: warnings before notes."""
+    return sorted(diagnostics(warnings), key=lambda warning: warning.severity == NOTE)
+
+
+def labelled(warnings: Iterable[str]) -> tuple[str, ...]:
+    """Return warnings as an answer lists them: "Warning: the base is steeper than the face"."""
+    return tuple(f"{warning.label}: {warning}" for warning in by_severity(warnings))
+
+
 def as_documents(warnings: Iterable[str]) -> list[dict[str, Any]]:
     """Return warnings under the keys of the JSON contract."""
     return [
@@ -209,7 +224,7 @@ def as_documents(warnings: Iterable[str]) -> list[dict[str, Any]]:
 
 
 def with_diagnostics(document: Any) -> Any:
-    """Return a JSON document with ``diagnostics`` beside its ``warnings``, or each of a list."""
+    """Return a JSON document, or each of a list, with ``diagnostics`` next to its ``warnings``."""
     if isinstance(document, list):
         return [with_diagnostics(part) for part in document]
     if not isinstance(document, Mapping) or "warnings" not in document:

@@ -9,6 +9,9 @@ from __future__ import annotations
 SMALLEST = 1e-4
 """Probabilities nearer to 0 or to 1 than this are printed as a bound."""
 
+TINY = 1e-12
+"""Probability, above 0, that is printed for one of a model that is 0 or 1 to rounding."""
+
 NEVER = 1e-8
 """Annual rates below this are printed as a bound [1/yr]."""
 
@@ -44,8 +47,8 @@ def with_interval(p: float, low: float, high: float) -> str:
 
 
 def equals(name: str, value: str) -> str:
-    """Return "P = 15 %", or "P <0.01 %" where the value is a bound."""
-    return f"{name} {value}" if value[0] in "<>" else f"{name} = {value}"
+    """Return "P = 15 %", or "P < 0.01 %" where the value is a bound."""
+    return f"{name} {value[0]} {value[1:]}" if value[0] in "<>" else f"{name} = {value}"
 
 
 def exact_percent(fraction: float) -> str:

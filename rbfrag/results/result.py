@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rbfrag.results.diagnostic import with_diagnostics
+from rbfrag.results.diagnostic import labelled, with_diagnostics
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,8 +133,8 @@ class Result(Tabular):
         from html import escape
 
         lines = (f"{label}: {text}" if label else text for label, text in self.lines())
-        notes = (f"Note: {text}" for text in dict.fromkeys(self.warnings))
-        first, *others = (escape(text) for text in (*self.sentences(), *lines, *notes))
+        texts = (*self.sentences(), *lines, *labelled(self.warnings))
+        first, *others = map(escape, texts)
         body = "<br>".join((f"<b>{first}</b>", *others))
         return f"<p>{body}</p>{super()._repr_html_()}"
 

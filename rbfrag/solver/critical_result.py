@@ -17,6 +17,7 @@ from rbfrag.solver.results import (
     Outcome,
     OutcomeIntervals,
     Polarity,
+    Response,
     SearchPoints,
     Status,
     no_intervals,
@@ -322,16 +323,36 @@ class SlidingStrengths(Result):
         ky_over_pga: k_y/PGA of the blocks of the curve, shape (n,).
         displacement_m: their displacements on a level plane [m], shape (n,); NaN after a jump.
         warnings: notes on the motion and the search.
+        response: of the block that the search was asked for; None for the motion alone.
     """
 
     thresholds: tuple[CriticalResult, ...]
     ky_over_pga: FloatArray
     displacement_m: FloatArray
     warnings: tuple[str, ...]
+    response: Response | None = None
 
     def sentences(self) -> Iterator[str]:
-        """Yield the critical k_y of the first displacement."""
+        """Yield how far the block slides, and the critical k_y of the first displacement."""
+        if self.response is not None:
+            yield self._of_block(self.response)
         yield from self.thresholds[0].sentences()
+
+    def _of_block(self, response: Response) -> str:
+        """Return which displacement limits the block exceeds."""
+        slid = response.displacement_m
+        if slid is None:
+            return f"The block may slide farther: {response.outcome.advice}"
+        limits = sorted(each.as_dict()["displacement_m"] for each in self.thresholds)
+        verdicts = [
+            f"{words} {' and '.join(f'{limit:g}' for limit in of)} m"
+            for words, of in (
+                ("more than", [limit for limit in limits if slid > limit]),
+                ("not more than", [limit for limit in limits if slid <= limit]),
+            )
+            if of
+        ]
+        return f"The block slides {rounded(slid)} m on its base: {', '.join(verdicts)}"
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield the critical values by displacement, and the displacements by strength."""

@@ -62,8 +62,8 @@ KINDS = {
         ),
         KindFacts(
             "rocking", "topple", "overturns", ("p2", "kr"), True, ("restitution",),
-            no_search="what overturns a free-standing block is no interval of k_r (up to 122 "
-            "islands for one record), so that no value is certain to be the last",
+            no_search="the k_r that overturn under one record form up to 122 islands, so that no "
+            "value is certified as the last: compute the response of one block",
         ),
         KindFacts(
             "sliding", "slide", "slides too far", ("ky", "displacement_m"), False,
@@ -126,7 +126,7 @@ def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
 
 NOT_BACKED = (
     "no plane backs the block: free-standing, it rocks on both corners and fails at weaker shaking "
-    "than this model says; kind rocking answers for it as it stands (docs/theory/rocking.md)"
+    "than this model says; kind='rocking' answers for it as it stands (docs/theory/rocking.md)"
 )
 """What is said of a block that :func:`stands_free_of` is true of."""
 

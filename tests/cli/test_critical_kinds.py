@@ -56,6 +56,15 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
     assert "On a dipping base" in shell("critical", record, "--kind", "sliding").stdout
 
 
+def test_sliding_says_how_far_the_block_slides(shell: Shell, record: Path) -> None:
+    block = ("--height", "2", "--width", "2", "--dip", "20", "--phi", "32")
+    slid = shell.json("respond", record, *block)["displacement_m"]
+    printed = shell("critical", record, *block, "--displacement", "0.05,0.3").stdout
+    assert printed.startswith(
+        f"The block slides {slid:.3f} m on its base: more than 0.05 m, not more than 0.3 m\n"
+    )
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -63,7 +72,7 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
         (("--kind", "sliding", "--p2", "3"), "--p2 requires --kind toppling"),
         (("--rotation", "3"), "--rotation requires --kind confined_toppling or slumping"),
         (("--kind", "falling"), "use one of confined_toppling, rocking, sliding"),
-        (("--kind", "rocking", "--p2", "3"), "has no critical value: what overturns"),
+        (("--kind", "rocking", "--p2", "3"), "has no critical value: the k_r that overturn"),
         ((), "--p2 is missing"),
         (("--kind", "sliding", "--displacement", "far"), "'far' is not a number"),
     ],

@@ -8,6 +8,7 @@ import pytest
 
 from rbfrag.fragility import describe
 from rbfrag.fragility.prediction import Prediction
+from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import percent, with_interval
 from tests.cli.conftest import Shell
 
@@ -30,8 +31,12 @@ def test_the_headline_is_the_probability_with_its_interval() -> None:
     assert rocking.headline() == "P(overturning) = 15 %   (90 % confidence interval 7.4–26 %)"
     slide = answer(0.5, 0.4, 0.6, kind="sliding", failure="displacement above 0.1 m")
     assert slide.headline().startswith("P(displacement above 0.1 m) = 50 %")
-    assert answer(0.0, 0.0, 0.0, how="by mechanics").headline() == (
-        "P(toppling) = 0   (by mechanics)"
+    reason = (Diagnostic("k_r = 0.7 is not below PGA = 0.5 g", "by_mechanics"),)
+    assert answer(0.0, 0.0, 0.0, how="by mechanics", warnings=reason).headline() == (
+        "P(toppling) = 0   k_r = 0.7 is not below PGA = 0.5 g   (by mechanics)"
+    )
+    assert answer(0.0, 0.0, 1e-9).headline() == (
+        "P(toppling) < 0.01 %   (95 % confidence interval <0.01 %)"
     )
     assert answer(1.0, 1.0, 1.0, how="by mechanics").headline() == (
         "P(toppling) = 1   the block is unstable without shaking   (by mechanics)"

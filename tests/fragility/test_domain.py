@@ -90,8 +90,8 @@ def test_points_of_the_fit_are_in_the_domain(fitted: FragilityModel, data: FitDa
     assert 0.9949 <= answer.in_domain[allowed].mean() < 1.0
     told = {text for text in answer.reason[allowed] if text}
     assert told == {
-        "p2, kr, pgv_m_s, pga_g and tm_s together lie further from the fitted ones than 99.5 % of "
-        "those do: the answer is an extrapolation"
+        "the combination of p2, kr, pgv_m_s, pga_g and tm_s is farther from the centre of the "
+        "fitted data than 99.5 % of them: the answer is an extrapolation"
     }
 
 

@@ -1,4 +1,4 @@
-"""`rbfrag critical`: the strongest block that a motion brings down."""
+"""`rbfrag critical`: the strongest block that fails under a motion."""
 
 from __future__ import annotations
 
@@ -72,10 +72,13 @@ def critical(
     smallest scale factor of the record at which the block fails.
     """
     from rbfrag.solver.critical import critical as search
+    from rbfrag.solver.kinds import facts_of
     from rbfrag.solver.respond import respond
     from rbfrag.solver.results import MAP_DEPTH
 
     rotation, displacement = searched.rotation, searched.displacement
+    if searched.kind is not None and (why := facts_of(searched.kind).no_search):
+        raise InputError(f"--kind {searched.kind} has no critical value: {why}")
     block, block_kr, remarks = _searched_block(given, searched.kind)
     model = _chosen_kind(searched.kind, block, displacement)
     _refuse_options_of_other_kinds(
@@ -152,8 +155,6 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
 def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import KINDS
 
-    if model.no_search:
-        raise InputError(f"--kind {model.kind} has no critical value: {model.no_search}")
     for word, is_given in given.items():
         if is_given and SEARCH_OPTION[word] not in model.search_options:
             name = SEARCH_OPTION[word]
@@ -202,16 +203,18 @@ def _searched_block(
 def _slides(
     ground: GroundMotion, distances: list[float] | None, remarks: list[str], **question: Any
 ) -> SlidingStrengths:
-    """Return the critical strengths by displacement, and displacements by strength."""
+    """Return the critical strengths by displacement, displacements by strength, and the block's."""
     import numpy as np
 
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.critical_result import SlidingStrengths
     from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, sliding_displacements
+    from rbfrag.solver.respond import respond
 
     distances = distances or [*THRESHOLDS_M]
     thresholds = tuple(search(ground, displacement_m=d, **question) for d in distances)
     shaking = {name: question[name] for name in ("vertical", "polarity")}
     slid = sliding_displacements(ground, **shaking)
+    response = respond(ground, **question) if "block" in question else None
     warnings = (*remarks, *thresholds[0].warnings)
-    return SlidingStrengths(thresholds, np.array(KY_OVER_PGA), slid, warnings)
+    return SlidingStrengths(thresholds, np.array(KY_OVER_PGA), slid, warnings, response)

@@ -59,7 +59,7 @@ def demo(*, context: typer.Context, folder: str = option("Output folder", ".")) 
     if sample_folder() is None:
         print(f"\n{sentence}")
     print("\nnext:")
-    for command in NEXT:
+    for command in (f"rbfrag critical 1 --height 2 --width 0.5 {shlex.join(db)}", *NEXT):
         print(f"  {command}")
 
 

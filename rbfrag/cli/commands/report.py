@@ -15,7 +15,6 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
@@ -110,4 +109,4 @@ def report(
         print()
     print(out)
     if len(rows) > 1:
-        print_warnings(diagnostics(report.warnings, *(block.warnings for block in contents)))
+        print_warnings([*report.warnings, *(w for block in contents for w in block.warnings)])

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
 SHEET = "Sheet of the workbook with the table [default: first]"
 
-IGNORE_COLUMNS = "Unknown columns of the table to ignore, separated by commas; others are rejected"
+IGNORE_COLUMNS = (
+    "Columns of the table to ignore, separated by commas. Without it, a name close to that of a "
+    "known column is rejected, and other unknown columns are ignored with a warning"
+)
 
 CRS = "Coordinate reference system of x and y of rows without one, such as EPSG:2056"
 

@@ -27,6 +27,7 @@ from rbfrag.fragility.method import (
     linear,
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.vocabulary.quantities import QUANTITIES
 
 MIDDLE_MAGNITUDE = 6.5
 
@@ -54,7 +55,8 @@ def capacity_method(
     at_rest = Bound(
         lambda v: v[strength] >= v["pga_g"],
         strength,
-        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
+        f"{QUANTITIES[strength].symbol}{{{strength}}} is not below PGA{{pga_g}}: "
+        "the block does not move",
     )
 
     def pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:

@@ -46,7 +46,7 @@ BLOCK = BlockParameters(
     Bound(
         lambda v: v["ky"] >= v["pga_g"],
         "ky",
-        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
+        "k_y{ky} is not below PGA{pga_g}: the block does not move",
     ),
     options=("beta_deg",),
     points="displacements",
@@ -104,8 +104,8 @@ METHOD = Method(
         "pgv_pga": Form(
             ("c", "b1", "b2", "s0", "s1"), _eta(lambda _, __: ()), 0, (BLOCK.at_rest,),
             start=(0.6, 0.9, 3.7, -0.6, 0.9),
-            advice="without the magnitude, which says how long it shakes, this is too high below "
-            "magnitude 6.4 and too low from 7.5: give it",
+            advice="without magnitude, P is overestimated below M 6.4 and underestimated from "
+            "M 7.5: give the magnitude",
         ),
         "pgv_pga_m": Form(
             ("c", "b1", "b2", "b_magnitude", "s0", "s1"),

@@ -49,10 +49,7 @@ BLOCK = BlockParameters(
     "rocking",
     "kr",
     "p2",
-    method.NOT_LIFTED._replace(
-        text="is not below PGA: without vertical motion the ground cannot lift this block, which "
-        "cannot overturn: P = 0 by mechanics, not by the model"
-    ),
+    method.NOT_LIFTED,
     options=("restitution",),
     stored={"restitution_factor": (1.0, 0.9)},
     judged_kr=1.0,

@@ -132,13 +132,6 @@ class Contents(Result):
         return {**self.prediction.as_dict(), "warnings": [*self.warnings], "hazard": rate}
 
 
-def sentences_of(warnings: Sequence[str]) -> tuple[str, ...]:
-    """Return warnings as sentences."""
-    return tuple(
-        f"{text[:1].upper()}{text[1:]}{'' if text[-1:] in '?)' else '.'}" for text in warnings
-    )
-
-
 def contents_of(
     given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[RangeFields]
 ) -> Contents:

@@ -18,9 +18,9 @@ from rbfrag.plots.report.contents import (
     Contents,
     Report,
     Table,
-    sentences_of,
 )
 from rbfrag.plots.report.panels import panels_of
+from rbfrag.results.diagnostic import labelled
 from rbfrag.version import __version__
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
         cells += [(_SUMMARY[1], text) for text in reasons[:1]]
         lines.append((tuple(cells), normal))
         lines += [(((_SUMMARY[1], text),), normal) for text in reasons[1:]]
-    notes = sentences_of(report.warnings)
+    notes = labelled(report.warnings)
     if notes:
-        lines += [((), normal), (((_LEFT, "Notes"),), heading)]
+        lines += [((), normal), (((_LEFT, "Warnings and notes"),), heading)]
         lines += [(((_LEFT, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
     versions = dict.fromkeys(v for e in report.entries if e.contents for v in e.contents.versions)
     lines += [((), normal)]
@@ -139,7 +139,7 @@ def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> Non
     halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
     for half, (name, contents) in zip(halves, entries, strict=False):
         notes, head_in = (
-            _note_lines(sentences_of(contents.warnings)),
+            _note_lines(labelled(contents.warnings)),
             0.85 + 0.17 * len(_head_lines(contents)),
         )
         foot_in = 0.35 + _NOTE_STEP_IN * (len(notes) + 1)
@@ -161,7 +161,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
     head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
     tables_in = 0.1 + _STEP_IN * max(1.5 + len(rows) for _, rows in contents.sections)
-    notes, versions = _note_lines(sentences_of(contents.warnings)), _wrapped_all(contents.versions)
+    notes, versions = _note_lines(labelled(contents.warnings)), _wrapped_all(contents.versions)
     versions_in = 0.35 + 0.13 * len(versions)
     foot_in = versions_in + _NOTE_STEP_IN * (len(notes) + 1)
     panels = panels_of(contents)
@@ -259,7 +259,7 @@ def _write_notes(
     if not lines:
         return
     y = (above_in + _NOTE_STEP_IN * len(lines)) / tall_in
-    _write(part, _LEFT, y, "Notes", fontsize=9, fontweight="bold", color=BLUE)
+    _write(part, _LEFT, y, "Warnings and notes", fontsize=9, fontweight="bold", color=BLUE)
     for line in lines:
         y -= _NOTE_STEP_IN / tall_in
         _write(part, _LEFT, y, line, fontsize=_NOTE_SIZE)

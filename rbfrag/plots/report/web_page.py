@@ -19,9 +19,9 @@ from rbfrag.plots.report.contents import (
     Report,
     ReportedBlock,
     Table,
-    sentences_of,
 )
 from rbfrag.plots.report.panels import Panel, panels_of
+from rbfrag.results.diagnostic import labelled
 
 _SIZE_IN = (5.4, 4.6)
 
@@ -68,7 +68,7 @@ def write_html(report: Report, title: str, date: str, target: Path) -> None:
         f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
         _rows(report.summary) if report.summary else "",
         _summary(entries) if several else "",
-        _notes(sentences_of(report.warnings)),
+        _notes(labelled(report.warnings)),
         *(_block(contents, name, f"b{i}-" if several else "")
           for i, (name, contents) in enumerate(answered)),
         "<footer>", *(f"<p>{escape(text)}</p>" for text in versions), "</footer>",
@@ -98,14 +98,14 @@ def _block(contents: Contents, name: str, prefix: str) -> str:
         *(f"<p>{_written(text)}</p>" for text in further),
         _rows(contents.lines()), '<div class="parts">', *map(_table, contents.sections), "</div>",
         '<div class="parts">', *islice(figures, 2 if prefix else None), "</div>",
-        _notes(sentences_of(contents.warnings)), "</section>",
+        _notes(labelled(contents.warnings)), "</section>",
     ])  # fmt: skip
 
 
 def _notes(sentences: Sequence[str]) -> str:
     """Return the warnings in a box; nothing where there are none."""
     items = "".join(f"<li>{_written(text)}</li>" for text in sentences)
-    return f'<div class="notes"><h2>Notes</h2><ul>{items}</ul></div>' if items else ""
+    return f'<div class="notes"><h2>Warnings and notes</h2><ul>{items}</ul></div>' if items else ""
 
 
 def _written(text: str) -> str:

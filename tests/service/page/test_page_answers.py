@@ -5,7 +5,14 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from rbfrag.results.diagnostic import Diagnostic, labelled
 from tests.service.page.reading import FIRST_ANSWER, agrees, points_of, probability_shown
+
+
+def listed(answer):
+    """The warnings of an answer of the service, as every interface lists them."""
+    return [*labelled(Diagnostic(d["text"], d["code"]) for d in answer["diagnostics"])]
+
 
 REFUSED = "Failed to load resource: the server responded with a status of 422"
 
@@ -50,7 +57,7 @@ def test_the_answer_is_the_services(open_page, ask, typed):
     expect(page.locator("#meter .one-event")).to_be_attached()
     if answer["event_low"] is not None and answer["probability"] > 0.0:
         assert "in one earthquake" in opened.text("#lines")
-    assert page.locator("#warnings li").all_text_contents() == answer["warnings"]
+    assert page.locator("#warnings li").all_text_contents() == listed(answer)
     inside = "within" if answer["in_domain"] else "outside"
     expect(page.locator("#lines")).to_contain_text(inside)
     rows = page.locator("#other-answers tr")
@@ -63,7 +70,7 @@ def test_an_extrapolation_is_said_and_its_reasons_are_the_services(open_page, as
     assert not answer["in_domain"]
     assert len(answer["warnings"]) >= 3
     expect(opened.page.locator("#lines")).to_contain_text("inputs outside the fitted range")
-    assert opened.page.locator("#warnings li").all_text_contents() == answer["warnings"]
+    assert opened.page.locator("#warnings li").all_text_contents() == listed(answer)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +245,7 @@ def test_the_page_opens_on_a_rectangle_that_is_answered(open_page, ask):
     numbers = ask("v1/drawing", height=2, width=0.5, dip=6)["numbers"]
     assert f"p² = {numbers['p2']:.3g} s⁻², kr = {numbers['kr']:.3g}" in opened.text("#lines")
     assert "backed by a rock face" in opened.text("#lines")
-    assert page.locator("#warnings li").all_text_contents() == answer["warnings"]
+    assert page.locator("#warnings li").all_text_contents() == listed(answer)
 
 
 def test_a_free_standing_rectangle_says_what_it_is_taken_as(open_page, ask):

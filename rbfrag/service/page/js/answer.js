@@ -3,7 +3,7 @@
 import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
 import { readable } from "./numbers.js";
-import { byId } from "./page.js";
+import { byId, labelled } from "./page.js";
 import { interval, percent } from "./percent.js";
 import { writeText } from "./subscripts.js";
 import { labelOfTerm } from "./vocabulary.js";
@@ -30,7 +30,8 @@ export function showAnswer(answer) {
   byId("lines").dataset.inside = String(answer.in_domain);
   byId("about").textContent = "";
   drawMeter(answer);
-  showWarnings(byId("warnings"), answer.warnings);
+  const shown = (/** @type {any} */ { text }) => !sentences[0].includes(text);
+  showWarnings(byId("warnings"), labelled(answer.diagnostics.filter(shown)));
   showOthers(answer.answers);
   const headline = [probability, ...rest].join(" ");
   byId("strip").textContent = headline;

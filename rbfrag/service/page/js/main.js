@@ -113,7 +113,7 @@ async function answerQuestion(asked) {
     nothingWrong(form);
     if (!answer) {
       sheets.hide();
-      return nothingKnown(noAnswer, found.block.warnings);
+      return nothingKnown(noAnswer, labelled(found.block.diagnostics));
     }
     showAnswer(answer);
     if (!found.numbers) {

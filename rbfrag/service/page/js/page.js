@@ -18,3 +18,17 @@ export function byId(id) {
 export function textIn(id) {
   return plain(/** @type {HTMLInputElement} */ (byId(id)).value);
 }
+
+/**
+ * Warnings as every interface lists them: warnings before notes, each with its label.
+ * @param {{severity: string, text: string}[]} diagnostics
+ * @returns {string[]}
+ */
+export function labelled(diagnostics) {
+  return [
+    ["warning", "Warning"],
+    ["note", "Note"],
+  ].flatMap(([level, label]) =>
+    diagnostics.filter((each) => each.severity === level).map(({ text }) => `${label}: ${text}`),
+  );
+}

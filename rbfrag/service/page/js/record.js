@@ -1,6 +1,7 @@
 /** The reader's record: dropped on the page or chosen, asked for its spectrum, kept in a link. */
 
 import { ratios } from "./numbers.js";
+import { labelled } from "./page.js";
 
 /**
  * @typedef {import("./spectrum.js").Spectrum} Spectrum
@@ -44,7 +45,7 @@ export function spectrumOf(answers, name) {
     p2: forward.p2,
     forward: forward.x_m_s,
     reverse: reverse.x_m_s,
-    warnings: forward.warnings,
+    warnings: labelled(forward.diagnostics),
   };
 }
 

@@ -3,7 +3,7 @@
 import { Refusal, Unreachable, upload } from "./ask.js";
 import { showWarnings } from "./answer.js";
 import { plain } from "./numbers.js";
-import { byId } from "./page.js";
+import { byId, labelled } from "./page.js";
 import { MEASURES, only } from "./question.js";
 
 /** @param {() => import("./question.js").Question} present what is asked above the table */
@@ -35,7 +35,7 @@ export function blockTable(present) {
       file.href = URL.createObjectURL(new Blob(["\ufeff", found.table]));
       file.hidden = false;
       byId("table-said").textContent = `${found.answered} of ${found.rows} blocks are answered.`;
-      showWarnings(byId("table-notes"), found.warnings);
+      showWarnings(byId("table-notes"), labelled(found.diagnostics));
     } catch (error) {
       if (![Refusal, Unreachable].some((kind) => error instanceof kind)) throw error;
       byId("table-error").textContent = /** @type {Error} */ (error).message;
