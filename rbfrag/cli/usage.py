@@ -33,8 +33,11 @@ def usage_message(error: Any) -> str:
         message = f"unexpected argument {message.partition(' (')[2].rpartition(')')[0]}"
     if context is None:
         return message
-    path = " ".join(("rbfrag", *context.command_path.split()[1:]))
-    return f"{message} (help: {path} --help)"
+    words = ["--help"]
+    while context.parent is not None:
+        words.insert(0, context.info_name)
+        context = context.parent
+    return f"{message} (help: rbfrag {' '.join(words)})"
 
 
 def _suggestion(typed: str, known: list[str]) -> str:

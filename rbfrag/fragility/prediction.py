@@ -327,7 +327,7 @@ def _at_sites(
     """Return an answer with the range of the share that fails at some sites of one earthquake."""
     if isinstance(sites, bool | str) or sites not in range(1, MOST_SITES + 1):
         raise InputError(
-            f"sites = {sites!r}: it must be a whole number from 1 to {MOST_SITES:,}",
+            f"sites must be a whole number from 1 to {MOST_SITES:,}, not {sites!r}",
             fields=("sites",),
         )
     if model.dependence is None:

@@ -265,10 +265,11 @@ class TopplingSpectrum(Result):
         pgv = f"PGV {rounded(self.pgv_m_s)} m/s"
         yield TextLine("Record", f"{self.name}, {pgv}, {self.polarity} polarity")
 
-    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield X and the critical k_r by size."""
+        shown = repr if verbose else rounded
         columns = zip(self.p2, self.x_m_s, self.critical_kr, strict=True)
-        rows = [(p2, rounded(x), rounded(kr)) for p2, x, kr in columns]
+        rows = [(p2, shown(x), shown(kr)) for p2, x, kr in columns]
         yield TextTable(("p² [s⁻²]", "X [m/s]", "k_r"), rows)
 
     def table_columns(self) -> Mapping[str, Any]:

@@ -7,6 +7,7 @@ one, and keeps each's own of many. No numpy is loaded for a single shape.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -278,7 +279,10 @@ def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool
             why = "is empty" if columns else "is not a number"
             level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
             listener.refuse(unknown, f"{shown} {why}{level}", name)
-        wrong = f"{shown} = {{value:.10g}} is not {about.range.words} {about.unit}".rstrip()
+        allowed = f"{about.range.words} {about.unit}".rstrip()
+        if about.unit == "deg":
+            allowed = re.sub(r"(\d+)", r"\1°", about.range.words)
+        wrong = f"{shown} must be {allowed}, not {{value:.10g}}"
         listener.refuse(usable ^ True ^ unknown, wrong, name, value=value)
 
 

@@ -8,6 +8,7 @@ belong to one object, so that a warning cannot be lost on the way to one of the 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -99,14 +100,14 @@ class Tabular:
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
-class Result(Tabular):
+class Result(Tabular, ABC):
     """Base of the answers; a subclass is a dataclass with ``warnings``."""
 
     warnings: Sequence[str]
 
+    @abstractmethod
     def sentences(self) -> Iterator[str]:
         """Yield the number that decides, with its interval, and what belongs to it."""
-        raise NotImplementedError
 
     def headline(self) -> str:
         """Return the number that decides, with its interval."""
@@ -116,17 +117,18 @@ class Result(Tabular):
         """Yield labelled lines: what was asked, and which model answers."""
         return iter(())
 
-    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:  # noqa: ARG002
+    def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
         """Yield tables for the terminal.
 
         Args:
             verbose: with every value.
         """
-        return iter(())
+        if verbose:
+            yield TextTable.of_values(self.as_dict())
 
+    @abstractmethod
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
-        raise NotImplementedError
 
     def _repr_html_(self) -> str:
         """Return the answer as a notebook shows it: sentences, lines, warnings, numbers."""

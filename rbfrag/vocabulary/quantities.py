@@ -57,7 +57,9 @@ class Limits:
             return f"above {self.above:g} and {high}" if high else f"above {self.above:g}"
         if self.least is not None:
             least = f"{self.least:g}"
-            return f"from {least} to {high.removeprefix('up to ')}" if high else f"at least {least}"
+            if self.most is not None:
+                return f"from {least} to {self.most:g}"
+            return f"at least {least}{f' and {high}' if high else ''}"
         return high
 
 

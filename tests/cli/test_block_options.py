@@ -127,7 +127,7 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
     ("options", "words"),
     [
         (("--height", "2"), "--width is missing: --height, --width together"),
-        ((*SIDES, "--width", "0"), "--width = 0 is not above 0 m"),
+        ((*SIDES, "--width", "0"), "--width must be above 0 m, not 0"),
         ((*SIDES, "--dip", "3", "--beta", "3"), "--beta cannot be combined with --dip"),
         (("--dip", "3"), "or by its shape, such as --height and --width"),
         ((*ALPHA1, "--dip", "3"), "--phi is missing"),

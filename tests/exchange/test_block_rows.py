@@ -201,8 +201,8 @@ def test_rectangles_are_refused_in_their_own_words() -> None:
     with pytest.raises(InputError) as refusal:
         read_blocks(columns)
     for words in (
-        "row 1: dip_deg = 95 is not between -90 and 90", "row 2: height_m is empty",
-        "row 3: height_m = -1 is not above 0", "row 4: width_m = '?' is not a number",
+        "row 1: dip_deg must be between -90° and 90°, not 95", "row 2: height_m is empty",
+        "row 3: height_m must be above 0 m, not -1", "row 4: width_m = '?' is not a number",
     ):  # fmt: skip
         assert words in str(refusal.value)
 

@@ -69,7 +69,7 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
     ("query", "words"),
     [
         ("height=2", "width is missing"),
-        ("height=2&width=0", "width = 0 is not above 0"),
+        ("height=2&width=0", "width must be above 0 m, not 0"),
         ("height=2&width=0.5&kr=0.1", "kr cannot be combined with height"),
         ("height=2&width=0.5&r3=2", "r3 cannot be combined with height"),
         ("height=2&width=0.5&dip=3&beta=3", "dip cannot be combined with beta"),

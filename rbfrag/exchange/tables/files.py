@@ -71,8 +71,7 @@ def open_table(
         return _of_one_part(read_points(path), "feature")
     if suffix not in (*SUFFIXES, *WORKBOOKS):
         raise InputError(
-            f"{path}: unsupported table: use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
-            f"{path.suffix!r}"
+            f"{path}: unsupported table format {path.suffix!r}; use {', '.join(SUFFIXES)} or .ods"
         )
     stack.enter_context(_reading(path))
     size = path.stat().st_size
