@@ -46,12 +46,12 @@ from rbfrag.hazards.kernel import (
 )
 from rbfrag.hazards.mass import Indices, SiteMass, curve_mass
 from rbfrag.hazards.model_parts import RateKeywords, parts_by_model
-from rbfrag.hazards.shaking import NOTABLE, LevelShaking, ends_in_words
+from rbfrag.hazards.shaking import NOTABLE, SINGLE_CURVE, LevelShaking, ends_in_words
 from rbfrag.question.fields import AnsweringFields
 from rbfrag.question.keywords import LEVEL, parts_of
 from rbfrag.question.question import is_wet, no_drained_bound, without_water
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
-from rbfrag.results.numbers import percent, relative
+from rbfrag.results.numbers import percent, relative, return_period
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCK, BLOCKS
 
@@ -234,13 +234,17 @@ def hazard_at_sites(
     if (joint or at_least is not None) and not one_class:
         joints, of_joints = joint_at_sites(each, mass, at_least, years, level, number)
     ends = _beyond(result, mass, where)
+    notes = reading.warnings
+    if SINGLE_CURVE in notes and sound.size == 1:
+        note = _single_component_note(sites, meaning, branch_weight, blocks[0][1], result)
+        notes = (*(text for text in notes if text != SINGLE_CURVE), *note)
     texts = [
         *remarks,
         *unusable_in_words(
             int((~sound).sum()), sound.size, elements(reason), reason[~sound].tolist(),
             FROM_MEAN if one_class else FROM_SUMS,
         ),
-        *reading.warnings, *alone,
+        *notes, *alone,
         *_of_curves(sites), *(note for part in parts for note in part.model.notes),
         *ends_in_words(first, where, result.rate, *ends[:2], result.ends[0]),
         *_numbers_in_words(result), *of_joints,
@@ -293,6 +297,26 @@ def hazard_at_sites(
         count=number,
         tau=LAW_TAU if by_law else None if meaning.get("convert") else TAU.get(reading.name),
     )
+
+
+def _single_component_note(
+    sites: Sequence[Sequence[HazardCurve]],
+    meaning: CurveKeywords,
+    weight: FloatArray,
+    block: KernelBlocks,
+    result: Rates,
+) -> Iterator[Diagnostic]:
+    """Yield the note that a single component is assumed, unless RotD50 gives the same period."""
+    rotd50: CurveKeywords = {**meaning, "component": "rotd50"}
+    reading = LevelShaking.of(sites[0][0], **rotd50)
+    mass = curve_mass(list(zip(*sites, strict=True)), weight, reading)
+    rate = rates(replace(block, median=reading.median), mass, LEVEL).rate
+    period = return_period(float(rate[0]))
+    if period != return_period(float(result.rate[0])):
+        yield SINGLE_CURVE.replaced(
+            text="the hazard curve is assumed to be of a single horizontal component; as RotD50 "
+            f"the return period would be {period}"
+        )
 
 
 def _whole(each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int) -> Rates:

@@ -389,9 +389,8 @@ _UNIT = re.compile(r"\s*[(\[]([^()\[\]]+)[)\]]$")
 """A unit in brackets at the end of a column's name, as people write it: PGV [m/s]."""
 
 HEADER_HELP = (
-    "the first line names both columns with their unit: pga_g, pga_m_s2, pgv_m_s, pgv_cm_s or "
-    "sa(PERIOD)_g, and annual_rate, return_period_years or poe_YEARS_years, such as  "
-    f"pgv_m_s,annual_rate; answered are {ANSWERED}"
+    "name the columns pga_g, pga_m_s2, pgv_m_s, pgv_cm_s or sa(1.0)_g, and annual_rate, "
+    "return_period_years or poe_50_years"
 )
 
 

@@ -359,8 +359,8 @@ def _warnings(
     if rate > 0.0 and outside > NOTABLE * rate:
         warnings.append(
             Diagnostic(
-                f"{percent(outside / rate)} of the failures come from blocks and shaking outside "
-                "the fitted range",
+                f"{percent(outside / rate)} of the expected failures come from blocks and shaking "
+                "outside the fitted range",
                 "extrapolation",
             )
         )

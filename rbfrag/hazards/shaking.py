@@ -63,7 +63,7 @@ class LevelShaking:
         if component is None:
             warnings.append(SINGLE_CURVE)
             component = component_named(SINGLE_COMPONENT)
-        else:
+        elif component.name != SINGLE_COMPONENT:
             warnings.append(component.in_words("the curve is"))
         ratio = None if curve.period_s is None else component.spectral_ratio(curve.period_s)
         return cls.about(name, component, factor, spread, tuple(warnings), ratio)
@@ -177,6 +177,7 @@ def ends_in_words(
         below: probability of failure at the first level, shape (m,).
     """
     more = above_at_most - above
+    of_block = " of a block" if rate.size > 1 else ""
     for doubtful, size in ((more > NOTABLE * rate, more), (below > NOTABLE, below)):
         if not doubtful.any():
             continue
@@ -187,13 +188,14 @@ def ends_in_words(
         if size is more:
             yield Diagnostic(
                 f"the hazard curve{of_site} ends at {curve.level_text(-1)}: stronger shaking may "
-                f"add up to {annual_rate(float(more[worst]))} /yr to the rate{more_sites}",
+                f"add up to {annual_rate(float(more[worst]))} /yr to the rate{of_block}"
+                f"{more_sites}",
                 "curve_ends",
             )
         else:
             yield Diagnostic(
-                f"the hazard curve{of_site} begins at {curve.level_text(0)}, where P(failure) is "
-                f"already {percent(float(below[worst]))}: weaker shaking is neglected "
-                f"(unconservative){more_sites}",
+                f"the hazard curve{of_site} begins at {curve.level_text(0)}, where "
+                f"P(failure){of_block} is already {percent(float(below[worst]))}: weaker shaking "
+                f"is neglected (unconservative){more_sites}",
                 "curve_ends",
             )

@@ -76,7 +76,7 @@ class Component:
         return float(self.spectral_ratio(0.01) ** AMPLIFIED.get(measure, 0))
 
     def in_words(self, subject: str) -> Diagnostic:
-        """Return the component of values, after "the curve is", for example."""
+        """Return the component of values, after "the measures are", for example."""
         if self.name == SINGLE_COMPONENT:
             return Diagnostic(f"{subject} of {self.title}, as the models are", "single_component")
         return Diagnostic(

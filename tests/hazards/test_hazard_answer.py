@@ -118,6 +118,20 @@ def test_several_blocks_have_a_sum_and_their_shortest_return_periods() -> None:
     )
 
 
+def test_the_component_is_noted_where_it_matters() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0)
+    row = model_row(dependence=SHARED)
+    alone, rotd50 = (hazard(curve, 3.0, 0.1, model=row, component=c) for c in (None, "rotd50"))
+    (note,) = (text for text in alone.warnings if "single horizontal component" in text)
+    assert note.endswith(f"as RotD50 the return period would be {rotd50.return_period_text(0)}")
+    several = hazard(curve, [3.0, 3.0], 0.1, model=row)
+    assert any(text.endswith("use component rotd50") for text in several.warnings)
+    for asked in ({"kr": 300.0}, {"kr": 0.1, "component": "single"}):
+        answer = hazard(curve, p2=3.0, model=row, **asked)  # type: ignore[arg-type]
+        assert not any("single horizontal component" in text for text in answer.warnings)
+
+
 REJECTED = {"block_id": "bad", "reason": "no number"}
 
 

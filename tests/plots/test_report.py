@@ -101,6 +101,9 @@ def test_a_table_becomes_one_document(shell: Shell) -> None:
     assert page.count("<svg") == 7  # of the unstable block its drawing alone
     names = re.findall(r'\bid="([^"]*)"', page)
     assert len(names) == len(set(names))
+    notes = re.findall("<li>(.*?)</li>", page)
+    assert len(notes) == len(set(notes))
+    assert any("the curve is of RotD50" in text for text in notes)
 
 
 def test_a_table_that_makes_no_document(refuses: Refuses) -> None:

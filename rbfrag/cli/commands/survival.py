@@ -35,7 +35,13 @@ def survival(
         "branches), USGS NSHM JSON, or CSV of two columns with units in the header",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
+    given: Annotated[Given, fields_of(*BLOCK, *WHOLE, without=("kind",))],
+    kind: str | None = option(
+        "Kind of failure: rocking (free-standing), toppling (backed by a rock face), slumping, "
+        "confined_toppling or sliding; required except for tables with a column kind, and with "
+        "the parameters of other kinds (--restitution, --ky, --ks, --kct)",
+        rich_help_panel="Block and shaking",
+    ),
     blocks: TableOptions,
     known: Uncertainty,
     meaning: options.Curve,
@@ -52,7 +58,6 @@ def survival(
 ) -> None:
     """Print the survival probability of standing blocks.
 
-    --kind is required: rocking for free-standing blocks, toppling for blocks backed by a rock face.
     The blocks of --blocks stand at one site. The factors on all rates of the hazard are those at
     which the survival probability is 5 % and 50 %. With --weights the weights of logic-tree
     branches are updated with the survival of the blocks.
@@ -65,6 +70,8 @@ def survival(
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
+    if kind is not None:
+        given["kind"] = kind
     if blocks.blocks is None:
         require_kind(given)
     several = blocks.given_blocks(given, reads=("count",), need_kind=KIND_MISSING)

@@ -219,6 +219,9 @@ class ReportedBlock:
         return (name, mode, *answer, period)
 
 
+NAMED = 6
+"""Blocks that a note of several of them names."""
+
 COLUMNS = ("block", "failure mode", "P", "interval", "return period")
 
 
@@ -236,6 +239,33 @@ class Report(NamedTuple):
     summary: Rows = ()
     warnings: tuple[str, ...] = ()
     totals: Mapping[str, Any] = {}
+
+    @property
+    def shared_notes(self) -> dict[str, Diagnostic]:
+        """Notes that several blocks have, with the names of these unless all have them."""
+        names: dict[Diagnostic, list[str]] = {}
+        for entry in self.entries:
+            for note in () if entry.contents is None else diagnostics(entry.contents.warnings):
+                names.setdefault(note, []).append(entry.name)
+        answered = sum(entry.contents is not None for entry in self.entries)
+        shared: dict[str, Diagnostic] = {}
+        for note, blocks in names.items():
+            if 1 < len(blocks) < answered and note not in self.warnings:
+                listed = ", ".join((*blocks[:NAMED], *["…"][: len(blocks) - NAMED]))
+                shared[note] = note.replaced(text=f"{note} (blocks {listed})")
+            elif len(blocks) > 1:
+                shared[note] = note
+        return shared
+
+    @property
+    def notes(self) -> tuple[Diagnostic, ...]:
+        """Notes of the report, those that several blocks have among them, once each."""
+        return diagnostics(self.warnings, self.shared_notes.values())
+
+    def notes_of(self, contents: Contents) -> tuple[Diagnostic, ...]:
+        """Return the notes of a block that no other has."""
+        shared = self.shared_notes
+        return tuple(note for note in contents.warnings if note not in shared)
 
 
 def report_of(

@@ -84,7 +84,8 @@ def _pages(report: Report, title: str, date: str) -> Iterator[Figure]:
     draws: list[Callable[[Figure], None]] = [
         *(partial(_list, lines=lines[i : i + _LINES], title=title, date=date)
           for i in range(0, len(lines), _LINES)),
-        *(partial(_draw_halves, entries=answered[i : i + 2]) for i in range(0, len(answered), 2)),
+        *(partial(_draw_halves, report=report, entries=answered[i : i + 2])
+          for i in range(0, len(answered), 2)),
     ]  # fmt: skip
     if len(report.entries) == 1:
         draws = [partial(_draw, contents=answered[0][1], title=title, date=date)]
@@ -114,7 +115,7 @@ def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
         cells += [(_SUMMARY[1], text) for text in reasons[:1]]
         lines.append((tuple(cells), normal))
         lines += [(((_SUMMARY[1], text),), normal) for text in reasons[1:]]
-    notes = labelled(report.warnings)
+    notes = labelled(report.notes)
     if notes:
         lines += [((), normal), (((_LEFT, "Warnings and notes"),), heading)]
         lines += [(((_LEFT, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
@@ -135,13 +136,11 @@ def _list(
             _write(part, x, 0.93 - i * _STEP_IN / _HEIGHT_IN, text, **style)
 
 
-def _draw_halves(figure: Figure, entries: Sequence[tuple[str, Contents]]) -> None:
+def _draw_halves(figure: Figure, report: Report, entries: Sequence[tuple[str, Contents]]) -> None:
     halves = figure.subfigures(2, 1, squeeze=False)[:, 0]
     for half, (name, contents) in zip(halves, entries, strict=False):
-        notes, head_in = (
-            _note_lines(labelled(contents.warnings)),
-            0.85 + 0.17 * len(_head_lines(contents)),
-        )
+        notes = _note_lines(labelled(report.notes_of(contents)))
+        head_in = 0.85 + 0.17 * len(_head_lines(contents))
         foot_in = 0.35 + _NOTE_STEP_IN * (len(notes) + 1)
         heights = [head_in, 0.5 * _HEIGHT_IN - head_in - foot_in, foot_in]
         head, body, foot = half.subfigures(3, 1, height_ratios=heights)

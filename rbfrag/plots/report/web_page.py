@@ -68,8 +68,8 @@ def write_html(report: Report, title: str, date: str, target: Path) -> None:
         f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
         _rows(report.summary) if report.summary else "",
         _summary(entries) if several else "",
-        _notes(labelled(report.warnings)),
-        *(_block(contents, name, f"b{i}-" if several else "")
+        _notes(labelled(report.notes)),
+        *(_block(contents, report.notes_of(contents), name, f"b{i}-" if several else "")
           for i, (name, contents) in enumerate(answered)),
         "<footer>", *(f"<p>{escape(text)}</p>" for text in versions), "</footer>",
         "</body></html>",
@@ -88,7 +88,7 @@ def _summary(entries: Sequence[ReportedBlock]) -> str:
     return f'<table class="all">{"".join(rows)}</table>'
 
 
-def _block(contents: Contents, name: str, prefix: str) -> str:
+def _block(contents: Contents, notes: Sequence[str], name: str, prefix: str) -> str:
     """Return what is said of a block; of several each has two pictures, and names of its own."""
     first, *further = contents.sentences()
     figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels_of(contents))
@@ -98,7 +98,7 @@ def _block(contents: Contents, name: str, prefix: str) -> str:
         *(f"<p>{_written(text)}</p>" for text in further),
         _rows(contents.lines()), '<div class="parts">', *map(_table, contents.sections), "</div>",
         '<div class="parts">', *islice(figures, 2 if prefix else None), "</div>",
-        _notes(labelled(contents.warnings)), "</section>",
+        _notes(labelled(notes)), "</section>",
     ])  # fmt: skip
 
 
