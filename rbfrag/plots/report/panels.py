@@ -80,5 +80,5 @@ def _rate(part: FigureBase, contents: Contents) -> None:
     assert contents.hazard is not None
     top, bottom = part.subplots(2, 1, sharex=True)
     draw_contribution(top, bottom, contents.hazard.curves[0], contents.hazard)
-    top.set_ylabel("rate of exceedance [yr⁻¹]")
-    bottom.set_ylabel("fraction of the rate\n[% of each interval]")
+    top.set_ylabel("exceedances [yr⁻¹]")
+    bottom.set_ylabel("fraction of\nthe rate [%]")
