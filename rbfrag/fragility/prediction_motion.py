@@ -56,7 +56,7 @@ def predict_motion(
 ) -> Prediction:
     """Return the probability for one block; arguments as for :func:`rbfrag.predict`."""
     if sites is not None:
-        text = "sites given beside a motion, which shakes one: give its measures instead"
+        text = "sites cannot be combined with a motion: give its intensity measures instead"
         raise InputError(text, fields=("sites",))
     if weights is not None:
         raise InputError(f"weights cannot be combined with a motion: {SIMULATED}")

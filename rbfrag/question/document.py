@@ -155,7 +155,7 @@ def answer_numbers(
             answers.append(answer)
         unused = unused_measures(models[0], given)
         if is_component_assumed and 0.0 < answers[0].probability < 1.0:
-            notes = _as_rotd50(models[0], given, weights, answers[0].probability)
+            notes = (_as_rotd50(models[0], given, weights, answers[0].probability),)
     warnings = diagnostics(remarks, unused, answers[0].warnings, notes)
     return _with_alternatives(with_values(answers[0], warnings=warnings), answers, inputs, sites)
 
@@ -179,19 +179,21 @@ def _as_rotd50(
     inputs: Mapping[str, ArrayLike],
     weights: ArrayLike | None,
     probability: float,
-) -> tuple[Diagnostic, ...]:
+) -> Diagnostic:
     """Return the note that a single component is assumed, with P for RotD50 if it differs."""
     from rbfrag.fragility import describe
     from rbfrag.results.numbers import percent
 
     rotd50 = answer_given(model, to_single_component(inputs, "rotd50"), 0.95, weights=weights)
     assert isinstance(rotd50, Prediction)
-    if percent(rotd50.probability) == percent(probability):
-        return ()
+    would_be = percent(rotd50.probability)
+    if would_be == percent(probability):
+        would_be = "the same"
     names = [name for name in model.term.inputs if name in AMPLIFIED]
     are = "is" if len(names) == 1 else "are"
-    text = (
+    return Diagnostic(
         f"{describe.measures(names)} {are} assumed to be of a single horizontal component; as "
-        f"RotD50 P would be {percent(rotd50.probability)}"
+        f"RotD50 P would be {would_be}",
+        SINGLE_ASSUMED.code,
+        fields=SINGLE_ASSUMED.fields,
     )
-    return (Diagnostic(text, SINGLE_ASSUMED.code, fields=SINGLE_ASSUMED.fields),)
