@@ -38,7 +38,7 @@ from rbfrag.plots.canvas import (
 from rbfrag.solver import toppling_run
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.free_rocking import TOPPLED
-from rbfrag.solver.integrator.two_corners import RockingRun
+from rbfrag.solver.integrator.rocking_kernel import RockingRun
 from rbfrag.solver.models.rocking import free_block
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES

@@ -16,8 +16,8 @@ from rbfrag.bench.tables import markdown
 from rbfrag.bench.timing import timed
 from rbfrag.solver.excitation import Excitation, Nodes, excitation
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.single_run import run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.integrator.toppling_kernel import run_toppling
 from rbfrag.solver.integrator.vectorised import run_batch
 from rbfrag.solver.results import FloatArray, IntArray
 

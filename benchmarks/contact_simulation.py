@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.page import ROOT, parser, report
 from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.bench.tables import markdown
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.plots.canvas import (
     MODE_COLOURS,
     legend_below,

@@ -24,7 +24,7 @@ from benchmarks.page import ROOT, parser, report
 from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.bench.tables import markdown
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.plots.canvas import BLUE, ROCK, light_grid, new_figure, save_figure
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.joint_sets import Realisations
@@ -32,12 +32,12 @@ from rbfrag.rockmasses.shaking import DISPLACEMENT_M
 from rbfrag.solver import free_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.models import model_of_mode, sliding
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
+from rbfrag.solver.simulation import Simulation, simulate_block
 from rbfrag.solver.stability.modes import ModeName
-from rbfrag.solver.whole_run import WholeRun, whole_run
 from tests.physics.penalty import Simulated, simulate
 from tests.physics.test_against_penalty import DT_S, half_sines
 from tests.physics.test_followed_on import LOST, SLIDES, first_rest_rad, first_time
@@ -147,8 +147,8 @@ def slides_by_law(root: Path) -> list[list[str]]:
     return rows
 
 
-def _slide(mass: Realisations, j: int, excited: Excitation) -> WholeRun:
-    site = BlockOnPlanes(
+def _slide(mass: Realisations, j: int, excited: Excitation) -> Simulation:
+    site = SupportedBlock(
         block=Block.from_fractures(
             float(mass.s1_m[j]), float(mass.s2_m[j]), float(mass.gamma_deg[j])
         ),
@@ -160,7 +160,7 @@ def _slide(mass: Realisations, j: int, excited: Excitation) -> WholeRun:
         yield_g=None,
         settings={},
     )
-    return whole_run(sliding.mechanism(site), site, excited)
+    return simulate_block(sliding.mechanism(site), site, excited)
 
 
 HEADERS = [

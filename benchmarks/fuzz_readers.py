@@ -37,7 +37,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.processing import processed
 from rbfrag.motions.quality import quality_flags
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
 from tests.motions.written_by_networks import AFAD_PREAMBLE, csmip_v1, knet, scec_bbp

@@ -20,7 +20,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
 from rbfrag.solver.integrator.one_freedom.follow import follow
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.models import confined_toppling, rocking, sliding, slumping
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.rocking_run import simulate
@@ -94,9 +94,9 @@ def models(excited: Excitation) -> dict[str, Run]:
     }
 
 
-def planes(block: Block | None, beta_deg: float, phi_deg: float) -> BlockOnPlanes:
+def planes(block: Block | None, beta_deg: float, phi_deg: float) -> SupportedBlock:
     phi = math.radians(phi_deg)
-    return BlockOnPlanes(
+    return SupportedBlock(
         block=block,
         beta_rad=math.radians(beta_deg),
         phi_rad=phi,
@@ -108,7 +108,7 @@ def planes(block: Block | None, beta_deg: float, phi_deg: float) -> BlockOnPlane
     )
 
 
-def at_strength(block: Block, k: float, model: object) -> BlockOnPlanes:
+def at_strength(block: Block, k: float, model: object) -> SupportedBlock:
     """Return the planes, with friction of 35 degrees, on which a block yields at k."""
     low, high = -30.0, 60.0
     for _ in range(40):

@@ -40,9 +40,9 @@ class Mutation(NamedTuple):
     tests: str
 
 
-STEP, RUN = "integrator/step.py", "integrator/single_run.py"
+STEP, RUN = "integrator/step.py", "integrator/toppling_kernel.py"
 ERRORS = "solver/integrator/test_step_errors.py"
-TOPPLING = "solver/integrator/test_toppling.py"
+TOPPLING = "solver/integrator/test_toppling_kernel.py"
 MUTATIONS = (
     Mutation("truncation / 32", STEP, "return growth, truncation, rounding",
              "return growth, truncation / 32.0, rounding", ERRORS),

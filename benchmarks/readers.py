@@ -45,7 +45,7 @@ from rbfrag.hazards.disaggregation import Disaggregation
 from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.question.gmm_table import read_gmm_table
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.orientations import read_planes

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.damage import NUMBER
 from rbfrag.errors import RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from tests.motions.test_header_check import MAKE, MISTAKES, made
 
 HEADER_BYTES = 6000

@@ -16,7 +16,7 @@ from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.results import DEFAULT_P2
 from rbfrag.solver.toppling_run import runner
 from tests.physics import linear_block

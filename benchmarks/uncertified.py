@@ -25,7 +25,7 @@ from rbfrag.motions.polarity import POLARITIES
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.results import DEFAULT_P2
 from rbfrag.solver.search.critical import critical
 

@@ -23,7 +23,7 @@ from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.report import toppling_blocks
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 
 HERE = Path(__file__).parent
 FILES = {

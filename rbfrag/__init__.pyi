@@ -30,7 +30,7 @@ from rbfrag.hazards.survival import BranchSurvival as BranchSurvival
 from rbfrag.hazards.survival import SurvivalAnswer as SurvivalAnswer
 from rbfrag.hazards.survival import survival as survival
 from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
-from rbfrag.motions.recognise import read_motions as read_motions
+from rbfrag.motions.readers import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
 from rbfrag.plots import plot as plot
 from rbfrag.plots.report.write import report as report

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 
 
 def on_planes(
     block: Block, beta_deg: float, phi_deg: float, back_deg: float, **settings: object
-) -> BlockOnPlanes:
-    return BlockOnPlanes(
+) -> SupportedBlock:
+    return SupportedBlock(
         block=block,
         beta_rad=math.radians(beta_deg),
         phi_rad=math.radians(phi_deg),

@@ -28,7 +28,7 @@ FIELD = (
     '        Quantity("pad_m", "Thickness of the pads", "m", "", POSITIVE, '
     'Input(aliases=("pads",))),\n'
 )
-FACTS = '        KindFacts("padded", None, "fails", ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
+FACTS = '        KindSpec("padded", None, "fails", ("p2", "kr", "pad_m"), False, ("pad_m",)),\n'
 
 MODEL = '''
 """A block on pads."""
@@ -38,8 +38,9 @@ from rbfrag.solver.results import Outcome, Response
 
 
 class Padded(Kind):
-    def respond(self, site, shaking):
-        fails = shaking.motion.pga_g > site.yield_g * (1.0 + site.settings["pad_m"] / 0.01)
+    def respond(self, supported_block, shaking):
+        strengthened = 1.0 + supported_block.settings["pad_m"] / 0.01
+        fails = shaking.motion.pga_g > supported_block.yield_g * strengthened
         return Response(
             kind=self.kind,
             outcome=Outcome.TOPPLED if fails else Outcome.STABLE,
@@ -174,7 +175,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / "rbfrag" / name).write_text(text)
     for name, mark, line in (
         ("vocabulary/quantities.py", '    "failure": (\n', FIELD),
-        ("solver/kinds.py", '        KindFacts(\n            "rocking"', FACTS),
+        ("solver/kinds.py", '        KindSpec(\n            "rocking"', FACTS),
     ):
         text = (PACKAGE / name).read_text(encoding="utf-8")
         head, found, rest = text.partition(mark)

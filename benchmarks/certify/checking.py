@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.block_excitation import BlockExcitation, block_excitation
 from rbfrag.solver.integrator.compiled import bare_kernel
-from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import STABLE, TOPPLED
 from rbfrag.solver.search.certified import MARGIN, keeps_order
 from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, decide
 from rbfrag.solver.search.renewal import ExcursionTable, begin, excursion_table, no_work

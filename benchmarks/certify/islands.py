@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from rbfrag.solver.critical_result import CriticalResult
-from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import STABLE, TOPPLED
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import runner
 

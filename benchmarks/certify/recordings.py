@@ -12,7 +12,7 @@ from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES, Polarity
 

@@ -11,7 +11,7 @@ import numpy as np
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.pulses import reversal_pulse
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.sample_motions import sample_folder
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES, Polarity

@@ -14,7 +14,7 @@ from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
-from rbfrag.solver.integrator.two_corners import PAST_BALANCE
+from rbfrag.solver.integrator.rocking_kernel import PAST_BALANCE
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.rocking_run import REST_SPEED
 

@@ -16,7 +16,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.critical_result import CriticalResult
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import Shaking, SupportedBlock
 from rbfrag.solver.results import (
     MAP_DEPTH,
     POLARITIES,
@@ -174,7 +174,7 @@ class Sequences(CampaignKind):
         """
 
     @abstractmethod
-    def site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
         """Return a block of :meth:`blocks` on its planes."""
 
 

@@ -17,7 +17,7 @@ from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.measures import spectral
 from rbfrag.fragility.model import Model
 from rbfrag.motions.polarity import Polarity
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.question.fields import MeasureFields
 from rbfrag.results.numbers import interval, percent, rounded, with_interval
 from rbfrag.results.result import Result, TextLine, TextTable

@@ -17,12 +17,17 @@ import numpy as np
 from rbfrag.campaign.kind import Case, CaseRequest, CaseResult, Measures, Sequences, each_once
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import Shaking, SupportedBlock
 from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.search.scale import critical_rad, grid_points, rotation_rad, scaled_run
+from rbfrag.solver.search.incremental_scaling import (
+    critical_rad,
+    grid_points,
+    rotation_rad,
+    scaled_run,
+)
 
 
 @dataclass(frozen=True)
@@ -136,9 +141,9 @@ class ScaledRecords(Sequences):
             for rotation in dict.fromkeys(stated)
         )
 
-    def site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
         """Return the block on its planes."""
-        return self._shaken(BlockClass(**block)).site
+        return self._shaken(BlockClass(**block)).supported_block
 
     def _shaken(self, each: BlockClass) -> ShakenMechanism:
         return shaken_mechanism(

@@ -33,7 +33,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import Shaking, SupportedBlock
 from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.results import NUMERICS_VERSION, BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW
@@ -199,7 +199,7 @@ def run_pair(work: PairWork) -> PairResults:
         def under(
             motion: GroundMotion,
             start: BlockState | None = None,
-            site: BlockOnPlanes = site,
+            site: SupportedBlock = site,
             polarity: Polarity = task.polarity,
         ) -> Response:
             """Return what the block does under a motion that finds it in a state."""

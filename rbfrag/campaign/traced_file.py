@@ -12,7 +12,7 @@ from rbfrag.motions.archive import is_there
 from rbfrag.motions.direction import is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.units import acceleration_unit, stated_in_g, unit_in_g
 
 NOTHING_STATED = TraceMetadata(file="", line=0)
@@ -70,7 +70,7 @@ def read_traces(
             by the table, or whose samples contradict it; :attr:`Trace.other_unit` names one that
             does state another.
         dt_s: sampling interval that the caller states [s]; likewise.
-        allow_partial: as for :func:`rbfrag.motions.recognise.read_motions`.
+        allow_partial: as for :func:`rbfrag.motions.readers.read_motions`.
         gain: counts/(m/s²) of files in counts of which the table states none.
 
     Raises:

@@ -28,7 +28,7 @@ from rbfrag.question.keywords import parts_of
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import count_of, percent
 from rbfrag.results.result import Result, TextLine
-from rbfrag.solver.kinds import KindFacts, facts_of
+from rbfrag.solver.kinds import KindSpec, facts_of
 from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 EACH_NEEDED = "an exposure model needs a function of each"
@@ -205,7 +205,7 @@ class _Request(NamedTuple):
         remarks: what is to be said of the blocks.
     """
 
-    facts: KindFacts
+    facts: KindSpec
     numbers: dict[str, NDArray[np.float64]]
     names: list[str]
     measure: str

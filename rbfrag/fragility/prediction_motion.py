@@ -22,7 +22,7 @@ from rbfrag.fragility.prediction import (
     with_remarks,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.results.diagnostic import diagnostics
 from rbfrag.vocabulary.quantities import INTENSITY, SPECTRAL

@@ -25,7 +25,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import FloatArray, Polarity, driving_acceleration_g
 from rbfrag.motions.quality import motion_warnings
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import rounded
 from rbfrag.results.result import Result, TextLine, TextTable

@@ -16,7 +16,7 @@ from rbfrag.fragility.lookup import find_model, stored_row
 from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.polarity import Polarity
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.plots.canvas import Out, Picture, plot_path
 from rbfrag.question.fields import BlockKeywords, MeasureFields, RangeFields
 from rbfrag.question.keywords import LEVEL, model_for, parts_of

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.polarity import POLARITIES, Polarity
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots import canvas

@@ -37,7 +37,7 @@ from rbfrag.question.shapes import (
 )
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.kinds import KINDS, KindSpec, facts_of, kind_of_mode
 from rbfrag.solver.quantity import number
 from rbfrag.solver.stability.joint import ROCK_KG_M3, is_drained
 from rbfrag.vocabulary.quantities import (
@@ -133,7 +133,7 @@ def has_shape(given: Collection[str]) -> bool:
     return any(name in given for name in OF_A_SHAPE)
 
 
-def kinds_by_numbers(given: Collection[str]) -> list[KindFacts]:
+def kinds_by_numbers(given: Collection[str]) -> list[KindSpec]:
     """Return the kinds of which names of fields have all numbers."""
     return [
         facts
@@ -372,7 +372,7 @@ def one_block(
         if kind in (None, block.kind):  # what another kind reads the choice of its model says
             check_numbers(block.kind, block, given)
         return Blocks((Group(kind, given),), (*unread, *size_questions(given.get("p2"))))
-    from rbfrag.solver.stability.first_slip import after_first_slip
+    from rbfrag.solver.stability.residual_strength import after_first_slip
     from rbfrag.solver.stability.single import judged, push_of
 
     if numbers := [name for name in NUMBERS if name in given]:
@@ -424,7 +424,7 @@ def one_block(
     return Blocks((Group(facts.kind, numbers_read),), remarks, at_rest=at_rest_reason)
 
 
-def requested_kind(kind: str | None, given: Collection[str]) -> KindFacts | None:
+def requested_kind(kind: str | None, given: Collection[str]) -> KindSpec | None:
     """Return the kind that a question about a shape asks for; None where its mode tells."""
     if kind is None and "restitution" in given:
         return next(facts for facts in KINDS.values() if facts.free_standing)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.fragility.prediction_motion import Polarity
-    from rbfrag.motions.recognise import MotionLike
+    from rbfrag.motions.readers import MotionLike
 
 
 BESIDE_A_MOTION = (

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from rbfrag.fragility.model import Model
     from rbfrag.fragility.prediction_motion import Polarity
-    from rbfrag.motions.recognise import MotionLike
+    from rbfrag.motions.readers import MotionLike
     from rbfrag.solver.block.geometry import Block
 
 V = TypeVar("V")

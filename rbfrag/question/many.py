@@ -46,9 +46,8 @@ from rbfrag.question.shapes import (
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.arrays import REASONS, BlockArray
 from rbfrag.solver.block.formulas import array_elementwise, cot_gamma, tan_deg
-from rbfrag.solver.kinds import KINDS, KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.kinds import KINDS, KindSpec, facts_of, kind_of_mode
 from rbfrag.solver.stability.arrays import stability_arrays
-from rbfrag.solver.stability.first_slip import AFTER_SLIP, ENDED, SLIPS_ON
 from rbfrag.solver.stability.joint import (
     DRAINAGES,
     DRAINED,
@@ -59,6 +58,7 @@ from rbfrag.solver.stability.joint import (
     water_at,
 )
 from rbfrag.solver.stability.modes import MODES, words_of_mode
+from rbfrag.solver.stability.residual_strength import AFTER_SLIP, ENDED, SLIPS_ON
 from rbfrag.vocabulary.quantities import JOINT, NUMBERS, PLANES, SPACE
 
 _IF_EMPTY = {"beta_deg": 0.0}
@@ -484,7 +484,7 @@ class _Sorted:
                 )
             self.group(facts, of_these, numbers)
 
-    def group(self, facts: KindFacts, places: Places, numbers: Mapping[str, Any]) -> None:
+    def group(self, facts: KindSpec, places: Places, numbers: Mapping[str, Any]) -> None:
         """Keep blocks of one kind, of those that no reason is known against."""
         usable = np.flatnonzero(self.free[places])
         if usable.size:
@@ -528,7 +528,7 @@ def _codes() -> dict[str, int]:
 
 
 @cache
-def _numbers_of(facts: KindFacts) -> tuple[str, ...]:
+def _numbers_of(facts: KindSpec) -> tuple[str, ...]:
     """Return what a model of a kind reads of a block."""
     block = block_of(facts.parameters, facts.kind)
     return (*block.names, *block.options, *block.sigmas)

@@ -15,9 +15,8 @@ from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kinds import NOT_BACKED, KindFacts, stands_free_of
+from rbfrag.solver.kinds import NOT_BACKED, KindSpec, stands_free_of
 from rbfrag.solver.stability.at_rest import rocking_at_rest, two_contacts_at_rest
-from rbfrag.solver.stability.first_slip import ROUGH, STATE_RESIDUAL, slips_on_base
 from rbfrag.solver.stability.joint import (
     ASSUMED_DENSITY,
     IS_DRAINED,
@@ -26,7 +25,8 @@ from rbfrag.solver.stability.joint import (
 )
 from rbfrag.solver.stability.margins import idealisations
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
-from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
+from rbfrag.solver.stability.residual_strength import ROUGH, STATE_RESIDUAL, slips_on_base
+from rbfrag.solver.stability.toe_stability import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 from rbfrag.vocabulary.quantities import JOINT, PLANES, QUANTITIES, SPACE, column_of, word_of
 
 if TYPE_CHECKING:
@@ -338,7 +338,7 @@ SMALL_BLOCK = Diagnostic("Check the unit: the block measures {value:.2g} m", "ch
 
 
 def numbers_of_shape(
-    facts: KindFacts,
+    facts: KindSpec,
     judged: ModeShapes,
     displacement_m: Any,
     stated: Mapping[str, Any],

@@ -17,7 +17,6 @@ from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.arrays import FLOATS, OF_JOINT, StabilityArray, stability_arrays
 from rbfrag.solver.stability.arrays import water_held_m as held_m
-from rbfrag.solver.stability.first_slip import ENDED
 from rbfrag.solver.stability.joint import (
     ASSUMED_DENSITY,
     DRAINED,
@@ -28,6 +27,7 @@ from rbfrag.solver.stability.joint import (
     refuse_half,
 )
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
+from rbfrag.solver.stability.residual_strength import ENDED
 
 REALISATIONS = 20_000
 """Blocks that are drawn when nothing else is asked for."""

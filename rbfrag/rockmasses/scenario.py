@@ -29,7 +29,7 @@ from rbfrag.solver.kinds import BY_MECHANICS, kind_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import MODES, STABLE, UNSTABLE, ModeName
-from rbfrag.solver.stability.toe import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
+from rbfrag.solver.stability.toe_stability import HEEL_TIPS, TOE_SLIPS, heel_tips_g, toe_slips_g
 
 MODELLED: tuple[ModeName, ...] = ("topple",)
 """Modes that a fragility model answers for."""

@@ -17,7 +17,7 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner
+from rbfrag.solver.kind import RunEnd, Runner, SupportedBlock
 from rbfrag.solver.models import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome
@@ -209,7 +209,7 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
     one: dict[str, Any] = {name: float(values[j]) for name, values in work.numbers.items()}
     block = Block.from_fractures(one.pop("s1_m"), one.pop("s2_m"), one.pop("gamma_deg"))
     finding, planes, _ = judged(block, back_fracture=work.back_fracture, **one)
-    site = BlockOnPlanes(
+    site = SupportedBlock(
         block=block,
         beta_rad=math.radians(finding.beta_deg),
         phi_rad=math.radians(finding.phi_deg),

@@ -158,7 +158,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:
-    from rbfrag.motions.recognise import motions_in
+    from rbfrag.motions.readers import motions_in
 
     trace = query.trace
     try:

@@ -10,7 +10,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.integrator.free_body import HEEL, ON_BACK, ON_BASE, TOE
 from rbfrag.solver.integrator.impulses import Corners
 from rbfrag.solver.integrator.one_freedom.equation import Pose
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.results import FloatArray
 
 TOUCHES = 1e-6
@@ -26,17 +26,17 @@ def corner_at(
     return centroid[0] + arm[0] * c - arm[1] * s, centroid[1] + arm[0] * s + arm[1] * c
 
 
-def corners_of(site: BlockOnPlanes, block: Block) -> Corners:
+def corners_of(supported_block: SupportedBlock, block: Block) -> Corners:
     """Return the pairs of corner and plane: those with the base first."""
     arms = np.array(block.outline)
     gamma = math.radians(block.gamma_deg)
     # of base and back plane, into the block; each plane touches its nearest corner at rest
     normals = [(0.0, 1.0), (math.sin(gamma), math.cos(gamma))]
     from_heel = arms - np.array(block.heel)
-    planes = 2 if site.back_fracture else 1
+    planes = 2 if supported_block.back_fracture else 1
     offs = [float((from_heel @ np.array(normal)).min()) for normal in normals]
     n = len(arms)
-    friction = (math.tan(site.phi_rad), math.tan(site.phi_back_rad))
+    friction = (math.tan(supported_block.phi_rad), math.tan(supported_block.phi_back_rad))
     named = {block.heel: HEEL, block.toe: TOE}
     bits = [named.get(arm, ON_BASE) for arm in block.outline] + [ON_BACK] * (planes - 1) * n
 
@@ -66,11 +66,11 @@ def gap_m(block: Block, pose: Pose) -> float:
     return gap if gap > 1e-12 * block.r3_m else 0.0
 
 
-def touching(site: BlockOnPlanes, pose: Pose) -> tuple[str, ...]:
+def touching(supported_block: SupportedBlock, pose: Pose) -> tuple[str, ...]:
     """Return which corners of a block touch which plane."""
-    block = site.block
+    block = supported_block.block
     assert block is not None
-    corners = corners_of(site, block)
+    corners = corners_of(supported_block, block)
     n = len(block.outline)
     names = {block.heel: "heel", block.toe: "toe", block.back: "upper back corner"}
     contacts = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.kind import Kind

@@ -37,7 +37,7 @@ from rbfrag.solver.integrator.free_body import (
 )
 from rbfrag.solver.integrator.impulses import work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 from rbfrag.solver.stability.modes import ModeName
@@ -225,7 +225,7 @@ class _Path(NamedTuple):
 
 
 def free_motion(
-    site: BlockOnPlanes,
+    supported_block: SupportedBlock,
     excited: Excitation,
     release: Release,
     *,
@@ -240,12 +240,12 @@ def free_motion(
         by_law: where the coarse run and those by other laws begin, at rest; () for all where the
             block is released.
     """
-    block = site.block
+    block = supported_block.block
     assert block is not None
     contact = block.toe if at_toe else block.heel
 
     def path(step_s: float, law: tuple[float, float], start: Release) -> _Path:
-        run, rows = _run(site, excited, start, step_s, law)
+        run, rows = _run(supported_block, excited, start, step_s, law)
         begin, end = start.pose, _pose(block, run.motion, contact)
         return _Path(
             run,
@@ -293,23 +293,23 @@ def free_motion(
 
 
 def _run(
-    site: BlockOnPlanes,
+    supported_block: SupportedBlock,
     excited: Excitation,
     release: Release,
     step_s: float,
     law: tuple[float, float],
 ) -> tuple[FreeRun, FloatArray]:
-    block = site.block
+    block = supported_block.block
     assert block is not None
-    corners = corners_of(site, block)
+    corners = corners_of(supported_block, block)
     frame = Frame(
         block.inertia_m2,
-        math.sin(site.beta_rad),
-        math.cos(site.beta_rad),
+        math.sin(supported_block.beta_rad),
+        math.cos(supported_block.beta_rad),
         block.on_back_edge_rad,
         block.on_front_face_rad,
         *law,
-        *site.push,
+        *supported_block.push,
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)

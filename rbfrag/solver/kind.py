@@ -17,7 +17,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.kinds import KindFacts, facts_of
+from rbfrag.solver.kinds import KindSpec, facts_of
 from rbfrag.solver.results import BlockState, Outcome, Polarity, Response
 from rbfrag.solver.stability.modes import DRY, ModeName, Push
 from rbfrag.solver.stability.single import Stability
@@ -27,7 +27,7 @@ SHAKING = ("vertical", "polarity", "search_limit")
 
 
 @dataclass(frozen=True)
-class BlockOnPlanes:
+class SupportedBlock:
     """A block, its planes and the settings of its motion, as a model sees them.
 
     Args:
@@ -60,7 +60,7 @@ class BlockOnPlanes:
     @classmethod
     def of(
         cls, block: Block, judged: Stability, mode: ModeName | None, settings: Mapping[str, Any]
-    ) -> BlockOnPlanes:
+    ) -> SupportedBlock:
         """Return a block whose stability is known, as a model of a mode sees it."""
         return cls(
             block,
@@ -142,7 +142,7 @@ Runner = Callable[[Excitation], RunEnd]
 """One block, made ready: says how it ends under an excitation."""
 
 
-class Kind(KindFacts):
+class Kind(KindSpec):
     """Base of the kinds: the facts of one, and what it answers without a search.
 
     Attributes:
@@ -156,11 +156,11 @@ class Kind(KindFacts):
         """Return the model of a kind with the facts of it."""
         return cls(**vars(facts_of(kind)))
 
-    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+    def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
         """Return what the block does."""
         raise NotImplementedError
 
-    def runner(self, site: BlockOnPlanes) -> Runner:
+    def runner(self, supported_block: SupportedBlock) -> Runner:
         """Return a function that says how the block ends under an excitation."""
         raise NotImplementedError
 

@@ -19,7 +19,7 @@ PLANES = ("beta_deg", "phi_deg", "phi_back_deg", "water_m", "drainage", "density
 
 
 @dataclass(frozen=True)
-class KindFacts:
+class KindSpec:
     """What is known of a kind of failure before anything is computed.
 
     Args:
@@ -56,22 +56,22 @@ _SCALED = ("block", *PLANES, "rotation_deg", "scan_ratio", "bracket")
 KINDS = {
     facts.kind: facts
     for facts in (
-        KindFacts(
+        KindSpec(
             "confined_toppling", "confined_topple", "topples", ("kct", "pct2"), False, (), "block",
             _SCALED,
         ),
-        KindFacts(
+        KindSpec(
             "rocking", "topple", "overturns", ("p2", "kr"), True, ("restitution",),
             no_search="the k_r that overturn under one record form up to 122 islands, so that no "
             "value is certified as the last: compute the response of one block",
         ),
-        KindFacts(
+        KindSpec(
             "sliding", "slide", "slides too far", ("ky", "displacement_m"), False,
             ("two_way", "horizontal"), "displacement_m",
             ("displacement_m", "tolerance", "block", *PLANES),
         ),
-        KindFacts("slumping", "slump", "slumps", ("ks", "ps2"), False, (), "block", _SCALED),
-        KindFacts(
+        KindSpec("slumping", "slump", "slumps", ("ks", "ps2"), False, (), "block", _SCALED),
+        KindSpec(
             "toppling", "topple", "topples", ("p2", "kr"), False, (),
             "p2", ("p2", "full_map", "map_depth", "block", *PLANES),
         ),
@@ -84,7 +84,7 @@ FREE_STANDING = next(facts.kind for facts in KINDS.values() if facts.free_standi
 """The kind of blocks without a rock face behind them."""
 
 
-def facts_of(kind: str) -> KindFacts:
+def facts_of(kind: str) -> KindSpec:
     """Return the facts of the kind of that name."""
     if kind not in KINDS:
         raise InputError(
@@ -100,7 +100,7 @@ def mode_of_kind(kind: str) -> str:
     return "" if facts is None else facts.mode or ""
 
 
-def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
+def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindSpec:
     """Return the kind of blocks that fail in this mode.
 
     Args:
@@ -113,7 +113,7 @@ def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
     return min(of_mode, key=lambda facts: facts.free_standing == back_fracture)
 
 
-def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
+def stands_free_of(facts: KindSpec, back_fracture: bool) -> bool:
     """Return whether a block is asked of a kind of backed blocks though nothing backs it.
 
     Args:

@@ -11,21 +11,25 @@ from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
-from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
+from rbfrag.solver.kind import Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.results import Response
+from rbfrag.solver.simulation import Simulation, end_of, response_of, simulate_block
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.single import refuse_undecided, stability
-from rbfrag.solver.whole_run import WholeRun, end_of, response_of, whole_run
 
 
-def driven_up_below(site: BlockOnPlanes) -> float:
+def driven_up_below(supported_block: SupportedBlock) -> float:
     """Return the k_h/(1 + k_v) below which the whole block slides up its back plane.
 
     -tan(γ + β + φ_back); minus infinity for a block that no pulse drives up it.
     """
-    if site.block is None or not site.back_fracture:
+    if supported_block.block is None or not supported_block.back_fracture:
         return -math.inf
-    steepness = math.radians(site.block.gamma_deg) + site.beta_rad + site.phi_back_rad
+    steepness = (
+        math.radians(supported_block.block.gamma_deg)
+        + supported_block.beta_rad
+        + supported_block.phi_back_rad
+    )
     return -math.tan(steepness) if steepness < 0.5 * math.pi else -math.inf
 
 
@@ -39,41 +43,43 @@ class MechanismKind(Kind):
     yield_name = "k"
     carries_state = True
 
-    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+    def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
         """Return the mechanism of a block."""
         raise NotImplementedError
 
-    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+    def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
         """Return what the block does.
 
         Raises:
             InputError: the base has cohesion.
         """
-        mechanism = self._without_cohesion(site)
+        mechanism = self._without_cohesion(supported_block)
         excited = shaking.excitation
-        whole = whole_run(
-            mechanism, site, excited, history=shaking.history, start=shaking.start,
+        whole = simulate_block(
+            mechanism, supported_block, excited, history=shaking.history, start=shaking.start,
             stepwise=shaking.stepwise,
         )  # fmt: skip
         return response_of(self.kind, whole, shaking)
 
-    def runner(self, site: BlockOnPlanes) -> Runner:
+    def runner(self, supported_block: SupportedBlock) -> Runner:
         """Return a function that says how the block ends under an excitation."""
-        mechanism = self._without_cohesion(site)
+        mechanism = self._without_cohesion(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
-            return end_of(whole_run(mechanism, site, excited), self.mode, mechanism.warnings)
+            return end_of(
+                simulate_block(mechanism, supported_block, excited), self.mode, mechanism.warnings
+            )
 
         return run
 
-    def _without_cohesion(self, site: BlockOnPlanes) -> Mechanism:
-        if site.cohesive:
+    def _without_cohesion(self, supported_block: SupportedBlock) -> Mechanism:
+        if supported_block.cohesive:
             raise InputError(
                 f"cohesion_pa cannot be combined with {self.kind} in time: cohesion is lost at "
                 "the first slip, which the model does not describe; see rbfrag block for its "
                 "effect on the yield"
             )
-        return self.mechanism(site)
+        return self.mechanism(supported_block)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +100,11 @@ class ShakenMechanism:
     yield_g: float
     p2: float
     remarks: tuple[str, ...]
-    site: BlockOnPlanes
+    supported_block: SupportedBlock
 
-    def run(self, excited: Excitation, *, stepwise: bool = True) -> WholeRun:
-        """Follow the block under an excitation; `stepwise` as of :func:`whole_run`."""
-        return whole_run(self.mechanism, self.site, excited, stepwise=stepwise)
+    def run(self, excited: Excitation, *, stepwise: bool = True) -> Simulation:
+        """Follow the block under an excitation; `stepwise` as of :func:`simulate_block`."""
+        return simulate_block(self.mechanism, self.supported_block, excited, stepwise=stepwise)
 
 
 def shaken_mechanism(
@@ -134,8 +140,8 @@ def shaken_mechanism(
             f"the block is not of kind {model.kind}: its mode is {words_of_mode(judged.mode)} "
             f"(yield {judged.yield_acceleration:.4g} g, {judged.state})"
         )
-    site = BlockOnPlanes.of(block, judged, judged.mode, {})
-    mechanism = model.mechanism(site)
+    supported_block = SupportedBlock.of(block, judged, judged.mode, {})
+    mechanism = model.mechanism(supported_block)
     equation = mechanism.first.forward
     return ShakenMechanism(
         kind=model.kind,
@@ -144,5 +150,5 @@ def shaken_mechanism(
         yield_g=equation.threshold(0.0),
         p2=equation.driving(0.0) / equation.inertia(0.0),
         remarks=judged.warnings,
-        site=site,
+        supported_block=supported_block,
     )

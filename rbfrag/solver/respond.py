@@ -9,18 +9,18 @@ from typing import Any, cast
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
+from rbfrag.solver.kind import Kind, Shaking, SupportedBlock
 from rbfrag.solver.kinds import KINDS, NOT_BACKED, stands_free_of
 from rbfrag.solver.models import model_of_kind, model_of_mode
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
-from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
 from rbfrag.solver.stability.joint import IS_DRAINED, STAYS_UNDRAINED
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
+from rbfrag.solver.stability.residual_strength import JOINT, after_first_slip, refuse_before_slip
 from rbfrag.solver.stability.single import Stability, refuse_undecided, stability
 
 
@@ -145,21 +145,21 @@ def respond(
             model = model_of_mode(judged.mode, back_fracture=back_fracture)
         else:
             model = model_of_kind(kind)
-        site = _site(block, judged, model, _known(model, settings))
+        supported_block = _site(block, judged, model, _known(model, settings))
         if phi_deg is None:
-            site = replace(site, phi_rad=0.5 * math.pi)
+            supported_block = replace(supported_block, phi_rad=0.5 * math.pi)
         remarks = (*after, *_remarks(judged, model))
         if judged.drained is not None:
             remarks = (*remarks, IS_DRAINED if judged.push is None else STAYS_UNDRAINED)
-        return replace(answer(model, site, remarks, judged.mode), drained=judged.drained)
+        return replace(answer(model, supported_block, remarks, judged.mode), drained=judged.drained)
     numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
-    model, site = known_by_numbers(kind, numbers, settings)
-    return answer(model, site)
+    model, supported_block = known_by_numbers(kind, numbers, settings)
+    return answer(model, supported_block)
 
 
 def known_by_numbers(
     kind: str | None, numbers: Mapping[str, float | None], settings: Mapping[str, Any]
-) -> tuple[Kind, BlockOnPlanes]:
+) -> tuple[Kind, SupportedBlock]:
     """Return a block that is given by numbers, and the model that answers for it.
 
     Args:
@@ -213,7 +213,7 @@ class _Shaken:
     start: BlockState | None
 
     def answer(
-        self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = (),
+        self, model: Kind, supported_block: SupportedBlock, remarks: tuple[str, ...] = (),
         mode: ModeName | None = None,
     ) -> Response:  # fmt: skip
         """Return what a model answers about a block of a failure mode; None for the model's."""
@@ -224,7 +224,7 @@ class _Shaken:
             motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
         ) -> Response:
             shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
-            answer = replace(model.respond(site, shaking), mode=mode or model.mode)
+            answer = replace(model.respond(supported_block, shaking), mode=mode or model.mode)
             if answer.started_s is None or answer.final_mode is not None:
                 return answer
             return replace(answer, final_mode=model.mode)
@@ -253,19 +253,19 @@ def _vertical(given: Any) -> GroundMotion | None:
     return None if given is None else as_motion(given, "vertical")
 
 
-def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:
+def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> SupportedBlock:
     """Return a block of which frequency parameter [1/s²] and yield acceleration [g] are known."""
     rough_rad = 0.5 * math.pi
-    return BlockOnPlanes(None, 0.0, rough_rad, rough_rad, kr, settings=settings, p2=p2)
+    return SupportedBlock(None, 0.0, rough_rad, rough_rad, kr, settings=settings, p2=p2)
 
 
 def _site(
     block: Block, judged: Stability, model: Kind, settings: Mapping[str, Any]
-) -> BlockOnPlanes:
+) -> SupportedBlock:
     """Return the block on its planes as the model that its mode calls for, or another, sees it."""
     if not model.free_standing:
         refuse_undecided(judged)
-    return BlockOnPlanes.of(block, judged, model.mode, settings)
+    return SupportedBlock.of(block, judged, model.mode, settings)
 
 
 def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
@@ -284,7 +284,7 @@ def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
     )
 
 
-def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> BlockOnPlanes:
+def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> SupportedBlock:
     """Return a plane of which only the yield acceleration is known."""
     ky = positive(ky, "ky", "the yield acceleration coefficient of sliding, in g")
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
@@ -295,7 +295,7 @@ def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> Block
             f"{math.degrees(phi_rad):.4g} degrees: it must be from 0 to below 90"
         )
     beta_rad = math.radians(beta_deg)
-    return BlockOnPlanes(
+    return SupportedBlock(
         None, beta_rad, phi_rad, phi_rad, ky, back_fracture=False, settings=settings
     )
 

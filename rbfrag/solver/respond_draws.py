@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.motions.polarity import POLARITIES
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.results.numbers import confidence, interval, percent
 from rbfrag.results.result import Result, TextLine, TextTable
@@ -174,7 +174,7 @@ def respond_draws(
         numbers: dict[str, Any] = {name: float(values[i]) for name, values in drawn.items()}
         own = {**settings, "restitution": numbers.pop("restitution", None)}
         try:
-            model, site = known_by_numbers(kind, numbers, own)
+            model, supported_block = known_by_numbers(kind, numbers, own)
             if (_FAILS_BY in model.parameters) is not (limit_m is not None):
                 raise InputError(
                     f"{_FAILS_BY} is missing: a block of kind {model.kind} requires a "
@@ -182,7 +182,7 @@ def respond_draws(
                     if limit_m is None
                     else f"{_FAILS_BY} cannot be combined with kind {model.kind}"
                 )
-            end = model.runner(site)(excited[i % len(excited)])
+            end = model.runner(supported_block)(excited[i % len(excited)])
         except InputError as error:
             raise InputError(f"draw {i + 1}: {error}" if _varies(drawn) else str(error)) from None
         outcomes[end.outcome.value] += 1

@@ -10,9 +10,9 @@ import numpy as np
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.free_rocking import TOPPLED
+from rbfrag.solver.integrator.rocking_kernel import IMPACT, RockingRules, RockingRun, run_rocking
 from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.two_corners import IMPACT, RockingRules, RockingRun, run_rocking
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.results import FloatArray, ResponseHistory
 

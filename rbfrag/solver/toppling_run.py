@@ -11,8 +11,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED, Run, run_toppling
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.quantity import finite_or_none, positive
 from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory

@@ -15,7 +15,7 @@ from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.spectra import spectrum_values
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking, write_at2
 

@@ -21,7 +21,7 @@ from rbfrag.fragility.fit.data import read_source
 from rbfrag.motions.ground_motion import LOCATION, GroundMotion
 from rbfrag.motions.processing import HighPass, processed
 from rbfrag.motions.quality import is_on_structure, quality_flags
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking, write_at2
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical import critical
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements

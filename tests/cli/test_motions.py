@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.motions.recognise import read_motion
+from rbfrag.motions.readers import read_motion
 from tests.cli.conftest import Refuses, Shell
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking, write_at2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.motions.recognise import read_motion
+from rbfrag.motions.readers import read_motion
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.shaking import FailureLimits, plan_shaking, run_blocks

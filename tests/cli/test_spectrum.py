@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2

@@ -19,7 +19,7 @@ from rbfrag.exchange.table_answers import TableAnswer, predict_table
 from rbfrag.exchange.tables import workbook
 from rbfrag.exchange.tables.files import write_block_table
 from rbfrag.hazards.curve_file import read_hazard_curves
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.question.components import SINGLE_ASSUMED
 from tests.block_tables import read_columns
 

@@ -12,7 +12,7 @@ import pytest
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions import archive
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from tests.motions.written_by_networks import csmip_v2, esm_asc
 
 SERIES = [f"{0.5 * (-1) ** i * i:.3f}" for i in range(60)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from tests.motions.written import AT2_SAMPLING, at2, v2a
 
 SAMPLES = [f"{0.001 * i:.5E}" for i in range(1, 13)]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.formats.delimited_text import FORMAT
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motion
+from rbfrag.motions.readers import read_motion
 from rbfrag.motions.text.times import sampling_interval
 from tests.motions.written import two_columns
 

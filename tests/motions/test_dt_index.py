@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.recognise import read_motion
+from rbfrag.motions.readers import read_motion
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from rbfrag.motions.direction import upward
 from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from tests.synthetic import shaking
 
 LABELS = (

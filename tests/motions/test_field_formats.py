@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import MotionFileError, UnitNotStatedError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.text.header_check import doubts
 from rbfrag.motions.units import unit_in_g
 from tests.motions import written_by_networks as written

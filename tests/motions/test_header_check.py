@@ -15,7 +15,7 @@ from rbfrag.campaign.add_motions import add_motions
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import FloatArray
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.text.header_check import doubts
 from tests.motions import written_by_networks as written
 from tests.motions.written import v2a

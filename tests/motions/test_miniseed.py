@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.errors import InputError, MissingExtraError, MotionFileError, UnitNotStatedError
-from rbfrag.motions.recognise import motions_in, read_motion, read_motions
+from rbfrag.motions.readers import motions_in, read_motion, read_motions
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from tests.motions.written_miniseed import COUNTS, miniseed
 

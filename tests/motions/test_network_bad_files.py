@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from tests.motions import written_by_networks as written
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 

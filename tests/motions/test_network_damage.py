@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbfrag.errors import RbfragError
 from rbfrag.motions.formats.rbfrag_csv import write
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import at2, v2a
 from tests.synthetic import shaking

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import READERS, read_motion, read_motions
+from rbfrag.motions.readers import READERS, read_motion, read_motions
 from rbfrag.motions.units import unit_in_g
 from tests.motions import written_by_networks as written
 from tests.synthetic import shaking

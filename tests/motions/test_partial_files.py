@@ -10,7 +10,7 @@ import pytest
 
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.quality import quality_flags
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from tests.motions import written_by_networks as written
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import at2, v2a

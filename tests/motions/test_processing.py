@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import HighPass, counts_as_uncorrected, processed
 from rbfrag.motions.quality import quality_flags
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from tests.motions import written_by_networks as written
 from tests.motions.test_quality import ordinary
 from tests.motions.test_real_records import STATES_NO_UNIT, manifest

@@ -10,7 +10,7 @@ import pytest
 from rbfrag.errors import MotionFileError, UnknownFormatError
 from rbfrag.motions.formats import delimited_text
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.recognise import HEAD_CHARACTERS, READERS, read_motion, read_motions
+from rbfrag.motions.readers import HEAD_CHARACTERS, READERS, read_motion, read_motions
 from rbfrag.motions.text.file import read_text
 
 COUNTS = {

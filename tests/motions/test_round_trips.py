@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.readers import read_motion, read_motions
 from rbfrag.motions.units import unit_in_g
 from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response

@@ -13,7 +13,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.free_motion import Release, free_motion
 from rbfrag.solver.integrator.one_freedom.equation import Pose
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
 from tests.on_planes import on_planes
@@ -130,7 +130,7 @@ def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
         )
 
 
-def site_of(case: Case) -> BlockOnPlanes:
+def site_of(case: Case) -> SupportedBlock:
     return on_planes(case.block, case.beta, case.phi, case.back)
 
 

@@ -16,7 +16,7 @@ import pytest
 import rbfrag
 from rbfrag import Block, GroundMotion, InputError, respond
 from rbfrag.solver.models.sliding import KY_ALONE, MAY_SLIDE_UP, MAY_TIP
-from rbfrag.solver.whole_run import FAILS_BY_SOME_LAWS
+from rbfrag.solver.simulation import FAILS_BY_SOME_LAWS
 from tests.conftest import missing
 from tests.physics.pulses import half_sines, smooth_noise
 

@@ -22,9 +22,9 @@ from rbfrag.solver.contacts import corner_at
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.free_motion import Release, free_motion
 from rbfrag.solver.integrator.one_freedom.equation import Pose
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.stability.joint import IS_DRAINED, STAYS_UNDRAINED
-from rbfrag.solver.stability.toe import moment_about_toe, toe_needs_deg
+from rbfrag.solver.stability.toe_stability import moment_about_toe, toe_needs_deg
 from rbfrag.solver.toppling_run import respond as topple
 from tests.physics.pulses import half_sines, rectangle, smooth_noise
 
@@ -186,7 +186,7 @@ def test_wet_blocks_on_two_contacts(
     answer = respond(motion, block=block, **planes)
     assert answer.peak_theta_rad == pytest.approx(peak_rad, rel=1e-6)
     # the free body with the same push, which knows nothing of mechanisms
-    site = BlockOnPlanes.of(block, judged, judged.mode, {})
+    site = SupportedBlock.of(block, judged, judged.mode, {})
     release = Release(0.0, Pose(0.0, corner_at((0.0, 0.0), 0.0, block.centroid), 0.0))
     free = free_motion(site, excitation(motion), release)
     error = free.step_error.rotation_rad
@@ -209,7 +209,7 @@ def test_the_toe_of_a_wet_block(
     step = GroundMotion.from_nodes([0.0, 0.0, 0.05], [0.0, 0.6, 0.6])
     for less_deg, slips in ((0.3, True), (-0.3, False)):
         judged = stability(block, phi_deg=needs_deg - less_deg, **on)
-        site = BlockOnPlanes.of(block, judged, judged.mode, {})
+        site = SupportedBlock.of(block, judged, judged.mode, {})
         release = Release(0.0, Pose(0.0, block.centroid, 0.0))
         free = free_motion(site, excitation(step), release, at_toe=True)
         at_once = free.history.time_s < 0.01

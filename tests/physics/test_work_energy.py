@@ -20,7 +20,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
 from rbfrag.solver.integrator.one_freedom.follow import follow
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.models import confined_toppling, sliding, slumping
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
@@ -58,7 +58,7 @@ def shaking(seed: int, amplitude_g: float, vertical_g: float) -> Excitation:
 
 def two_contacts(
     block: Block,
-    site: BlockOnPlanes,
+    site: SupportedBlock,
     *,
     clockwise: bool,
     base: tuple[float, float],
@@ -118,7 +118,7 @@ def two_contacts(
     return laws
 
 
-def slide_laws(site: BlockOnPlanes) -> Laws:
+def slide_laws(site: SupportedBlock) -> Laws:
     beta, mu = site.beta_rad, math.tan(site.phi_rad)
 
     def laws(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import Outcome, Polarity
 from rbfrag.solver.search.critical import critical

@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.certify.borders import border
 from benchmarks.extended.toppling import truth
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import POLARITIES, Polarity
 from rbfrag.solver.search.critical import critical

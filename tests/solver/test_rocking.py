@@ -15,7 +15,7 @@ from benchmarks.rocking_runs import compare, draw
 from rbfrag.bench.cases import Records
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.question.blocks import one_block
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
@@ -453,7 +453,7 @@ def test_a_toppling_answer_compiles_no_kernel_of_two_corners() -> None:
         "import numpy as np, rbfrag\n"
         "motion = rbfrag.GroundMotion(0.3 * np.sin(np.arange(200) * 0.1), 0.02)\n"
         "rbfrag.respond(motion, p2=3.0, kr=0.2)\n"
-        "from rbfrag.solver.integrator.two_corners import run_rocking\n"
+        "from rbfrag.solver.integrator.rocking_kernel import run_rocking\n"
         "assert run_rocking.signatures == []\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.campaign.kind import Case, CaseRequest, CaseResult, Measures, Sequences, each_once
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import Shaking, SupportedBlock
 from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, level_plane, slide_m
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import SEARCH_LIMIT, FloatArray
@@ -77,7 +77,7 @@ class SlidingCampaign(Sequences):
         limits: list[Any] = [case.settings["displacement_m"] for case in cases]
         return tuple(limit for limit in limits if limit > 0.0)
 
-    def site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
         """Return the block on its level plane."""
         return level_plane(block["ky"])
 

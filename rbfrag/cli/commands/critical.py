@@ -16,7 +16,7 @@ from rbfrag.vocabulary.quantities import JOINT, PLANES, SHAPE, WHOLE
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
     from rbfrag.solver.critical_result import SlidingStrengths
-    from rbfrag.solver.kinds import KindFacts
+    from rbfrag.solver.kinds import KindSpec
 
 EXAMPLE = "Example:  rbfrag critical record.AT2 --height 2.4 --width 0.5"
 
@@ -133,7 +133,7 @@ SEARCH_OPTION = {
 """What an option is called by the kinds that understand it."""
 
 
-def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | None) -> KindFacts:
+def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | None) -> KindSpec:
     from rbfrag.question.shapes import SIDES_AND_PLANES, WAYS
     from rbfrag.solver.critical import kind_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
@@ -152,7 +152,7 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
     return kind_of_mode("topple" if displacement is None else "slide")
 
 
-def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> None:
+def _refuse_options_of_other_kinds(model: KindSpec, given: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import KINDS
 
     for word, is_given in given.items():
@@ -170,7 +170,11 @@ def _searched_block(
     """Return the block of a search by keyword, its k_r if it topples, and warnings."""
     from rbfrag.question.blocks import shape_of, without_kv
     from rbfrag.solver.kinds import PLANES, facts_of, kind_of_mode
-    from rbfrag.solver.stability.first_slip import JOINT, after_first_slip, refuse_before_slip
+    from rbfrag.solver.stability.residual_strength import (
+        JOINT,
+        after_first_slip,
+        refuse_before_slip,
+    )
     from rbfrag.solver.stability.single import stability
 
     with given.named():

@@ -33,7 +33,7 @@ def find_motion(
 
         with opened_database(db, read_only=True) as engine, engine.connect() as connection:
             return load_motion(connection, int(text))
-    from rbfrag.motions.recognise import read_motion
+    from rbfrag.motions.readers import read_motion
 
     return read_motion(
         text,

@@ -2,7 +2,7 @@
 
 Fields are found by what they say; counts, intervals and numbers are read or refused with their
 line. What all traces go through (unit, missing samples, labels) is done once, in
-:mod:`rbfrag.motions.recognise`.
+:mod:`rbfrag.motions.readers`.
 """
 
 from __future__ import annotations

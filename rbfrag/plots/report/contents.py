@@ -34,7 +34,7 @@ from rbfrag.results.diagnostic import Diagnostic, diagnostics
 from rbfrag.results.numbers import exact_percent, interval, percent, return_period
 from rbfrag.results.result import Result, TextLine
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kinds import BY_MECHANICS, KindFacts, facts_of
+from rbfrag.solver.kinds import BY_MECHANICS, KindSpec, facts_of
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 from rbfrag.vocabulary.quantities import (
@@ -438,7 +438,7 @@ def _drawing(shape: Shape | None, numbers: Mapping[str, float], *, free: bool) -
 
 def _block_rows(
     shape: Shape | None,
-    facts: KindFacts,
+    facts: KindSpec,
     numbers: Mapping[str, float],
     model: FragilityModel,
     y_m_s: float | None,

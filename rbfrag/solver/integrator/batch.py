@@ -19,7 +19,7 @@ class Runs:
     """What many runs ended in; every array has the shape of the blocks that were asked for.
 
     Args:
-        outcome: codes of `rbfrag.solver.integrator.single_run` (STABLE, TOPPLED, UNDETERMINED,
+        outcome: codes of `rbfrag.solver.integrator.toppling_kernel` (STABLE, TOPPLED, UNDETERMINED,
             JUMP).
         theta_n: peak rotation over the critical angle; NaN unless the block stays.
         peak_rad: peak rotation [rad]; NaN unless the block stays.

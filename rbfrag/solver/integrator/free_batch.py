@@ -9,9 +9,9 @@ import numpy as np
 from rbfrag.solver.excitation import Excitation, Nodes
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import STABLE
+from rbfrag.solver.integrator.rocking_kernel import RockingRules, run_rocking
 from rbfrag.solver.integrator.state import Corner
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.two_corners import RockingRules, run_rocking
 from rbfrag.solver.results import FloatArray, IntArray
 
 
@@ -20,7 +20,7 @@ class FreeRuns:
     """What many runs ended in; arrays of the shape of the blocks, shape (n,).
 
     Args:
-        outcome: codes of `rbfrag.solver.integrator.two_corners`.
+        outcome: codes of `rbfrag.solver.integrator.rocking_kernel`.
         theta_n: the greater ratio of a peak rotation to its critical angle; NaN unless the block
             stays.
         sensitive: 1 where the outcome is another one for the motion times a little more or less.

@@ -3,7 +3,7 @@
 A step of one run waits for the step before it, and leaves a processor idle most of the time. Here
 up to `BATCH` runs over one record take each step together. Only the plain step of a moving block
 is taken so; whatever else happens in an interval (a start, a peak, an impact, a jump, the end of
-the record) is left to :func:`rbfrag.solver.integrator.single_run.advance`, which goes on to
+the record) is left to :func:`rbfrag.solver.integrator.toppling_kernel.advance`, which goes on to
 the next node at which the block moves. Every operation is that of the single run, in the same
 order, so that the results are equal bit for bit.
 """
@@ -18,14 +18,6 @@ import numpy as np
 from rbfrag.solver.excitation import Nodes
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, kernel, within
 from rbfrag.solver.integrator.events import irrecoverable, keeps_direction, simple_turn
-from rbfrag.solver.integrator.single_run import (
-    TOPPLED,
-    Known,
-    Progress,
-    advance,
-    beginning,
-    end_of_run,
-)
 from rbfrag.solver.integrator.state import (
     Peak,
     State,
@@ -40,6 +32,14 @@ from rbfrag.solver.integrator.step import (
     step_errors,
 )
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
+from rbfrag.solver.integrator.toppling_kernel import (
+    TOPPLED,
+    Known,
+    Progress,
+    advance,
+    beginning,
+    end_of_run,
+)
 from rbfrag.solver.results import FloatArray, IntArray
 
 BATCH = 32

@@ -29,18 +29,20 @@ from rbfrag.solver.integrator.one_freedom.equation import (
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import SupportedBlock
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.search.scale import ScaledKind
+from rbfrag.solver.search.incremental_scaling import ScaledKind
 
 
-def mechanism(site: BlockOnPlanes) -> Mechanism:
+def mechanism(supported_block: SupportedBlock) -> Mechanism:
     """Return the confined block."""
-    block = site.block
+    block = supported_block.block
     assert block is not None
-    if not site.back_fracture or not block.confines:
+    if not supported_block.back_fracture or not block.confines:
         raise InputError("without an overhanging plane the block topples freely: use kind toppling")
-    rocking = rocking_equation(block, site.beta_rad, site.phi_rad, site.push)
+    rocking = rocking_equation(
+        block, supported_block.beta_rad, supported_block.phi_rad, supported_block.push
+    )
     # where the base edge is normal to the back plane, and where the front face lies on the base
     square, flat = free_from(block), block.on_front_face_rad
     slip = toe_slip(block)
@@ -65,7 +67,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         stays = constant(slip(square))
         return Phase(
             name="topples freely about its toe",
-            forward=rocking_equation(block, site.beta_rad, push=site.push),
+            forward=rocking_equation(block, supported_block.beta_rad, push=supported_block.push),
             pose=pose_with(stays),
             after=after_free,
             # no contact slips: no friction holds the block at a standstill
@@ -105,8 +107,8 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             highest=exit.x,
         )
 
-    confined = equation(site)
-    critical_rad = math.radians(block.alpha3_deg) - site.beta_rad
+    confined = equation(supported_block)
+    critical_rad = math.radians(block.alpha3_deg) - supported_block.beta_rad
     return Mechanism(
         first=Phase(
             name="topples against its back plane",
@@ -125,13 +127,13 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
     )
 
 
-def equation(site: BlockOnPlanes) -> Equation:
+def equation(supported_block: SupportedBlock) -> Equation:
     """Return the equation of motion up to the first standstill."""
-    block = site.block
+    block = supported_block.block
     assert block is not None
     gamma = math.radians(block.gamma_deg)
     # (3.28, 3.29): the toe slides out and the heel up, so that friction pulls both back
-    phi1, phi2 = site.phi_rad, site.phi_back_rad
+    phi1, phi2 = supported_block.phi_rad, supported_block.phi_back_rad
     return two_contact_equation(
         base=Contact(
             arm=turning(block.toe, -1),
@@ -146,8 +148,8 @@ def equation(site: BlockOnPlanes) -> Equation:
         path=Vector(toe_slip(block), constant(0.0)) - turning(block.toe, -1),
         clockwise=True,
         inertia_m2=block.inertia_m2,
-        beta_rad=site.beta_rad,
-        push=site.push,
+        beta_rad=supported_block.beta_rad,
+        push=supported_block.push,
     )
 
 
@@ -182,9 +184,9 @@ class ConfinedToppling(ScaledKind):
 
     yield_name = "kct"
 
-    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+    def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
         """Return the confined toppling block."""
-        return mechanism(site)
+        return mechanism(supported_block)
 
 
 MODEL = ConfinedToppling.named("confined_toppling")

@@ -22,14 +22,14 @@ from rbfrag.results.numbers import relative
 from rbfrag.solver.block.formulas import moments_about_corners
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.integrator.rocking_kernel import RockingRun
 from rbfrag.solver.integrator.state import Corner, corner
-from rbfrag.solver.integrator.two_corners import RockingRun
 from rbfrag.solver.kind import (
-    BlockOnPlanes,
     Kind,
     RunEnd,
     Runner,
     Shaking,
+    SupportedBlock,
 )
 from rbfrag.solver.quantity import finite_or_none, number, positive
 from rbfrag.solver.results import (
@@ -59,26 +59,30 @@ CHAOTIC = 1e-3
 """Error over the critical angle from which on the size of a peak means nothing."""
 
 
-def free_block(site: BlockOnPlanes) -> FreeBlock:
+def free_block(supported_block: SupportedBlock) -> FreeBlock:
     """Return the block with its corners.
 
     Args:
-        site: the block, its base, and `restitution` among its settings.
+        supported_block: the block, its base, and `restitution` among its settings.
 
     Raises:
         InputError: a block that does not stand of itself, a restitution outside (0, 1].
     """
-    given = site.settings.get("restitution")
+    given = supported_block.settings.get("restitution")
     if given is not None:
         given = number(given, "restitution", "the coefficient of restitution")
         if not 0.0 < given <= 1.0:
             raise InputError(
                 f"restitution = {given:g}: give the coefficient of restitution, above 0 and up to 1"
             )
-    if site.block is None:
-        assert site.p2 is not None
-        return rectangle(positive(site.p2, "p2", "1/s²"), positive(site.yield_g, "kr", "g"), given)
-    return _of_shape(site.block, site.beta_rad, given)
+    if supported_block.block is None:
+        assert supported_block.p2 is not None
+        return rectangle(
+            positive(supported_block.p2, "p2", "1/s²"),
+            positive(supported_block.yield_g, "kr", "g"),
+            given,
+        )
+    return _of_shape(supported_block.block, supported_block.beta_rad, given)
 
 
 def rectangle(p2: float, kr: float, given: float | None) -> FreeBlock:
@@ -141,14 +145,14 @@ def _corner(
 class Rocking(Kind):
     """The model of free-standing blocks."""
 
-    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+    def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
         """Return what the block does.
 
         Raises:
             InputError: a block that does not stand of itself, cohesion, a restitution outside
                 (0, 1].
         """
-        block = self._block(site)
+        block = self._block(supported_block)
         excited = shaking.excitation
         refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
         run = simulate(excited, block)
@@ -175,7 +179,7 @@ class Rocking(Kind):
             samples_total=int(np.count_nonzero(excited.interval_s)),
             warnings=(
                 *shaking.warnings,
-                *_warnings(block, site, run, outcome, sensitive, spread, traced.motion),
+                *_warnings(block, supported_block, run, outcome, sensitive, spread, traced.motion),
             ),
             history=_posed(block, traced) if shaking.history else None,
             critical_backward_deg=math.degrees(block.heel.theta_c),
@@ -186,9 +190,9 @@ class Rocking(Kind):
             peak_spread=spread if known else None,
         )
 
-    def runner(self, site: BlockOnPlanes) -> Runner:
+    def runner(self, supported_block: SupportedBlock) -> Runner:
         """Return a function that says how the block ends under an excitation."""
-        block = self._block(site)
+        block = self._block(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
             refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
@@ -205,12 +209,12 @@ class Rocking(Kind):
 
         return run
 
-    def _block(self, site: BlockOnPlanes) -> FreeBlock:
-        if site.cohesive:
+    def _block(self, supported_block: SupportedBlock) -> FreeBlock:
+        if supported_block.cohesive:
             raise InputError(
                 f"cohesion_pa cannot be combined with {self.kind}: the block lifts off its base"
             )
-        return free_block(site)
+        return free_block(supported_block)
 
 
 def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:
@@ -248,7 +252,7 @@ def repeated(excited: Excitation, block: FreeBlock, run: RockingRun) -> tuple[bo
 
 def _warnings(
     block: FreeBlock,
-    site: BlockOnPlanes,
+    supported_block: SupportedBlock,
     run: RockingRun,
     outcome: Outcome,
     sensitive: bool,
@@ -288,7 +292,9 @@ def _warnings(
             "the response is chaotic: after so many impacts the size of its peaks is not "
             "determined by the motion as recorded",
         )
-    tan_phi = math.tan(site.phi_rad) if site.phi_rad < 0.5 * math.pi else math.inf
+    tan_phi = (
+        math.tan(supported_block.phi_rad) if supported_block.phi_rad < 0.5 * math.pi else math.inf
+    )
     until_s = run.verdict_s if outcome is Outcome.TOPPLED else math.inf
     force = corner_force(block, motion, tan_phi, until_s)
     if force.lifts_s is not None:

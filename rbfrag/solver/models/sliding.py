@@ -26,7 +26,7 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import MotionLike, as_motion
+from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
@@ -42,7 +42,7 @@ from rbfrag.solver.integrator.one_freedom.equation import (
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant
 from rbfrag.solver.kind import (
-    BlockOnPlanes,
+    SupportedBlock,
 )
 from rbfrag.solver.mechanism import MechanismKind, driven_up_below
 from rbfrag.solver.quantity import positive
@@ -59,24 +59,24 @@ KY_OVER_PGA = (
 """Strengths at which displacements are asked for when nothing else is said."""
 
 
-def mechanism(site: BlockOnPlanes) -> Mechanism:
+def mechanism(supported_block: SupportedBlock) -> Mechanism:
     """Return the sliding block.
 
     Args:
-        site: the block, its planes, and the settings `two_way` and `horizontal`.
+        supported_block: the block, its planes, and the settings `two_way` and `horizontal`.
     """
-    phi, beta = site.phi_rad, site.beta_rad
-    two_way = bool(site.settings.get("two_way", False))
+    phi, beta = supported_block.phi_rad, supported_block.beta_rad
+    two_way = bool(supported_block.settings.get("two_way", False))
     if two_way and not phi + beta < 0.5 * math.pi:
         raise InputError(
             f"phi + beta = {math.degrees(phi + beta):g} degrees: no acceleration slides the block "
             "up the base; omit two_way"
         )
-    forward = _equation(site, 1.0)
-    start = site.centroid_m
+    forward = _equation(supported_block, 1.0)
+    start = supported_block.centroid_m
     # both settings are forms of Newmark's block, which has no rotation
-    newmark = two_way or bool(site.settings.get("horizontal", False))
-    may_tip = _may_tip(site)
+    newmark = two_way or bool(supported_block.settings.get("horizontal", False))
+    may_tip = _may_tip(supported_block)
     tips = may_tip and not newmark
 
     def pose(s: float) -> Pose:
@@ -85,9 +85,9 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
     def after(exit: Exit) -> Ending:
         return Ending(Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block tips back")
 
-    reverse = _tips_back(site) if tips else None
+    reverse = _tips_back(supported_block) if tips else None
     if two_way:
-        reverse = _equation(site, -1.0)
+        reverse = _equation(supported_block, -1.0)
 
     return Mechanism(
         first=Phase(
@@ -98,15 +98,16 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             pose=pose,
             after=after,
             # with a plane behind it the block cannot go further up than it was
-            lowest=0.0 if site.back_fracture else -math.inf,
+            lowest=0.0 if supported_block.back_fracture else -math.inf,
         ),
         rotates=False,
         critical=None,
-        warnings=(KY_ALONE,) if site.block is None and not newmark else (),
-        least_q=_neglected_below(site, two_way=two_way, tips=tips, may_tip=may_tip),
+        warnings=(KY_ALONE,) if supported_block.block is None and not newmark else (),
+        least_q=_neglected_below(supported_block, two_way=two_way, tips=tips, may_tip=may_tip),
         if_below=MAY_TIP if may_tip else MAY_SLIDE_UP,
-        stepwise_below=-math.inf if newmark else driven_up_below(site),
-        goes_on=site.block is not None and not site.settings.get("horizontal", False),
+        stepwise_below=-math.inf if newmark else driven_up_below(supported_block),
+        goes_on=supported_block.block is not None
+        and not supported_block.settings.get("horizontal", False),
     )
 
 
@@ -127,61 +128,63 @@ MAY_SLIDE_UP = (
 )
 
 
-def _neglected_below(site: BlockOnPlanes, *, two_way: bool, tips: bool, may_tip: bool) -> float:
+def _neglected_below(
+    supported_block: SupportedBlock, *, two_way: bool, tips: bool, may_tip: bool
+) -> float:
     """Return the k_h/(1 + k_v) below which the block does what its model neglects."""
-    if site.block is None or tips:
+    if supported_block.block is None or tips:
         return -math.inf
     if may_tip:
-        return tip_threshold(site)
-    up = site.phi_rad + site.beta_rad
+        return tip_threshold(supported_block)
+    up = supported_block.phi_rad + supported_block.beta_rad
     return -math.inf if two_way or up >= 0.5 * math.pi else -math.tan(up)
 
 
-def _may_tip(site: BlockOnPlanes) -> bool:
+def _may_tip(supported_block: SupportedBlock) -> bool:
     """Whether a pulse into the slope can tip the block about its heel.
 
     With α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
     centroid, and no pulse into the slope turns the block about it.
     """
-    if site.block is None:
+    if supported_block.block is None:
         return False
-    alpha1 = math.radians(site.block.alpha1_deg)
-    return alpha1 > -site.phi_rad and alpha1 - site.beta_rad > -0.5 * math.pi
+    alpha1 = math.radians(supported_block.block.alpha1_deg)
+    return alpha1 > -supported_block.phi_rad and alpha1 - supported_block.beta_rad > -0.5 * math.pi
 
 
-def tip_threshold(site: BlockOnPlanes) -> float:
+def tip_threshold(supported_block: SupportedBlock) -> float:
     """Return the k_h/(1 + k_v) below which the block tips about its heel, dry tan(α1 - β)."""
-    tips = _tips_back(site)
+    tips = _tips_back(supported_block)
     return tips.threshold(0.0)
 
 
-def _tips_back(site: BlockOnPlanes) -> Equation:
+def _tips_back(supported_block: SupportedBlock) -> Equation:
     """Return the equation of the start of a rotation backward about the heel."""
-    assert site.block is not None
+    assert supported_block.block is not None
     # moments about the heel over m g r1: k_h cos(α1 - β) against (1 + k_v) times sin(α1 - β) and
     # the backward moment of water; only their sign is read
-    past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
-    along, off, moment_m = site.push
-    heel_x, heel_y = site.block.heel
+    past_heel = math.radians(supported_block.block.alpha1_deg) - supported_block.beta_rad
+    along, off, moment_m = supported_block.push
+    heel_x, heel_y = supported_block.block.heel
     moment_m += heel_y * along - heel_x * off
     return Equation(
         inertia=constant(1.0),
         driving=constant(math.cos(past_heel)),
-        resistance=constant(math.sin(past_heel) + moment_m / site.block.r1_m),
+        resistance=constant(math.sin(past_heel) + moment_m / supported_block.block.r1_m),
     )
 
 
-def _equation(site: BlockOnPlanes, sense: float) -> Equation:
+def _equation(supported_block: SupportedBlock, sense: float) -> Equation:
     """Return the equation of motion down (1) or up (-1) the base."""
-    phi, beta = sense * site.phi_rad, site.beta_rad
+    phi, beta = sense * supported_block.phi_rad, supported_block.beta_rad
     # (4.15) with the change of the normal force by the inertial one, N = m g (w cos β - k_h sin β)
     factor = math.cos(phi - beta) / math.cos(phi)
-    horizontal = bool(site.settings.get("horizontal", False))
+    horizontal = bool(supported_block.settings.get("horizontal", False))
     if horizontal:
         factor = 1.0
     driving = STANDARD_GRAVITY_M_S2 * factor
     # the push of water over the weight lessens the yield, and leaves the factor as it is
-    along, off, _ = site.push
+    along, off, _ = supported_block.push
     pushed = (along * math.cos(phi) + off * math.sin(phi)) / math.cos(phi - beta)
     contact = Condition(
         per_k_h=constant(-math.sin(beta)),
@@ -239,10 +242,10 @@ def slide_m(excited: Excitation, ky: float) -> float:
     return run.x if run.outcome is Outcome.STABLE else math.nan
 
 
-def level_plane(ky: float) -> BlockOnPlanes:
+def level_plane(ky: float) -> SupportedBlock:
     """Return a block that slides on a level plane, of yield acceleration `ky` [g]."""
     friction_rad = math.atan(ky)
-    return BlockOnPlanes(None, 0.0, friction_rad, friction_rad, ky, back_fracture=False)
+    return SupportedBlock(None, 0.0, friction_rad, friction_rad, ky, back_fracture=False)
 
 
 class Sliding(MechanismKind):
@@ -250,9 +253,9 @@ class Sliding(MechanismKind):
 
     yield_name = "ky"
 
-    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+    def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
         """Return the sliding block."""
-        return mechanism(site)
+        return mechanism(supported_block)
 
     def critical(
         self,

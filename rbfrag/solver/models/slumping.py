@@ -34,22 +34,22 @@ from rbfrag.solver.integrator.one_freedom.equation import (
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
 from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
 from rbfrag.solver.kind import (
-    BlockOnPlanes,
+    SupportedBlock,
 )
 from rbfrag.solver.mechanism import driven_up_below
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.search.scale import ScaledKind
+from rbfrag.solver.search.incremental_scaling import ScaledKind
 
 
-def mechanism(site: BlockOnPlanes) -> Mechanism:
+def mechanism(supported_block: SupportedBlock) -> Mechanism:
     """Return the slumping block.
 
     Raises:
         InputError: there is no back plane, or the corner at the heel is missing.
     """
-    block = site.block
+    block = supported_block.block
     assert block is not None
-    if not site.back_fracture:
+    if not supported_block.back_fracture:
         raise InputError("a block without a back plane cannot slump")
     if block.lowest_on_back != block.heel:
         raise InputError(
@@ -71,12 +71,12 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             "on from there, which is not followed",
         )
 
-    forward = equation(site, 1.0)
+    forward = equation(supported_block, 1.0)
     return Mechanism(
         first=Phase(
             name="slumps",
             forward=forward,
-            reverse=equation(site, -1.0),
+            reverse=equation(supported_block, -1.0),
             pose=pose,
             after=after,
             highest=flat,
@@ -86,17 +86,17 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         if_impact="the block was driven back to where it had been: it is taken to stop there "
         "without rebound, whatever its speed",
         goes_on=True,
-        stepwise_below=driven_up_below(site),
+        stepwise_below=driven_up_below(supported_block),
     )
 
 
-def equation(site: BlockOnPlanes, sense: float) -> Equation:
+def equation(supported_block: SupportedBlock, sense: float) -> Equation:
     """Return the equation of motion, forward (1) or in reverse (-1)."""
-    block = site.block
+    block = supported_block.block
     assert block is not None
     gamma = math.radians(block.gamma_deg)
     # (3.24, 3.25): friction opposes the slip of both contacts, and changes sides with its sense
-    phi1, phi2 = sense * site.phi_rad, sense * site.phi_back_rad
+    phi1, phi2 = sense * supported_block.phi_rad, sense * supported_block.phi_back_rad
     return two_contact_equation(
         base=Contact(
             arm=turning(block.heel),
@@ -111,8 +111,8 @@ def equation(site: BlockOnPlanes, sense: float) -> Equation:
         path=centroid_path(block),
         clockwise=False,
         inertia_m2=block.inertia_m2,
-        beta_rad=site.beta_rad,
-        push=site.push,
+        beta_rad=supported_block.beta_rad,
+        push=supported_block.push,
     )
 
 
@@ -135,9 +135,9 @@ class Slumping(ScaledKind):
 
     yield_name = "ks"
 
-    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+    def mechanism(self, supported_block: SupportedBlock) -> Mechanism:
         """Return the slumping block."""
-        return mechanism(site)
+        return mechanism(supported_block)
 
 
 MODEL = Slumping.named("slumping")

@@ -2,7 +2,7 @@
 
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
-It has a kernel of its own, `rbfrag.solver.integrator.single_run`, which campaigns and searches
+It has a kernel of its own, `rbfrag.solver.integrator.toppling_kernel`, which campaigns and searches
 call by the million. A block given by its shape whose toe does not hold is followed step by step
 instead, with the slip of its toe.
 """
@@ -20,43 +20,46 @@ from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.equation import Ending, Mechanism, Phase, Pose
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
-from rbfrag.solver.kind import SHAKING, BlockOnPlanes, Kind, RunEnd, Runner, Shaking
+from rbfrag.solver.kind import SHAKING, Kind, RunEnd, Runner, Shaking, SupportedBlock
 from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
-from rbfrag.solver.stability.toe import (
+from rbfrag.solver.simulation import Simulation, end_of, response_of, simulate_block
+from rbfrag.solver.stability.toe_stability import (
     TOE_FOLLOWED,
     slides_at_toe,
     toe_needs_in_time,
     toe_slips_g,
 )
 from rbfrag.solver.toppling_run import history_of, outcome_of, refuse_endless, respond, simulate
-from rbfrag.solver.whole_run import WholeRun, end_of, response_of, whole_run
 
 
 class Toppling(Kind):
     """The toppling model."""
 
-    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+    def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
         """Return what the block does."""
         answer = respond(
             shaking.motion,
-            p2=_size(site),
-            kr=_strength(site),
+            p2=_size(supported_block),
+            kr=_strength(supported_block),
             vertical=shaking.vertical,
             polarity=shaking.polarity,
-            history=shaking.history or site.block is not None,
+            history=shaking.history or supported_block.block is not None,
         )
         answer = replace(answer, warnings=(*shaking.remarks, *answer.warnings))
-        if site.block is None or answer.history is None:
+        if supported_block.block is None or answer.history is None:
             return answer
-        beta_deg, phi_deg = math.degrees(site.beta_rad), math.degrees(site.phi_rad)
-        slips_g = toe_slips_g(site.block, beta_deg, phi_deg, site.push)
-        needs = _toe_needs(site, answer.history)
+        beta_deg, phi_deg = (
+            math.degrees(supported_block.beta_rad),
+            math.degrees(supported_block.phi_rad),
+        )
+        slips_g = toe_slips_g(supported_block.block, beta_deg, phi_deg, supported_block.push)
+        needs = _toe_needs(supported_block, answer.history)
         need, at_s = needs or (None, None)
         history = answer.history if shaking.history else None
-        if need is not None and _is_followed_with_toe(site, needs):
-            whole = _with_toe(site, shaking.excitation, history=shaking.history)
+        if need is not None and _is_followed_with_toe(supported_block, needs):
+            whole = _with_toe(supported_block, shaking.excitation, history=shaking.history)
             answer = replace(response_of(self.kind, whole, shaking), state=None)
             gives_way = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
             answer = replace(answer, warnings=(*answer.warnings, gives_way))
@@ -66,18 +69,18 @@ class Toppling(Kind):
             answer, toe_needs_deg=need, toe_needs_s=at_s, toe_slips_g=slips, history=history
         )
 
-    def runner(self, site: BlockOnPlanes) -> Runner:
+    def runner(self, supported_block: SupportedBlock) -> Runner:
         """Return a function that says how the block ends under an excitation."""
-        p2, kr = _size(site), _strength(site)
+        p2, kr = _size(supported_block), _strength(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
             refuse_endless(excited, p2)
             end = simulate(excited, p2=p2, kr=kr)
             moved = math.isfinite(end.started_s)
-            if moved and site.block is not None:
-                needs = _toe_needs(site, history_of(excited, p2=p2, kr=kr))
-                if _is_followed_with_toe(site, needs):
-                    return end_of(_with_toe(site, excited), self.mode, (TOE_FOLLOWED,))
+            if moved and supported_block.block is not None:
+                needs = _toe_needs(supported_block, history_of(excited, p2=p2, kr=kr))
+                if _is_followed_with_toe(supported_block, needs):
+                    return end_of(_with_toe(supported_block, excited), self.mode, (TOE_FOLLOWED,))
             return RunEnd(
                 outcome=outcome_of(end),
                 moved=moved,
@@ -104,31 +107,39 @@ class Toppling(Kind):
         return critical(motion, kind=self.kind, **options)
 
 
-def _toe_needs(site: BlockOnPlanes, history: ResponseHistory) -> tuple[float, float] | None:
+def _toe_needs(
+    supported_block: SupportedBlock, history: ResponseHistory
+) -> tuple[float, float] | None:
     """Return the greatest friction angle that a rotation needs at the toe [deg], and when [s]."""
-    assert site.block is not None
-    return toe_needs_in_time(site.block, math.degrees(site.beta_rad), history, site.push)
+    assert supported_block.block is not None
+    return toe_needs_in_time(
+        supported_block.block, math.degrees(supported_block.beta_rad), history, supported_block.push
+    )
 
 
-def _is_followed_with_toe(site: BlockOnPlanes, needs: tuple[float, float] | None) -> bool:
+def _is_followed_with_toe(
+    supported_block: SupportedBlock, needs: tuple[float, float] | None
+) -> bool:
     """Return whether the toe slips of a block whose mode is to topple.
 
     A block of another mode, asked about as a topple, is not followed: it would slide or slump.
     """
-    slips = needs is not None and needs[0] > math.degrees(site.phi_rad)
-    return slips and site.yield_g is not None
+    slips = needs is not None and needs[0] > math.degrees(supported_block.phi_rad)
+    return slips and supported_block.yield_g is not None
 
 
-def _with_toe(site: BlockOnPlanes, excited: Excitation, *, history: bool = False) -> WholeRun:
+def _with_toe(
+    supported_block: SupportedBlock, excited: Excitation, *, history: bool = False
+) -> Simulation:
     """Follow the block with the slip of its toe, step by step."""
     # friction on the back face is neglected, as it is in k_r
-    smooth = replace(site, phi_back_rad=0.0)
-    return whole_run(_mechanism(site), smooth, excited, history=history)
+    smooth = replace(supported_block, phi_back_rad=0.0)
+    return simulate_block(_mechanism(supported_block), smooth, excited, history=history)
 
 
-def _mechanism(site: BlockOnPlanes) -> Mechanism:
+def _mechanism(supported_block: SupportedBlock) -> Mechanism:
     """Return a block that turns about its toe, to be followed step by step from the beginning."""
-    block = site.block
+    block = supported_block.block
     assert block is not None
     toe = block.toe
 
@@ -140,32 +151,32 @@ def _mechanism(site: BlockOnPlanes) -> Mechanism:
     return Mechanism(
         first=Phase(
             name="topples about its toe",
-            forward=rocking_equation(block, site.beta_rad, push=site.push),
+            forward=rocking_equation(block, supported_block.beta_rad, push=supported_block.push),
             pose=pose,
             after=lambda _: Ending(Outcome.CONTACT_LOST),
         ),
         rotates=True,
-        critical=math.radians(block.alpha3_deg) - site.beta_rad,
+        critical=math.radians(block.alpha3_deg) - supported_block.beta_rad,
         stepwise_below=math.inf,
         at_toe=True,
     )
 
 
-def _size(site: BlockOnPlanes) -> float:
+def _size(supported_block: SupportedBlock) -> float:
     """Return p² [1/s²]."""
-    if site.block is not None:
-        return site.block.p2
-    assert site.p2 is not None
-    return site.p2
+    if supported_block.block is not None:
+        return supported_block.block.p2
+    assert supported_block.p2 is not None
+    return supported_block.p2
 
 
-def _strength(site: BlockOnPlanes) -> float:
+def _strength(supported_block: SupportedBlock) -> float:
     """Return k_r: the yield, or for a block of another mode the balance on its toe."""
-    if site.yield_g is not None:
-        return site.yield_g
-    assert site.block is not None
+    if supported_block.yield_g is not None:
+        return supported_block.yield_g
+    assert supported_block.block is not None
     # (3.16): θc = α3 - β is what is left to the balance on the toe
-    balance_deg = site.block.alpha3_deg - math.degrees(site.beta_rad)
+    balance_deg = supported_block.block.alpha3_deg - math.degrees(supported_block.beta_rad)
     if not 0.0 < balance_deg < 90.0:
         raise InputError(
             f"alpha3 - beta = {balance_deg:.4g} degrees: a block can rock about its toe where it "

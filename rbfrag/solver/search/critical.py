@@ -23,7 +23,7 @@ from rbfrag.results.diagnostic import Diagnostic
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.integrator.block_excitation import block_excitation
-from rbfrag.solver.integrator.single_run import TOPPLED, Run
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED, Run
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import MAP_DEPTH, RESOLUTION, SEARCH_LIMIT, Polarity, SearchPoints
 from rbfrag.solver.search.certified import (

@@ -17,8 +17,8 @@ from rbfrag.solver.integrator.excursion import (
     Rules,
     excursion_from_rest,
 )
-from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.toppling_kernel import next_lifting_node
 from rbfrag.solver.search.rises import next_start
 
 WORK = np.dtype([("trajectories", np.int64), ("steps", np.int64)])

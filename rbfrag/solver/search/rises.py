@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import inner_kernel
-from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.toppling_kernel import next_lifting_node
 from rbfrag.solver.results import FloatArray
 
 LIFTED, TURNED_BACK, APART = 0, 1, 2

@@ -8,7 +8,7 @@ import numpy as np
 
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.batch import simulate_many
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.results import RESOLUTION, FloatArray, IntArray
 
 FIRST_RUNS = 3000

@@ -9,8 +9,8 @@ import numpy as np
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.excursion import TRUSTED, excursion_from_rest
-from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.toppling_kernel import next_lifting_node
 from rbfrag.solver.search.borders import Border, narrowed, next_trial
 from rbfrag.solver.search.from_rest import linear_distance
 from rbfrag.solver.search.renewal import ExcursionTable, add_work, all_known, begin

@@ -59,7 +59,7 @@ from rbfrag.solver.stability.modes import (
     words_of_mode,
     yield_coefficient,
 )
-from rbfrag.solver.stability.toe import toe_slips_g
+from rbfrag.solver.stability.toe_stability import toe_slips_g
 
 YIELDS = {
     "slide": "Yield acceleration of sliding {} g",

@@ -29,7 +29,7 @@ from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.step import TURN_MAX
-from rbfrag.solver.kinds import KINDS, KindFacts
+from rbfrag.solver.kinds import KINDS, KindSpec
 from rbfrag.solver.models import confined_toppling, sliding, slumping
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
@@ -298,7 +298,7 @@ def test_a_fifth_model_is_a_line_of_facts_and_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "belt.py").write_text(FIFTH)
-    monkeypatch.setitem(KINDS, "belt", KindFacts("belt", "slide"))
+    monkeypatch.setitem(KINDS, "belt", KindSpec("belt", "slide"))
     path = [*rbfrag.solver.models.__path__, str(tmp_path)]
     monkeypatch.setattr(rbfrag.solver.models, "__path__", path)
     motion = GroundMotion.from_nodes([0.0, 1.0, 3.0], [0.0, 0.5, 0.0])

@@ -14,9 +14,9 @@ from numba import njit
 
 from benchmarks.extended.double_double import Pair, add, div, mul, sine_versine, sub
 from benchmarks.extended.toppling import HIGHEST, _series, _value
-from rbfrag.solver.integrator.single_run import Known, errors_after_impact
 from rbfrag.solver.integrator.state import Corner, Peak, State, StepExcitation
 from rbfrag.solver.integrator.step import drift_of_step, take_step
+from rbfrag.solver.integrator.toppling_kernel import Known, errors_after_impact
 from rbfrag.solver.results import FloatArray
 
 ORDER = 8

@@ -9,7 +9,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.block_excitation import block_excitation
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.search.lower_bound import all_topple_below, least_rate
 from rbfrag.solver.toppling_run import respond
 from tests.solver.search.test_critical import shaking

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.block_excitation import remaining_excitation
-from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import STABLE, TOPPLED
 from rbfrag.solver.search.certified import MAP_DEPTH, certified_map, keeps_order
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import simulate

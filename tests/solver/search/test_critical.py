@@ -11,7 +11,7 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import excitation

@@ -11,11 +11,11 @@ import pytest
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.pulses import reversal_pulse
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.toppling_run import runner
 from tests.physics import linear_block
 from tests.physics.pulses import rectangular_cycle

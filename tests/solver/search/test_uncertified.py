@@ -8,7 +8,7 @@ import pytest
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
-from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.integrator.toppling_kernel import TOPPLED
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.search.scan import _gaps
 

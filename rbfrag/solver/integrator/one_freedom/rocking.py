@@ -10,7 +10,7 @@ from rbfrag.solver.integrator.one_freedom.equation import Condition, Equation
 from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.stability.modes import DRY, Push
-from rbfrag.solver.stability.toe import moment_about_toe
+from rbfrag.solver.stability.toe_stability import moment_about_toe
 
 
 def rocking_equation(

@@ -22,7 +22,7 @@ from rbfrag.solver.free_motion import (
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
-from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Shaking
+from rbfrag.solver.kind import RunEnd, Shaking, SupportedBlock
 from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import (
     BlockState,
@@ -36,7 +36,7 @@ from rbfrag.solver.stability.modes import ModeName
 
 
 @dataclass(frozen=True, eq=False)
-class WholeRun:
+class Simulation:
     """A block followed to its end: by its mechanism, and from where that ends step by step.
 
     Args:
@@ -47,7 +47,7 @@ class WholeRun:
     """
 
     mechanism: Mechanism
-    site: BlockOnPlanes
+    supported_block: SupportedBlock
     start: BlockState | None
     run: MechanismRun | None
     free: FreeMotion | None
@@ -182,7 +182,7 @@ class WholeRun:
             error: bound on its error.
             laws: whether it keeps where other laws of impact leave the block.
         """
-        pose, block = self.pose, self.site.block
+        pose, block = self.pose, self.supported_block.block
         if self.outcome is not Outcome.STABLE:
             return None
         position = None
@@ -194,7 +194,7 @@ class WholeRun:
             centroid_m=pose.centroid_m,
             displacement_m=pose.displacement_m,
             gap_m=gap_m(block, pose) if block is not None else pose.displacement_m,
-            touching=touching(self.site, pose) if block is not None else ("base",),
+            touching=touching(self.supported_block, pose) if block is not None else ("base",),
             position=position,
             # in its first place it is exactly
             error=0.0 if position == 0.0 else error,
@@ -214,15 +214,15 @@ FAILS_BY_SOME_LAWS = (
 )
 
 
-def whole_run(
+def simulate_block(
     mechanism: Mechanism,
-    site: BlockOnPlanes,
+    supported_block: SupportedBlock,
     excited: Excitation,
     *,
     history: bool = False,
     start: BlockState | None = None,
     stepwise: bool = True,
-) -> WholeRun:
+) -> Simulation:
     """Follow a block to its end.
 
     Args:
@@ -241,7 +241,7 @@ def whole_run(
         at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
         run = follow(mechanism, excited, history=history, start=at)
         if not (mechanism.goes_on and run.outcome is Outcome.CONTACT_LOST):
-            return WholeRun(mechanism, site, start, run, None)
+            return Simulation(mechanism, supported_block, start, run, None)
         assert run.ended_s is not None
         release = released(run.ended_s, run.phase.pose, run.x, run.rate)
     else:
@@ -250,11 +250,11 @@ def whole_run(
             pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
         release = Release(float(excited.time_s[0]), pose)
     by_law = () if start is None or run is not None else start.by_law
-    free = free_motion(site, excited, release, at_toe=mechanism.at_toe, by_law=by_law)
-    return WholeRun(mechanism, site, start, run, free)
+    free = free_motion(supported_block, excited, release, at_toe=mechanism.at_toe, by_law=by_law)
+    return Simulation(mechanism, supported_block, start, run, free)
 
 
-def end_of(whole: WholeRun, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
+def end_of(whole: Simulation, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
     """Return how a block that was followed ends, without its history.
 
     Args:
@@ -275,7 +275,7 @@ def end_of(whole: WholeRun, mode: ModeName | None, about_block: tuple[str, ...])
     )
 
 
-def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
+def response_of(kind: str, whole: Simulation, shaking: Shaking) -> Response:
     """Return the answer about a block that was followed.
 
     Args:
@@ -323,7 +323,7 @@ def response_of(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
     )
 
 
-def _samples(excited: Excitation, whole: WholeRun) -> int:
+def _samples(excited: Excitation, whole: Simulation) -> int:
     """Return the sample intervals through which a block was followed step by step."""
     assert whole.free is not None
     history = whole.free.history
@@ -344,7 +344,7 @@ def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> Kinematics:
     )
 
 
-def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
+def _history(whole: Simulation, excited: Excitation) -> ResponseHistory:
     """Put the nodes of rest, which the kernels skip, back between those of motion."""
     mechanism = whole.mechanism
     parts = []
@@ -401,7 +401,7 @@ def _nodes_of_rest(trajectory: Kinematics, excited: Excitation) -> FloatArray:
     return nodes_s[~np.isin(nodes_s, time_s)]
 
 
-def _at_start(whole: WholeRun) -> tuple[Pose, float]:
+def _at_start(whole: Simulation) -> tuple[Pose, float]:
     """Return where the motion finds the block, and its strength there; NaN if it is not known."""
     state, first = whole.start, whole.mechanism.first
     if state is None:

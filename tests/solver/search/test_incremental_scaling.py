@@ -23,7 +23,7 @@ from rbfrag.solver.models import model_of_kind
 from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.search.scale import (
+from rbfrag.solver.search.incremental_scaling import (
     ScaledRun,
     ScaleSearch,
     Verdict,

@@ -37,7 +37,7 @@ from rbfrag.solver.results import (
     SearchPoints,
     Status,
 )
-from rbfrag.solver.whole_run import WholeRun
+from rbfrag.solver.simulation import Simulation
 
 SCAN_RATIO = 1.05
 """Ratio of two scales that are looked at one after the other; its square beyond the answer."""
@@ -285,7 +285,7 @@ def critical_rad(shaken: ShakenMechanism) -> float:
     return highest if math.isfinite(highest) else 0.5 * math.pi
 
 
-def scaled_run(run: WholeRun, scale: float, fails_rad: float) -> ScaledRun:
+def scaled_run(run: Simulation, scale: float, fails_rad: float) -> ScaledRun:
     """Return a run with its verdict: whether it reaches the rotation that counts as failure."""
     outcome, peak = run.outcome, run.peak_rad
     # a block that slides has no rotation

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.recognise import read_motions
+from rbfrag.motions.readers import read_motions
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.toppling_run import OUTCOMES, respond

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
+from rbfrag.solver.kinds import KindSpec, facts_of, kind_of_mode
 from rbfrag.solver.stability.modes import words_of_mode
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ AFTER_SLIP = Diagnostic(
 )
 
 
-def slips_on_base(facts: KindFacts) -> bool:
+def slips_on_base(facts: KindSpec) -> bool:
     """Return whether blocks of a kind slip on their base; a topple turns about its toe."""
     return facts.free_standing or "p2" not in facts.parameters
 

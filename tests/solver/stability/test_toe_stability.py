@@ -11,7 +11,7 @@ import pytest
 import rbfrag
 from rbfrag import Block, stability
 from rbfrag.motions.polarity import Polarity
-from rbfrag.solver.stability.toe import toe_needs_deg, toe_needs_in_time, toe_slips_g
+from rbfrag.solver.stability.toe_stability import toe_needs_deg, toe_needs_in_time, toe_slips_g
 from tests.physics.pulses import half_sines
 
 
