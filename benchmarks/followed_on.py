@@ -136,7 +136,7 @@ def slides_by_law(root: Path) -> list[list[str]]:
         for law in (free_motion.RIGID, *free_motion.OTHER_LAWS):
             with patch.object(free_motion, "RIGID", law):
                 runs = [_slide(mass, j, excited) for j in slides]
-            lost = sum(run.free is not None for run in runs)
+            lost = sum(run.free_motion is not None for run in runs)
             failed.append(
                 sum(
                     run.outcome is Outcome.TOPPLED or run.peak_displacement_m > DISPLACEMENT_M

@@ -110,9 +110,9 @@ def member_bytes(archive: Path, path: Path) -> bytes:
     with _opened(archive) as members:
         info = members.get(name)
         if info is None:
-            some = ", ".join(sorted(members)[:5])
+            examples = ", ".join(sorted(members)[:5])
             raise MotionFileError(
-                path, f"no such member in the zip archive; members are, for example, {some}"
+                path, f"no such member in the zip archive; members are, for example, {examples}"
             )
         if info.file_size > LARGEST_FILE_BYTES:
             raise MotionFileError(path, f"{info.file_size} bytes are too large for an accelerogram")

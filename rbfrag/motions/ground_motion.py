@@ -208,8 +208,8 @@ class GroundMotion:
     @property
     def location(self) -> str:
         """Place of the sensor as the file's header names it; empty where it does not."""
-        stated = (each for each in self.remarks if each.startswith(LOCATION))
-        return next(stated, "").removeprefix(LOCATION)
+        remarks = (remark for remark in self.remarks if remark.startswith(LOCATION))
+        return next(remarks, "").removeprefix(LOCATION)
 
     def scaled(self, factor: float) -> GroundMotion:
         """Return the motion with every sample multiplied by `factor`."""
@@ -227,18 +227,18 @@ class GroundMotion:
         return f"GroundMotion({self.label!r}, {self.npts} {step}, PGA {self.pga_g:.3g} g)"
 
 
-def _finite_vector(values: ArrayLike, what: str, unit: str) -> FloatArray:
+def _finite_vector(values: ArrayLike, description: str, unit: str) -> FloatArray:
     try:
         vector = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"the {what}s must be numbers: {error}") from None
+        raise InputError(f"the {description}s must be numbers: {error}") from None
     if vector.ndim != 1:
-        raise InputError(f"{what}s must be one-dimensional, not of shape {vector.shape}")
+        raise InputError(f"{description}s must be one-dimensional, not of shape {vector.shape}")
     if vector.size == 0:
-        raise InputError(f"no {what}: at least one is required")
+        raise InputError(f"no {description}: at least one is required")
     bad = np.flatnonzero(~np.isfinite(vector))
     if bad.size:
         i = int(bad[0])
-        raise InputError(f"{what} {i} is {vector[i]} ({unit}): every value must be finite")
+        raise InputError(f"{description} {i} is {vector[i]} ({unit}): every value must be finite")
     vector.flags.writeable = False
     return vector

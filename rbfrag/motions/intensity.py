@@ -149,16 +149,16 @@ def significant_duration(
     times = _running_sum(interval_s)
     reached = []
     for share in (0.05, 0.95):
-        wanted = share * total
+        threshold = share * total
         # the interval that ends above what is wanted and began at or below it
-        at = int(np.searchsorted(energy, wanted, side="right")) - 1
+        at = int(np.searchsorted(energy, threshold, side="right")) - 1
         a0, slope = float(acceleration_g[at]), float(acceleration_g[at + 1] - acceleration_g[at])
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             a = a0 + middle * slope
             part = float(interval_s[at]) * middle * (a0 * a0 + a0 * a + a * a) / 3.0
-            low, high = (middle, high) if energy[at] + part < wanted else (low, middle)
+            low, high = (middle, high) if energy[at] + part < threshold else (low, middle)
         reached.append(float(times[at]) + high * float(interval_s[at]))
     return reached[1] - reached[0]
 

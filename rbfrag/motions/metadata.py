@@ -132,19 +132,19 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
                 "(a comma in a text needs quotes around the text)",
                 line=line,
             )
-        stated = dict(zip(header, (cell.strip() for cell in cells), strict=True))
-        row = _row(table, stated, line)
+        fields = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+        row = _row(table, fields, line)
         place = _place(folder / row.file)
         first = seen.setdefault((place, row.trace_index), line)
         if first != line:
             raise MotionFileError(
                 table, f"{_named(row)} was given in line {first}: keep one row", line=line
             )
-        others = by_file.get(place, [])
-        if others and None in (row.trace_index, others[0].trace_index):
+        entries = by_file.get(place, [])
+        if entries and None in (row.trace_index, entries[0].trace_index):
             raise MotionFileError(
                 table,
-                f"{_named(row)} and {_named(others[0])} (line {others[0].line}) are both given: "
+                f"{_named(row)} and {_named(entries[0])} (line {entries[0].line}) are both given: "
                 "use one row without trace_index for the file, or one row with trace_index for "
                 "each trace, from 0",
                 line=line,
@@ -200,20 +200,20 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
     return header
 
 
-def _edits(one: str, other: str) -> int:
+def _edits(first: str, second: str) -> int:
     """Return how many letters must be put in, taken out or replaced to make one text the other."""
-    before = list(range(len(other) + 1))
-    for i, a in enumerate(one, 1):
+    before = list(range(len(second) + 1))
+    for i, a in enumerate(first, 1):
         row = [i]
-        for j, b in enumerate(other):
+        for j, b in enumerate(second):
             row.append(min(row[j] + 1, before[j + 1] + 1, before[j] + (a != b)))
         before = row
     return before[-1]
 
 
-def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
+def _row(table: Path, fields: Mapping[str, str], line: int) -> TraceMetadata:
     def text(name: str) -> str:
-        return stated.get(name, "")
+        return fields.get(name, "")
 
     for name in NAMES:
         try:

@@ -27,7 +27,7 @@ MOST_SAMPLES = 20_000_000
 
 LARGEST_PGA_G = 1e100
 
-STATED = {
+PROCESSING_WORDS = {
     "corrected": True,
     "baseline corrected": True,
     "v2 corrected": True,
@@ -82,8 +82,8 @@ DEFAULT_HIGH_PASS = HighPass()
 def says_corrected(words: str) -> bool | None:
     """Return whether a record is corrected by what is said of its processing; None for nothing.
 
-    The leading word or phrase of :data:`STATED` decides; case, hyphens and what stands in brackets
-    do not matter, and what follows is a remark.
+    The leading word or phrase of :data:`PROCESSING_WORDS` decides; case, hyphens and text in
+    brackets do not matter, and further text is a remark.
 
     Raises:
         InputError: it begins with another word.
@@ -95,16 +95,16 @@ def says_corrected(words: str) -> bool | None:
         raise InputError(
             f"processing {words[:60]!r}: volume 3 has spectra: use the record of volume 2"
         )
-    for phrase, corrected in STATED.items():
+    for phrase, corrected in PROCESSING_WORDS.items():
         if leading.startswith(phrase) and not leading[len(phrase) :][:1].isalnum():
             return corrected
     raise InputError(
-        f"processing {words[:60]!r} must begin with one of {', '.join(STATED)}; further text is a "
-        "comment"
+        f"processing {words[:60]!r} must begin with one of {', '.join(PROCESSING_WORDS)}; "
+        "further text is a comment"
     )
 
 
-def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str = "") -> bool:
+def counts_as_uncorrected(motion: GroundMotion, by_metadata: str = "", confirmed: str = "") -> bool:
     """Return whether a record is to be processed before it is integrated.
 
     Where nothing is stated, the file decides: its header, or its format where that holds
@@ -113,17 +113,17 @@ def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str
 
     Args:
         motion: as its file has it.
-        stated: what a metadata table says of its processing, as :func:`says_corrected` reads it.
+        by_metadata: processing by a metadata table, as :func:`says_corrected` reads it.
         confirmed: what the caller says of it, who may say otherwise than the file.
 
     Raises:
         InputError: what is stated is none of the words, or contradicts the file or the caller.
     """
-    by_table, by_caller = says_corrected(stated), says_corrected(confirmed)
+    by_table, by_caller = says_corrected(by_metadata), says_corrected(confirmed)
     if by_table is not None and by_caller is not None and by_table != by_caller:
         raise InputError(
-            f"the metadata have processing {stated[:60]!r}, but processing = {confirmed[:60]!r} "
-            "is given: correct one of them",
+            f"the metadata have processing {by_metadata[:60]!r}, but processing = "
+            f"{confirmed[:60]!r} is given: correct one of them",
             fields=("processing",),
         )
     corrected = by_caller if by_table is None else by_table
@@ -133,7 +133,7 @@ def counts_as_uncorrected(motion: GroundMotion, stated: str = "", confirmed: str
         format_says = "corrected" if motion.is_corrected else "uncorrected"
         raise InputError(
             f"by its header or format the record is {format_says}, but the metadata have "
-            f"{stated[:60]!r}: correct the metadata, or confirm it with processing",
+            f"{by_metadata[:60]!r}: correct the metadata, or confirm it with processing",
             fields=("processing",),
         )
     return not corrected

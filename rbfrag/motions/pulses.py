@@ -53,13 +53,15 @@ def _sine_lobe(duration_s: float, dt_s: float) -> tuple[NDArray[np.float64], flo
     return np.concatenate([rising, [1.0], rising[::-1]]), interval
 
 
-def _finite(what: str, value: float) -> float:
+def _finite(description: str, value: float) -> float:
     if not math.isfinite(value):
-        raise InputError(f"the {what} of a pulse must be a finite number, not {value}")
+        raise InputError(f"the {description} of a pulse must be a finite number, not {value}")
     return float(value)
 
 
-def _positive(what: str, value: float) -> float:
+def _positive(description: str, value: float) -> float:
     if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"the {what} of a pulse must be a positive number of seconds, not {value}")
+        raise InputError(
+            f"the {description} of a pulse must be a positive number of seconds, not {value}"
+        )
     return float(value)

@@ -147,10 +147,10 @@ def _check_stated(
 ) -> None:
     if units is not None:
         acceleration_unit(units)
-    for each in gain.values() if isinstance(gain, Mapping) else [gain]:
-        if each is not None and not 0.0 < each < math.inf:
+    for value in gain.values() if isinstance(gain, Mapping) else [gain]:
+        if value is not None and not 0.0 < value < math.inf:
             raise InputError(
-                f"gain must be a positive number of counts/(m/s2), not {each:g}", fields=("gain",)
+                f"gain must be a positive number of counts/(m/s2), not {value:g}", fields=("gain",)
             )
     if dt_s is not None and not 0.0 < dt_s < float("inf"):
         raise InputError(
@@ -159,7 +159,7 @@ def _check_stated(
 
 
 def _read_whole(record: RecordFile) -> list[GroundMotion]:
-    text, whole = record.text, replace(record, allow_partial=False)
+    text, complete = record.text, replace(record, allow_partial=False)
     motions: list[GroundMotion]
     try:
         if word := cut_number(text):
@@ -169,7 +169,7 @@ def _read_whole(record: RecordFile) -> list[GroundMotion]:
                 line=text.count("\n") + 1,
                 fields=("allow_partial",),
             )
-        motions = _read(whole)
+        motions = _read(complete)
     except UnknownFormatError:
         raise
     except MotionFileError:
@@ -270,7 +270,7 @@ def read_motion(
         name, index = stem, int(tail)
     if is_archive(file := Path(name)):
         members = members_of(file)
-        listed = ", ".join(str(each.relative_to(file.parent)) for each in members[:5])
+        listed = ", ".join(str(member.relative_to(file.parent)) for member in members[:5])
         raise MotionFileError(
             file, f"the zip archive has {len(members)} records: give one, such as {listed}"
         )
@@ -284,22 +284,22 @@ def read_motion(
     raise MotionFileError(name, f"the file {trouble}: give one of  {listed}, for example {name}#0")
 
 
-def as_motion(given: MotionLike, name: str = "motion") -> GroundMotion:
+def as_motion(motion: MotionLike, name: str = "motion") -> GroundMotion:
     """Return a motion that an argument gives, reading it where a file is named.
 
     Args:
-        given: a motion, or a file of one as for :func:`read_motion`.
+        motion: a motion, or a file of one as for :func:`read_motion`.
         name: of the argument, for the message.
 
     Raises:
         InputError: something else; the list of :func:`read_motions` is of several motions.
     """
-    if isinstance(given, GroundMotion):
-        return given
-    if isinstance(given, str | os.PathLike):
-        return read_motion(given)
+    if isinstance(motion, GroundMotion):
+        return motion
+    if isinstance(motion, str | os.PathLike):
+        return read_motion(motion)
     raise InputError(
-        f"{name} is of type {type(given).__name__}: give a GroundMotion, or the path of a file "
+        f"{name} is of type {type(motion).__name__}: give a GroundMotion, or the path of a file "
         "(rbfrag.read_motions returns a list, with one motion for each trace)"
     )
 

@@ -27,7 +27,9 @@ ComplexArray = NDArray[np.complex128]
 DAMPING = 0.05
 """Damping ratio ζ of the spectral accelerations."""
 
-_STORED = {each.period_s: name for name, each in MEASURES.items() if each.period_s is not None}
+_STORED = {
+    measure.period_s: name for name, measure in MEASURES.items() if measure.period_s is not None
+}
 PERIODS_S: Mapping[str, float] = {_STORED[period_s]: period_s for period_s in sorted(_STORED)}
 """Period [s] of each spectral acceleration that is stored, by its name."""
 

@@ -123,11 +123,11 @@ def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatAr
     rows: Iterable[tuple[FloatArray, ...]] = (
         zip(*_weights(h[:1], p[:, None]), strict=True) if equal else (_weights(h, p_) for p_ in p)
     )
-    for i, (each, weights) in enumerate(zip(p.tolist(), rows, strict=True)):
+    for i, (frequency, weights) in enumerate(zip(p.tolist(), rows, strict=True)):
         _fill_remaining(remaining, a, weights, diagonals)
-        np.multiply(remaining, each, out=excess)
+        np.multiply(remaining, frequency, out=excess)
         excess -= a  # H' = p H − a
-        greatest[i] = _greatest(a, h, each, remaining, excess)
+        greatest[i] = _greatest(a, h, frequency, remaining, excess)
     return greatest
 
 

@@ -62,9 +62,9 @@ def acceleration_unit(text: str) -> str:
     try:
         return _SPELLINGS[key]
     except KeyError:
-        known = ", ".join(ACCELERATION_UNITS)
+        accepted = ", ".join(ACCELERATION_UNITS)
         raise InputError(
-            f"unknown unit of acceleration {text!r}: use one of {known} (gal is cm/s2)"
+            f"unknown unit of acceleration {text!r}: use one of {accepted} (gal is cm/s2)"
         ) from None
 
 

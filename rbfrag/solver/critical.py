@@ -98,52 +98,52 @@ def critical(
         "scan_ratio": scan_ratio,
         "bracket": bracket,
     }
-    given = {name: value for name, value in question.items() if value is not None}
-    model = kind_of(kind, given)
-    if model.searchable and "block" in given and "beta_deg" in given:
-        judged_at_rest(given)
+    options = {name: value for name, value in question.items() if value is not None}
+    model = kind_of(kind, options)
+    if model.searchable and "block" in options and "beta_deg" in options:
+        judged_at_rest(options)
     ground = as_motion(motion)
     answer = model.critical(
         ground,
         vertical=None if vertical is None else as_motion(vertical, "vertical"),
         polarity=polarity,
         search_limit=search_limit,
-        **given,
+        **options,
     )
     return replace(answer, motion=ground.label)
 
 
-def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:
+def kind_of(kind: str | None, options: Mapping[str, Any]) -> Kind:
     """Return the model of a search, by name or by what is given."""
     if kind is not None:
         return model_of_kind(kind)
-    if "p2" in given:
+    if "p2" in options:
         return model_of_mode("topple")
-    if "block" not in given:
-        if "displacement_m" in given:
+    if "block" not in options:
+        if "displacement_m" in options:
             return model_of_mode("slide")
         raise InputError("give p2, or displacement_m, or a block with beta_deg and phi_deg")
     for name in ("beta_deg", "phi_deg"):
-        if name not in given:
+        if name not in options:
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
-    judged = judged_at_rest(given)
+    judged = judged_at_rest(options)
     return model_of_mode(judged.mode)
 
 
-def judged_at_rest(given: Mapping[str, Any]) -> Stability:
+def judged_at_rest(options: Mapping[str, Any]) -> Stability:
     """Return the stability of a block with its dip, or refuse one that no earthquake decides about.
 
     Without a friction angle it is one that topples.
     """
-    block = given["block"]
+    block = options["block"]
     judged = stability(
         block,
-        beta_deg=given["beta_deg"],
-        phi_deg=given.get("phi_deg", rough_deg(block)),
-        phi_back_deg=given.get("phi_back_deg"),
-        water_m=given.get("water_m") or 0.0,
-        drainage=given.get("drainage"),
-        density_kg_m3=given.get("density_kg_m3"),
+        beta_deg=options["beta_deg"],
+        phi_deg=options.get("phi_deg", rough_deg(block)),
+        phi_back_deg=options.get("phi_back_deg"),
+        water_m=options.get("water_m") or 0.0,
+        drainage=options.get("drainage"),
+        density_kg_m3=options.get("density_kg_m3"),
     )
     refuse_undecided(judged)
     return judged

@@ -79,8 +79,8 @@ class Excitation:
     def q(self) -> FloatArray:
         """k_h/(1 + k_v): a block lifts when it exceeds k_r. Zero from a jump on."""
         q = np.zeros_like(self.k_h)
-        usable = slice(0, self.jump_node)
-        q[usable] = self.k_h[usable] / self.w[usable]
+        before_jump = slice(0, self.jump_node)
+        q[before_jump] = self.k_h[before_jump] / self.w[before_jump]
         return q
 
     @cached_property

@@ -148,7 +148,7 @@ class FreeMotion:
     by_other_laws: Callable[[], tuple[_Path, ...]]
 
     @cached_property
-    def _others(self) -> tuple[_Path, ...]:
+    def _alternatives(self) -> tuple[_Path, ...]:
         """The runs by other laws, which take as long as the motion itself has taken."""
         return self.by_other_laws()
 
@@ -156,16 +156,16 @@ class FreeMotion:
     def error(self) -> FreeError | None:
         """Error of the steps plus the spread of the laws of impact; None where they disagree on
         whether the block fails."""
-        if any(other.fails != self.coarse.fails for other in self._others):
+        if any(other.fails != self.coarse.fails for other in self._alternatives):
             return None
         # compared with the coarse run: what laws differ by needs no finer steps
-        of_laws = map(max, *(self.coarse.beside(other) for other in self._others))
+        of_laws = map(max, *(self.coarse.beside(other) for other in self._alternatives))
         return FreeError(*(a + b for a, b in zip(self.step_error, of_laws, strict=True)))
 
     @cached_property
     def by_law(self) -> tuple[Pose, ...]:
         """Where the coarse run and those by other laws rest; () where not all of them do."""
-        paths = (self.coarse, *self._others)
+        paths = (self.coarse, *self._alternatives)
         if any(path.run.stop != AT_REST for path in paths):
             return ()
         return tuple(_pose(self.block, path.run.motion, self.contact) for path in paths)
@@ -329,9 +329,9 @@ def _run(
 
 
 def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
-    here = corner_at((at.x, at.y), at.turned, contact)
+    contact_now = corner_at((at.x, at.y), at.turned, contact)
     start = contact[0] - block.heel[0]
-    return Pose(at.turned, (at.x, at.y), here[0] - start)
+    return Pose(at.turned, (at.x, at.y), contact_now[0] - start)
 
 
 def _extremes_and_end(begin: float, values: FloatArray, end: float) -> tuple[float, float, float]:
@@ -400,11 +400,11 @@ def released(time_s: float, pose: Callable[[float], Pose], position: float, rate
         time_s: when [s].
         pose: where the block is at a position of the mechanism.
     """
-    here = pose(position)
+    at_release = pose(position)
     if rate == 0.0:
-        return Release(time_s, here)
+        return Release(time_s, at_release)
     # by central differences of the poses, whose error is of second order in the time between
     half = 0.5 * _MOMENT_S * rate
     before, after = pose(position - half), pose(position + half)
     vx, vy = ((b - a) / _MOMENT_S for a, b in zip(before.centroid_m, after.centroid_m, strict=True))
-    return Release(time_s, here, (vx, vy), (after.turned_rad - before.turned_rad) / _MOMENT_S)
+    return Release(time_s, at_release, (vx, vy), (after.turned_rad - before.turned_rad) / _MOMENT_S)

@@ -173,9 +173,9 @@ class Kind(KindSpec):
         why = f": {self.no_search}" if self.no_search else ""
         raise InputError(f"no critical values of kind {self.kind} are computed{why}")
 
-    def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
+    def refuse_foreign(self, options: Iterable[str], allowed: Sequence[str]) -> None:
         """Refuse an option that is not among the kind's own."""
-        foreign = sorted(set(given) - set(own))
+        foreign = sorted(set(options) - set(allowed))
         if foreign:
-            remedy = f"its options are {' and '.join(own)}" if own else "omit it"
+            remedy = f"its options are {' and '.join(allowed)}" if allowed else "omit it"
             raise InputError(f"{foreign[0]} cannot be combined with {self.kind}: {remedy}")

@@ -55,11 +55,11 @@ class MechanismKind(Kind):
         """
         mechanism = self._without_cohesion(supported_block)
         excited = shaking.excitation
-        whole = simulate_block(
+        simulation = simulate_block(
             mechanism, supported_block, excited, history=shaking.history, start=shaking.start,
             stepwise=shaking.stepwise,
         )  # fmt: skip
-        return response_of(self.kind, whole, shaking)
+        return response_of(self.kind, simulation, shaking)
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
         """Return a function that says how the block ends under an excitation."""

@@ -98,10 +98,10 @@ def respond(
             another model, components that cannot be brought together, a start of a block that
             carries none.
     """
-    known = {name for facts in KINDS.values() for name in facts.settings}
+    accepted = {name for facts in KINDS.values() for name in facts.settings}
     joint = {name: of_kind.pop(name) for name in JOINT if name in of_kind}
     for name in of_kind:
-        if name not in known:
+        if name not in accepted:
             raise TypeError(f"respond() got an unexpected keyword argument {name!r}")
     settings = {
         "two_way": two_way or None,
@@ -145,7 +145,7 @@ def respond(
             model = model_of_mode(judged.mode, back_fracture=back_fracture)
         else:
             model = model_of_kind(kind)
-        supported_block = _site(block, judged, model, _known(model, settings))
+        supported_block = _site(block, judged, model, _model_settings(model, settings))
         if phi_deg is None:
             supported_block = replace(supported_block, phi_rad=0.5 * math.pi)
         remarks = (*after, *_remarks(judged, model))
@@ -170,35 +170,35 @@ def known_by_numbers(
     Raises:
         InputError: a block given in no way or in two, or an option of another model.
     """
-    given = {name: value for name, value in numbers.items() if value is not None}
-    if "ky" in given:
-        if "p2" in given or "kr" in given:
+    inputs = {name: value for name, value in numbers.items() if value is not None}
+    if "ky" in inputs:
+        if "p2" in inputs or "kr" in inputs:
             raise InputError(
                 "ky is for sliding, p2 and kr for toppling: give one or the other",
                 fields=("ky", "p2", "kr"),
             )
-        if extra := [name for name in given if name not in ("ky", "beta_deg")]:
+        if extra := [name for name in inputs if name not in ("ky", "beta_deg")]:
             raise InputError(
                 f"{extra[0]} cannot be combined with ky: it follows from ky and beta_deg",
                 fields=(extra[0], "ky", "beta_deg"),
             )
         model = _by_numbers(kind, "slide", ("ky",))
-        beta_deg = given.get("beta_deg", 0.0)
-        return model, _sliding_site(given["ky"], beta_deg, _known(model, settings))
+        beta_deg = inputs.get("beta_deg", 0.0)
+        return model, _sliding_site(inputs["ky"], beta_deg, _model_settings(model, settings))
     for name in ("p2", "kr"):
-        if name not in given:
+        if name not in inputs:
             raise InputError(
                 f"{name} is missing: give p2 and kr, or ky, or the geometry of a block with "
                 "beta_deg and phi_deg",
                 fields=("p2", "kr", "ky", "beta_deg", "phi_deg"),
             )
-    if extra := [name for name in given if name not in ("p2", "kr")]:
+    if extra := [name for name in inputs if name not in ("p2", "kr")]:
         raise InputError(
             f"{extra[0]} cannot be combined with p2 and kr, which describe the block completely",
             fields=(extra[0], "p2", "kr"),
         )
     model = _by_numbers(kind, "topple", ("p2", "kr"))
-    return model, block_of_numbers(given["p2"], given["kr"], _known(model, settings))
+    return model, block_of_numbers(inputs["p2"], inputs["kr"], _model_settings(model, settings))
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +240,8 @@ class _Shaken:
         if not (self.vertical is None or isinstance(self.vertical, list | tuple)):
             raise InputError("vertical is one motion: give a list for a list of motions")
         motions = Motions(
-            [as_motion(each) for each in self.motion],
-            [_vertical(each) for each in self.vertical or ()],
+            [as_motion(item) for item in self.motion],
+            [_vertical(item) for item in self.vertical or ()],
             self.gap_s,
         )
         return respond_in_sequence(
@@ -249,8 +249,8 @@ class _Shaken:
         )
 
 
-def _vertical(given: Any) -> GroundMotion | None:
-    return None if given is None else as_motion(given, "vertical")
+def _vertical(vertical: Any) -> GroundMotion | None:
+    return None if vertical is None else as_motion(vertical, "vertical")
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> SupportedBlock:
@@ -314,9 +314,9 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     return model
 
 
-def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
-    given = {name: value for name, value in settings.items() if value is not None}
-    unknown = sorted(set(given) - set(model.settings))
+def _model_settings(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
+    inputs = {name: value for name, value in settings.items() if value is not None}
+    unknown = sorted(set(inputs) - set(model.settings))
     if unknown:
         supported = " and ".join(model.settings)
         remedy = f"its options are {supported}" if supported else "omit it"
@@ -324,4 +324,4 @@ def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
             f"{unknown[0]} cannot be combined with kind {model.kind}: {remedy}",
             fields=(unknown[0],),
         )
-    return given
+    return inputs

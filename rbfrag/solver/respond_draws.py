@@ -151,14 +151,14 @@ def respond_draws(
         InputError: a value outside its range, standard deviations beside draws or without a
             value, a block that slides without a displacement, options of another model.
     """
-    given = {
+    inputs = {
         "p2": p2, "kr": kr, "ky": ky, "beta_deg": beta_deg, "restitution": restitution,
     }  # fmt: skip
     sigmas = {
         "p2": p2_sigma, "kr": kr_sigma, "ky": ky_sigma, "restitution": restitution_sigma,
     }  # fmt: skip
     count, generator = _checked(draws, seed)
-    drawn = _drawn(given, sigmas, weights, count, generator)
+    drawn = _drawn(inputs, sigmas, weights, count, generator)
     ways = POLARITIES if polarity == "both" else (polarity,)
     if not set(ways) <= set(POLARITIES):
         raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
@@ -172,9 +172,9 @@ def respond_draws(
     model = None
     for i in range(count):
         numbers: dict[str, Any] = {name: float(values[i]) for name, values in drawn.items()}
-        own = {**settings, "restitution": numbers.pop("restitution", None)}
+        draw_settings = {**settings, "restitution": numbers.pop("restitution", None)}
         try:
-            model, supported_block = known_by_numbers(kind, numbers, own)
+            model, supported_block = known_by_numbers(kind, numbers, draw_settings)
             if (_FAILS_BY in model.parameters) is not (limit_m is not None):
                 raise InputError(
                     f"{_FAILS_BY} is missing: a block of kind {model.kind} requires a "
@@ -232,7 +232,7 @@ def _checked(draws: object, seed: object) -> tuple[int, np.random.Generator]:
 
 
 def _drawn(
-    given: Mapping[str, ArrayLike | None],
+    inputs: Mapping[str, ArrayLike | None],
     sigmas: Mapping[str, float],
     weights: ArrayLike | None,
     count: int,
@@ -243,7 +243,7 @@ def _drawn(
     try:
         values = {
             name: np.asarray(value, dtype=np.float64)
-            for name, value in given.items()
+            for name, value in inputs.items()
             if value is not None
         }
     except (TypeError, ValueError) as error:
@@ -276,8 +276,8 @@ def _picked(
 ) -> dict[str, FloatArray]:
     """Return so many of the draws that are given, taken by their weights."""
     try:
-        stated = np.asarray(1.0 if weights is None else weights, dtype=np.float64)
-        *columns, weight = np.broadcast_arrays(*values.values(), stated)
+        raw_weights = np.asarray(1.0 if weights is None else weights, dtype=np.float64)
+        *columns, weight = np.broadcast_arrays(*values.values(), raw_weights)
     except (TypeError, ValueError) as error:
         raise InputError(f"the draws are not lists of numbers of one length: {error}") from None
     if weight.ndim != 1 or weight.size == 0:
@@ -300,8 +300,8 @@ def _fails(end: RunEnd, limit_m: float | None) -> bool:
 
 
 def _not_known(outcomes: Mapping[str, int], count: int) -> list[str]:
-    known = (Outcome.STABLE.value, Outcome.TOPPLED.value)
-    open_ended = {name: n for name, n in outcomes.items() if name not in known}
+    decided = (Outcome.STABLE.value, Outcome.TOPPLED.value)
+    open_ended = {name: n for name, n in outcomes.items() if name not in decided}
     if not open_ended:
         return []
     named = ", ".join(f"{n} {name}" for name, n in sorted(open_ended.items()))

@@ -103,9 +103,9 @@ def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> Rock
     # the array that is left for it, and what does not fit is not drawn
     rows = np.empty((4, 3 * longer.time_s.size + 5 * impacts + 50_000))
     run = simulate(longer, block, rows=rows)
-    kept = rows[:, : run.history_length]
-    motion = node_history(excited, longer, kept, toppled=run.outcome == TOPPLED)
-    return RockingHistory(motion, kept[0, kept[3] == IMPACT])
+    columns = rows[:, : run.history_length]
+    motion = node_history(excited, longer, columns, toppled=run.outcome == TOPPLED)
+    return RockingHistory(motion, columns[0, columns[3] == IMPACT])
 
 
 @dataclass(frozen=True)
@@ -144,22 +144,22 @@ def corner_force(
     along = np.zeros_like(theta)
     across = np.ones_like(theta)
     for sign, at in ((1.0, block.toe), (-1.0, block.heel)):
-        here = (side == sign) & moves
-        turned, rate = np.abs(theta[here]), history.theta_dot_rad_s[here]
-        k_h, w = sign * history.k_h[here], 1.0 + history.k_v[here]
-        left = at.theta_c - turned
+        rows = (side == sign) & moves
+        turned, rate = np.abs(theta[rows]), history.theta_dot_rad_s[rows]
+        k_h, w = sign * history.k_h[rows], 1.0 + history.k_v[rows]
+        to_balance = at.theta_c - turned
         # α - θ of the corner: the dip is a slope down for the one and up for the other
-        lean = left + sign * block.beta_rad
+        lean = to_balance + sign * block.beta_rad
         arm = block.centroid_m[0] - (block.toe_m if sign > 0.0 else 0.0)
         factor = at.p * at.p * math.hypot(arm, block.centroid_m[1]) / STANDARD_GRAVITY_M_S2
-        speeds_up = factor * (k_h * np.cos(left) - w * np.sin(left))
+        speeds_up = factor * (k_h * np.cos(to_balance) - w * np.sin(to_balance))
         inward = factor * (rate / at.p) ** 2
         tilt = sign * block.beta_rad
-        along[here] = (
+        along[rows] = (
             speeds_up * np.cos(lean) + inward * np.sin(lean)
             - (w * math.sin(tilt) + k_h * math.cos(tilt))
         )  # fmt: skip
-        across[here] = (
+        across[rows] = (
             speeds_up * np.sin(lean) - inward * np.cos(lean)
             + (w * math.cos(tilt) - k_h * math.sin(tilt))
         )  # fmt: skip

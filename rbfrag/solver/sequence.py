@@ -148,7 +148,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
     """Return the values of a whole sequence."""
     answers = [part.response for part in parts]
     outcome = max((answer.outcome for answer in answers), key=WORST_LAST.index)
-    own = (
+    of_parts = (
         with_prefix(f"motion {number}: ", text)
         for number, answer in enumerate(answers, start=1)
         for text in answer.warnings
@@ -181,7 +181,7 @@ def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
         displacement_m=math.fsum(known_slips) if len(known_slips) == len(slips) else None,
         impacts=_total([answer.impacts for answer in answers]),
         sensitive=_any([answer.sensitive for answer in answers]),
-        warnings=(*warnings, *own),
+        warnings=(*warnings, *of_parts),
         mode_changes=tuple(
             ModeChange(begun, change.motion)
             for part in parts
@@ -205,13 +205,13 @@ def _most(values: Sequence[float | None]) -> float | None:
 
 
 def _total(values: Sequence[int | None]) -> int | None:
-    known = [value for value in values if value is not None]
-    return sum(known) if known else None
+    numbers = [value for value in values if value is not None]
+    return sum(numbers) if numbers else None
 
 
 def _any(values: Sequence[bool | None]) -> bool | None:
-    known = [value for value in values if value is not None]
-    return any(known) if known else None
+    answers = [value for value in values if value is not None]
+    return any(answers) if answers else None
 
 
 def _on_clock(part: Part, time_s: float | None) -> float | None:

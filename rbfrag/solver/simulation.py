@@ -43,14 +43,14 @@ class Simulation:
         mechanism: the block as its model describes it.
         start: the state that it started from; None for its first place.
         run: what its mechanism did; None where it is followed step by step from the beginning.
-        free: what the block did after it; None where the mechanism goes to the end.
+        free_motion: what the block did after it; None where the mechanism goes to the end.
     """
 
     mechanism: Mechanism
     supported_block: SupportedBlock
     start: BlockState | None
     run: MechanismRun | None
-    free: FreeMotion | None
+    free_motion: FreeMotion | None
 
     @property
     def outcome(self) -> Outcome:
@@ -59,7 +59,7 @@ class Simulation:
 
     @property
     def _last(self) -> MechanismRun | FreeMotion:
-        last = self.run if self.free is None else self.free
+        last = self.run if self.free_motion is None else self.free_motion
         assert last is not None
         return last
 
@@ -71,39 +71,39 @@ class Simulation:
     @property
     def ending(self) -> str:
         """What happened at the end; empty where there is nothing to say."""
-        if self.free is not None:
-            return self.free.sentence
+        if self.free_motion is not None:
+            return self.free_motion.sentence
         assert self.run is not None
         return self.run.ending
 
     @property
     def started_s(self) -> float | None:
         """First motion [s]."""
-        of_free = None if self.free is None else self.free.started_s
+        of_free = None if self.free_motion is None else self.free_motion.started_s
         return of_free if self.run is None or self.run.started_s is None else self.run.started_s
 
     @property
     def ended_s(self) -> float | None:
         """Last standstill, or where the model ended [s]; None for no motion."""
-        if self.free is None:
+        if self.free_motion is None:
             assert self.run is not None
             return self.run.ended_s
         moved = self.started_s is not None or self.outcome is Outcome.JUMP
-        return self.free.time_s if moved else None
+        return self.free_motion.time_s if moved else None
 
     @property
     def peak_rad(self) -> float | None:
         """Greatest rotation [rad]; None for a block that only slides."""
         peak = self.run.peak if self.run is not None and self.mechanism.rotates else None
-        if self.free is None:
+        if self.free_motion is None:
             return peak
-        return max(peak or 0.0, self.free.backward_rad, self.free.forward_rad)
+        return max(peak or 0.0, self.free_motion.backward_rad, self.free_motion.forward_rad)
 
     @property
     def peak_displacement_m(self) -> float:
         """Greatest displacement along the base [m]."""
         slips = [self.run.peak_displacement_m] if self.run is not None else []
-        return max([*slips, self.free.slip_m] if self.free is not None else slips)
+        return max([*slips, self.free_motion.slip_m] if self.free_motion is not None else slips)
 
     @property
     def step_error(self) -> float:
@@ -111,7 +111,7 @@ class Simulation:
 
         Infinite where the error of the state that it started from is not known.
         """
-        return self._error(None if self.free is None else self.free.step_error)
+        return self._error(None if self.free_motion is None else self.free_motion.step_error)
 
     @property
     def error(self) -> float:
@@ -119,9 +119,9 @@ class Simulation:
 
         Infinite also where some of them let the block fail and others do not.
         """
-        if self.free is None:
+        if self.free_motion is None:
             return self.step_error
-        return math.inf if self.free.error is None else self._error(self.free.error)
+        return math.inf if self.free_motion.error is None else self._error(self.free_motion.error)
 
     def _error(self, of_free: FreeError | None) -> float:
         # where each law goes on from its own place, the spread of this motion has that of the last
@@ -136,8 +136,8 @@ class Simulation:
     def changes(self) -> tuple[ModeChange, ...]:
         """What the block did after its first motion."""
         changes = () if self.run is None else self.run.changes
-        free = () if self.free is None else self.free.changes
-        return (*(ModeChange(change.time_s, change.name) for change in changes), *free)
+        free_changes = () if self.free_motion is None else self.free_motion.changes
+        return (*(ModeChange(change.time_s, change.name) for change in changes), *free_changes)
 
     @property
     def final_mode(self) -> ModeName | None:
@@ -148,10 +148,10 @@ class Simulation:
         """
         if self.started_s is None:
             return None
-        free = self.free
+        motion = self.free_motion
         failed = self.outcome is Outcome.TOPPLED
         rocks_count = failed or self.mechanism.rotates
-        if free and failed and free.backward_rad > free.forward_rad:
+        if motion and failed and motion.backward_rad > motion.forward_rad:
             return "slump"
         first = () if self.run is None else (self.mechanism.first.name,)
         names = (*first, *(change.motion for change in self.changes))
@@ -165,15 +165,15 @@ class Simulation:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What the answer takes for granted, and where it ends."""
-        known = () if self.run is None else self.run.sentences
-        if self.free is None:
-            return known
+        sentences = () if self.run is None else self.run.sentences
+        if self.free_motion is None:
+            return sentences
         # the end of its mechanism is not the end of the block any more
         if self.run is not None and self.run.ending:
-            known = known[:-1]
-        if self.free.landed_s:
-            known = (*known, FALLS_ON_ITS_BASE.format(self.free.landed_s))
-        return (*known, self.free.sentence) if self.free.sentence else known
+            sentences = sentences[:-1]
+        if self.free_motion.landed_s:
+            sentences = (*sentences, FALLS_ON_ITS_BASE.format(self.free_motion.landed_s))
+        return (*sentences, self.free_motion.sentence) if self.free_motion.sentence else sentences
 
     def state(self, error: float, *, laws: bool) -> BlockState | None:
         """Return where the block is left at rest; None where it is not.
@@ -187,7 +187,11 @@ class Simulation:
             return None
         position = None
         # only the first phase can be entered at rest: what comes after it goes on step by step
-        if self.free is None and self.run is not None and self.run.phase is self.mechanism.first:
+        if (
+            self.free_motion is None
+            and self.run is not None
+            and self.run.phase is self.mechanism.first
+        ):
             position = self.run.x
         return BlockState(
             turned_rad=pose.turned_rad,
@@ -198,7 +202,7 @@ class Simulation:
             position=position,
             # in its first place it is exactly
             error=0.0 if position == 0.0 else error,
-            by_law=self.free.by_law if self.free is not None and laws else (),
+            by_law=self.free_motion.by_law if self.free_motion is not None and laws else (),
         )
 
 
@@ -250,11 +254,13 @@ def simulate_block(
             pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
         release = Release(float(excited.time_s[0]), pose)
     by_law = () if start is None or run is not None else start.by_law
-    free = free_motion(supported_block, excited, release, at_toe=mechanism.at_toe, by_law=by_law)
-    return Simulation(mechanism, supported_block, start, run, free)
+    after_release = free_motion(
+        supported_block, excited, release, at_toe=mechanism.at_toe, by_law=by_law
+    )
+    return Simulation(mechanism, supported_block, start, run, after_release)
 
 
-def end_of(whole: Simulation, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
+def end_of(simulation: Simulation, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
     """Return how a block that was followed ends, without its history.
 
     Args:
@@ -262,71 +268,71 @@ def end_of(whole: Simulation, mode: ModeName | None, about_block: tuple[str, ...
         about_block: what its model takes for granted.
     """
     # of a block that has failed a peak is only where the run was stopped
-    failed = whole.outcome is Outcome.TOPPLED
-    moved = whole.started_s is not None
+    failed = simulation.outcome is Outcome.TOPPLED
+    moved = simulation.started_s is not None
     return RunEnd(
-        outcome=whole.outcome,
+        outcome=simulation.outcome,
         moved=moved,
-        peak_rad=None if failed else whole.peak_rad,
-        peak_displacement_m=None if failed else whole.peak_displacement_m,
-        error=whole.step_error,
-        final_mode=(whole.final_mode or mode) if moved else None,
+        peak_rad=None if failed else simulation.peak_rad,
+        peak_displacement_m=None if failed else simulation.peak_displacement_m,
+        error=simulation.step_error,
+        final_mode=(simulation.final_mode or mode) if moved else None,
         about_block=about_block,
     )
 
 
-def response_of(kind: str, whole: Simulation, shaking: Shaking) -> Response:
+def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response:
     """Return the answer about a block that was followed.
 
     Args:
         kind: name of its model.
     """
     excited = shaking.excitation
-    failed = whole.outcome is Outcome.TOPPLED
-    peak_rad = None if failed else whole.peak_rad
-    critical = whole.mechanism.critical
-    first = whole.mechanism.first.pose(0.0)
-    before_m = 0.0 if whole.start is None else whole.start.displacement_m
-    at_end = None if failed else whole.pose
-    run = whole.run
+    failed = simulation.outcome is Outcome.TOPPLED
+    peak_rad = None if failed else simulation.peak_rad
+    critical = simulation.mechanism.critical
+    first = simulation.mechanism.first.pose(0.0)
+    before_m = 0.0 if simulation.start is None else simulation.start.displacement_m
+    at_end = None if failed else simulation.pose
+    run = simulation.run
     certain_s = None if run is None else run.certain_s
     steps, moved = (0, 0) if run is None else (run.steps, run.samples_moved)
-    if whole.free is not None:
-        steps += whole.free.steps
-        moved += _samples(excited, whole)
-    error = whole.error if shaking.laws else whole.step_error
-    sentences = whole.sentences
+    if simulation.free_motion is not None:
+        steps += simulation.free_motion.steps
+        moved += _samples(excited, simulation)
+    error = simulation.error if shaking.laws else simulation.step_error
+    sentences = simulation.sentences
     if error == math.inf:
         sentences = (*sentences, FAILS_BY_SOME_LAWS)
     return Response(
         kind=kind,
-        outcome=whole.outcome,
+        outcome=simulation.outcome,
         peak_theta_n=None if peak_rad is None or not critical else peak_rad / critical,
         peak_theta_rad=peak_rad,
         critical_angle_deg=None if critical is None else math.degrees(critical),
-        started_s=whole.started_s,
-        toppled_s=(certain_s or whole.ended_s) if failed else None,
+        started_s=simulation.started_s,
+        toppled_s=(certain_s or simulation.ended_s) if failed else None,
         error_estimate=finite_or_none(error),
         steps=steps,
         samples_moved=moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
         warnings=(*shaking.warnings, *(Diagnostic(text, "model_limits") for text in sentences)),
-        history=_history(whole, excited) if shaking.history else None,
+        history=_history(simulation, excited) if shaking.history else None,
         final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
         displacement_m=at_end.displacement_m - before_m if at_end else None,
-        peak_displacement_m=None if failed else whole.peak_displacement_m,
+        peak_displacement_m=None if failed else simulation.peak_displacement_m,
         centroid_displacement_m=math.dist(at_end.centroid_m, first.centroid_m) if at_end else None,
-        stopped_s=whole.ended_s,
-        mode_changes=whole.changes,
-        final_mode=whole.final_mode,
-        state=whole.state(error, laws=shaking.laws),
+        stopped_s=simulation.ended_s,
+        mode_changes=simulation.changes,
+        final_mode=simulation.final_mode,
+        state=simulation.state(error, laws=shaking.laws),
     )
 
 
-def _samples(excited: Excitation, whole: Simulation) -> int:
+def _samples(excited: Excitation, simulation: Simulation) -> int:
     """Return the sample intervals through which a block was followed step by step."""
-    assert whole.free is not None
-    history = whole.free.history
+    assert simulation.free_motion is not None
+    history = simulation.free_motion.history
     moving = history.time_s[(history.rate_rad_s != 0.0) | (history.slip_m_s != 0.0)]
     return int(np.unique(np.searchsorted(excited.time_s, moving)).size)
 
@@ -344,14 +350,14 @@ def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> Kinematics:
     )
 
 
-def _history(whole: Simulation, excited: Excitation) -> ResponseHistory:
+def _history(simulation: Simulation, excited: Excitation) -> ResponseHistory:
     """Put the nodes of rest, which the kernels skip, back between those of motion."""
-    mechanism = whole.mechanism
+    mechanism = simulation.mechanism
     parts = []
-    if whole.run is not None and whole.run.history is not None:
-        parts.append(_of_mechanism(mechanism, whole.run.history))
-    if whole.free is not None:
-        parts.append(whole.free.history)
+    if simulation.run is not None and simulation.run.history is not None:
+        parts.append(_of_mechanism(mechanism, simulation.run.history))
+    if simulation.free_motion is not None:
+        parts.append(simulation.free_motion.history)
     trajectory = Kinematics(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     time_s = trajectory.time_s
     rest = _nodes_of_rest(trajectory, excited)
@@ -363,8 +369,8 @@ def _history(whole: Simulation, excited: Excitation) -> ResponseHistory:
         """Return values at all times: at rest those of the motion before, or of the first place."""
         resting = np.full((rest.size, *moving.shape[1:]), before, dtype=np.float64)
         if moving.size:
-            known = last >= 0 if moving.ndim == 1 else (last >= 0)[:, None]
-            resting = np.where(known, moving[np.maximum(last, 0)], resting)
+            has_begun = last >= 0 if moving.ndim == 1 else (last >= 0)[:, None]
+            resting = np.where(has_begun, moving[np.maximum(last, 0)], resting)
         together: FloatArray = np.concatenate([moving, resting])[order]
         return together
 
@@ -372,7 +378,7 @@ def _history(whole: Simulation, excited: Excitation) -> ResponseHistory:
         np.concatenate([values, np.zeros(rest.size)])[order]
         for values in (trajectory.rate_rad_s, trajectory.slip_m_s)
     )
-    at_start, strength = _at_start(whole)
+    at_start, strength = _at_start(simulation)
     k_h, k_v = _accelerations(excited, at_s)
     turned = merged(trajectory.turned_rad, at_start.turned_rad)
     return ResponseHistory(
@@ -401,9 +407,9 @@ def _nodes_of_rest(trajectory: Kinematics, excited: Excitation) -> FloatArray:
     return nodes_s[~np.isin(nodes_s, time_s)]
 
 
-def _at_start(whole: Simulation) -> tuple[Pose, float]:
+def _at_start(simulation: Simulation) -> tuple[Pose, float]:
     """Return where the motion finds the block, and its strength there; NaN if it is not known."""
-    state, first = whole.start, whole.mechanism.first
+    state, first = simulation.start, simulation.mechanism.first
     if state is None:
         return first.pose(0.0), first.forward.threshold(0.0)
     strength = math.nan if state.position is None else first.forward.threshold(state.position)

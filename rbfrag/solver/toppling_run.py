@@ -60,12 +60,12 @@ def respond(
     run = simulate(excited, p2=p2, kr=kr)
     outcome = outcome_of(run)
     theta_c = math.atan(kr)
-    known = math.isfinite(run.peak_rad)
+    has_peak = math.isfinite(run.peak_rad)
     return Response(
         kind=kind,
         outcome=outcome,
-        peak_theta_n=run.peak_rad / theta_c if known else None,
-        peak_theta_rad=run.peak_rad if known else None,
+        peak_theta_n=run.peak_rad / theta_c if has_peak else None,
+        peak_theta_rad=run.peak_rad if has_peak else None,
         critical_angle_deg=math.degrees(theta_c),
         started_s=finite_or_none(run.started_s),
         toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
@@ -118,8 +118,8 @@ def history_of(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     # nodes, and at most a start, a peak and an impact twice in an interval
     rows = np.empty((4, 7 * longer.time_s.size + 8))
     run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, np.empty(9)))
-    kept = rows[:, : run.history_length]
-    return node_history(excited, longer, kept, toppled=run.outcome == TOPPLED)
+    columns = rows[:, : run.history_length]
+    return node_history(excited, longer, columns, toppled=run.outcome == TOPPLED)
 
 
 def _warnings(

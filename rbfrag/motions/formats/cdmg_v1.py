@@ -120,22 +120,22 @@ def _series(
 
     The unit must agree with what the text lines say, where they say it.
     """
-    here = range(at, at + 1)
-    points = file.find(here, _SERIES, "number of points")
+    lines = range(at, at + 1)
+    points = file.find(lines, _SERIES, "number of points")
     if file.count(points, "number of points").number != count.number:
         raise file.error(
             f"{points.text} points follow by this line, but {count.number:.12g} by line "
             f"{count.line}: export the record again",
             points.line,
         )
-    rate = file.optional(here, _RATE)
+    rate = file.optional(lines, _RATE)
     if rate is None:
-        dt = file.dt(file.find(here, _INTERVAL, "sampling interval"))
+        dt = file.dt(file.find(lines, _INTERVAL, "sampling interval"))
     else:
         dt = file.possible_dt(1.0 / file.positive(rate, "number of points a second"), rate.line)
-    unit = file.optional(here, _SERIES_UNIT) or above
+    unit = file.optional(lines, _SERIES_UNIT) or above
     if unit is None:
-        unit = file.find(here, _SERIES_UNIT, "unit of acceleration")
+        unit = file.find(lines, _SERIES_UNIT, "unit of acceleration")
     if above is not None and _spelling(above) != _spelling(unit):
         raise file.error(
             f"the samples are in {unit.text} by this line, but in {above.text} by line "

@@ -43,23 +43,23 @@ recognises = _BLOCK.match
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     """Yield the accelerations of a COSMOS file in their order."""
-    others: list[str] = []
+    quantities: list[str] = []
     spans = file.blocks(_BLOCK)
     for span in spans:
         series = file.find(span, _SERIES, "line '... acceleration pts, ...'")
         quantity = _POINTS.search(series.text)
         if quantity and not quantity[2].lower().startswith("accel"):
-            others.append(quantity[2])
+            quantities.append(quantity[2])
         else:
             yield _trace(file, span, series)
-    if len(others) == len(spans):
-        raise file.error(f"the file has {', '.join(others)}: the acceleration is required")
+    if len(quantities) == len(spans):
+        raise file.error(f"the file has {', '.join(quantities)}: the acceleration is required")
 
 
 def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
-    here = range(series.line - 1, series.line)
-    count = file.count(file.find(here, _POINTS, "number of points"), "number of points")
-    unit = file.find(here, _UNIT, "unit of acceleration")
+    lines = range(series.line - 1, series.line)
+    count = file.count(file.find(lines, _POINTS, "number of points"), "number of points")
+    unit = file.find(lines, _UNIT, "unit of acceleration")
     header = range(span.start, series.line - 1)
     dt = file.possible_dt(*_interval(file, header))
     ends = (at for at in span if at >= series.line and _END.match(file.lines[at]))
@@ -84,7 +84,7 @@ def _trace(file: RecordFile, span: range, series: HeaderField) -> ParsedTrace:
         start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
         remarks=file.location(header),
-        durations=(file.optional(here, _SECONDS),),
+        durations=(file.optional(lines, _SECONDS),),
         peak=peak_of(file.optional(header, _PEAK)),
     )
 
@@ -95,13 +95,17 @@ def _interval(file: RecordFile, header: range) -> tuple[float, int]:
     per_line, width = _layout(file, reals)
     row, place = divmod(DT_MS_VALUE - 1, per_line)
     at = reals.line + row
-    what = f"real-header value {DT_MS_VALUE}, the sampling interval in ms"
+    description = f"real-header value {DT_MS_VALUE}, the sampling interval in ms"
     if at >= header.stop:
-        raise file.error(f"the header ends before {what}: export the record again", reals.line)
+        raise file.error(
+            f"the header ends before {description}: export the record again", reals.line
+        )
     shown = file.lines[at][place * width : (place + 1) * width].strip()
-    milliseconds = finite_number(file.path, shown, at + 1, what)
+    milliseconds = finite_number(file.path, shown, at + 1, description)
     if milliseconds <= 0.0:
-        raise file.error(f"{what} is {shown}, that is, unknown: the record is not usable", at + 1)
+        raise file.error(
+            f"{description} is {shown}, that is, unknown: the record is not usable", at + 1
+        )
     return milliseconds / 1000.0, at + 1
 
 

@@ -65,9 +65,9 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...]) -> ParsedTrace:
     points = file.find(span, _POINTS, f"line 'points of accel data' in {name}")
     count = file.count(points, "number of points", name)
-    here = range(points.line - 1, points.line)
-    dt = file.dt(file.find(here, _INTERVAL, "sampling interval"))
-    unit = file.find(here, _UNIT, "unit of acceleration")
+    lines = range(points.line - 1, points.line)
+    dt = file.dt(file.find(lines, _INTERVAL, "sampling interval"))
+    unit = file.find(lines, _UNIT, "unit of acceleration")
     layout = field_layout(file.lines[points.line - 1]) or LAYOUT
     if not file.allow_partial and not any(file.lines[at].startswith(END) for at in span):
         raise file.error(

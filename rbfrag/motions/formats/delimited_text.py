@@ -254,18 +254,18 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
 def _stated_unit(file: RecordFile, header: Header) -> HeaderField | None:
     """The unit of acceleration that the header states, once or alike several times."""
     _check_columns(file, header)
-    stated = [HeaderField(spelling, number) for number, spelling in _spellings(header)]
-    known = [field for field in stated if _is_unit(field.text)]
-    for field in known[1:]:
-        if acceleration_unit(field.text) != acceleration_unit(known[0].text):
+    candidates = [HeaderField(spelling, number) for number, spelling in _spellings(header)]
+    units = [field for field in candidates if _is_unit(field.text)]
+    for field in units[1:]:
+        if acceleration_unit(field.text) != acceleration_unit(units[0].text):
             raise file.error(
-                f"the header has {field.text} here, but {known[0].text} on line {known[0].line}: "
+                f"the header has {field.text} here, but {units[0].text} on line {units[0].line}: "
                 "correct it",
                 field.line,
             )
-    if not stated:
+    if not candidates:
         file.require_units()
-    return next(iter(known or stated), None)
+    return next(iter(units or candidates), None)
 
 
 def _spellings(header: Header) -> Iterator[tuple[int, str]]:

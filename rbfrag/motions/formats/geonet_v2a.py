@@ -48,8 +48,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 def _component(file: RecordFile, span: range, name: str) -> ParsedTrace:
     header = range(span.start, min(span.start + TEXT_LINES, span.stop))
 
-    def field(pattern: re.Pattern[str], what: str) -> HeaderField:
-        return file.find(header, pattern, f"{what} of {name}")
+    def field(pattern: re.Pattern[str], description: str) -> HeaderField:
+        return file.find(header, pattern, f"{description} of {name}")
 
     recording = field(_BLOCK, "accelerogram name").text
     station = field(_SITE, "site").text

@@ -44,9 +44,9 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
         raise _damaged(file, error) from None
     # libmseed only warns where the last sample is not the one that its record states
     warnings = pymseed.get_error_messages()
-    if any("integrity" in each for each in warnings):
+    if any("integrity" in item for item in warnings):
         raise _damaged(file, warnings[0])
-    channels = [(each.sourceid, list(each)) for each in traces]
+    channels = [(item.sourceid, list(item)) for item in traces]
     if not channels:
         raise file.error("the file has no samples: request the record again")
     start = min(segments[0].starttime_str() for _, segments in channels)

@@ -96,8 +96,8 @@ def _labels(motion: GroundMotion) -> dict[str, object]:
     labels: dict[str, object] = {name: getattr(motion, name) for name in _LABELS}
     labels["start_time"] = None if motion.start_time is None else motion.start_time.isoformat()
     labels["remarks"] = list(motion.remarks)
-    kept = {name: value for name, value in labels.items() if value not in (None, "", [])}
-    return {**kept, "dt_s": motion.dt_s, "npts": motion.npts, "samples_sha256": motion.sha256}
+    present = {name: value for name, value in labels.items() if value not in (None, "", [])}
+    return {**present, "dt_s": motion.dt_s, "npts": motion.npts, "samples_sha256": motion.sha256}
 
 
 def _motion(file: RecordFile, span: range) -> ParsedTrace:
@@ -144,16 +144,16 @@ def _header(file: RecordFile, span: range) -> dict[str, Any]:
             value = json.loads(written)
         except (ValueError, RecursionError):
             value = None
-        usable = _usable(name, value)
-        if usable is None:
+        label = _valid_label(name, value)
+        if label is None:
             raise file.error(
                 f"{name} {written.strip()[:40]!r} cannot be used: export the motion again", at + 1
             )
-        fields[name] = usable
+        fields[name] = label
     return fields
 
 
-def _usable(name: str, value: object) -> Any:
+def _valid_label(name: str, value: object) -> Any:
     """The value of a label, or None where it is none."""
     if not isinstance(value, _KINDS[name]) or isinstance(value, bool) is not (
         _KINDS[name] == (bool,)

@@ -74,7 +74,7 @@ def _unit(file: RecordFile, header: range) -> HeaderField | None:
             continue
         if other := _OTHER.search(line):
             raise _no_acceleration(file, other[0], at + 1)
-        words = [one or two for one, two in _UNIT.findall(line)]
+        words = [bracketed or plain for bracketed, plain in _UNIT.findall(line)]
         fields += [HeaderField(word, at + 1) for word in words if word not in {"", "s", "sec"}]
     for field in fields:
         try:
@@ -90,9 +90,9 @@ def _unit(file: RecordFile, header: range) -> HeaderField | None:
     return next(iter(fields), None)
 
 
-def _no_acceleration(file: RecordFile, what: str, line: int) -> Exception:
+def _no_acceleration(file: RecordFile, quantity: str, line: int) -> Exception:
     return file.error(
-        f"the columns hold {what}, no acceleration: take the .acc.bbp file of the same station, or "
-        "correct the header",
+        f"the columns hold {quantity}, no acceleration: take the .acc.bbp file of the same station, "
+        "or correct the header",
         line,
     )

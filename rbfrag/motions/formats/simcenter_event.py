@@ -37,13 +37,13 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     file.require_units("files of this format have")
     index = 0
     for number, event in enumerate(_list(file, content, "Events", "the file")):
-        here = f"event {number}"
+        label = f"event {number}"
         dof_of = {
             pattern.get("timeSeries"): pattern.get("dof")
-            for pattern in _list(file, event, "pattern", here, required=False)
+            for pattern in _list(file, event, "pattern", label, required=False)
             if isinstance(pattern, dict) and isinstance(pattern.get("timeSeries"), str)
         }
-        for series in _list(file, event, "timeSeries", here):
+        for series in _list(file, event, "timeSeries", label):
             # whose lines can be told: keys of a later event may stand anywhere
             first = number == 0
             yield _trace(file, event, series, f"time series {index}", dof_of, first=first)
@@ -56,23 +56,23 @@ def _trace(
     file: RecordFile,
     event: dict[str, Any],
     series: object,
-    what: str,
+    label: str,
     dof_of: dict[Any, Any],
     *,
     first: bool,
 ) -> ParsedTrace:
     if not isinstance(series, dict):
-        raise file.error(f"{what} is not a JSON object")
+        raise file.error(f"{label} is not a JSON object")
     component = str(series.get("name", ""))
-    what += f" ({component})"
+    label += f" ({component})"
     data = series.get("data")
     if not isinstance(data, list):
-        raise file.error(f"{what} has no list 'data'")
+        raise file.error(f"{label} has no list 'data'")
     wrong = next((value for value in data if not _is_number(value)), None)
     if not all(map(_is_number, data)):
         constant = _CONSTANT.search(file.text)
         raise file.error(
-            f"the data of {what} must be finite numbers, not {str(wrong)[:40]!r}: repair the "
+            f"the data of {label} must be finite numbers, not {str(wrong)[:40]!r}: repair the "
             "value or export the event again",
             file.text.count("\n", 0, constant.start()) + 1 if constant else None,
         )
@@ -81,18 +81,18 @@ def _trace(
     counted = isinstance(steps, int) and not isinstance(steps, bool) and steps > 0
     if not counted or (steps != len(data) and not file.allow_partial):
         raise file.error(
-            f"numSteps is {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
+            f"numSteps is {str(steps)[:40]}, but {label} has {len(data)} values: the file is "
             "truncated or numSteps is wrong; export the event again, or use allow_partial",
             line,
             fields=("allow_partial",),
         )
     if not data:
-        raise file.error(f"{what} has no values")
+        raise file.error(f"{label} has no values")
     line = _line(file, "dT") if first else None
     intervals = [owner["dT"] for owner in (series, event) if "dT" in owner]
     if not intervals or not all(map(_is_number, intervals)) or len(set(intervals)) > 1:
         raise file.error(
-            f"{what} requires a single dT, in the series or its event, not {str(intervals)[:60]}",
+            f"{label} requires a single dT, in the series or its event, not {str(intervals)[:60]}",
             line,
         )
     dt = file.possible_dt(float(intervals[0]), line)
@@ -103,7 +103,7 @@ def _trace(
         np.array(data, dtype=np.float64),
         dt,
         None,
-        Count(steps, line or 1, what),
+        Count(steps, line or 1, label),
         component,
         event=name,
         recording=name or file.path.stem,

@@ -46,8 +46,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     word = _UNIT.match(unit.text)
     unit = HeaderField(word[0] if word else unit.text, unit.line)
     dt = file.dt(_same(file, fields["INTERVALO DE MUESTREO, C1-C6"], "sampling interval"))
-    stated = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
-    count = file.count(stated, "number of samples")
+    total = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
+    count = file.count(total, "number of samples")
     # a decimated file may state the interval of the instrument, not its own
     duration = fields.optional("DURACION DEL REGISTRO (s), C1-C6")
     duration = _same(file, duration, "duration") if duration and duration.text else None
@@ -99,9 +99,9 @@ def _slashed(text: str) -> list[str]:
     return [part.strip() for part in text.split("/")[1:]]
 
 
-def _same(file: RecordFile, field: HeaderField, what: str) -> HeaderField:
+def _same(file: RecordFile, field: HeaderField, description: str) -> HeaderField:
     """The one value of all channels."""
     values = _slashed(field.text)
     if len(set(values)) != 1:
-        raise file.error(f"the channels differ in their {what}: {field.text}", field.line)
+        raise file.error(f"the channels differ in their {description}: {field.text}", field.line)
     return HeaderField(values[0], field.line)

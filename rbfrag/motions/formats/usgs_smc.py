@@ -54,8 +54,8 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
     if top is None:
         raise file.error("the file has no integer header: export it again", 1)
     comments = _integer(file, top, COMMENTS_VALUE)
-    stated = _value(file, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
-    count = file.count(stated, "number of samples")
+    npts = _value(file, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
+    count = file.count(npts, "number of samples")
     rate = _value(file, top + INTEGER_LINES, RATE_VALUE, REALS, REAL_WIDTH)
     dt = file.possible_dt(1.0 / file.positive(rate, "samples per second"), rate.line)
     above = top + INTEGER_LINES + REAL_LINES

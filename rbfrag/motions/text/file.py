@@ -85,17 +85,17 @@ def cut_number(text: str) -> str:
     if text.endswith("\n"):
         return ""
     words = _BETWEEN_NUMBERS.split(text[-_TAIL:])[1:]
-    *others, last = words[-_COMPARED - 1 :] or [""]
-    matches = {_DECIMALS.fullmatch(word) for word in set(others)}
-    if len(others) < _COMPARED or len(matches) < _DISTINCT or None in matches:
+    *earlier, last = words[-_COMPARED - 1 :] or [""]
+    matches = {_DECIMALS.fullmatch(word) for word in set(earlier)}
+    if len(earlier) < _COMPARED or len(matches) < _DISTINCT or None in matches:
         return ""
     shapes = {(len(word[1]), len(word[2] or "")) for word in matches if word}
     ((decimals, exponent),) = shapes if len(shapes) == 1 else {(0, 0)}
     if decimals < _FEWEST_DECIMALS:
         return ""
     end = _DECIMALS.match(last)
-    whole = end is not None and len(end[1]) >= decimals and len(end[2] or "") >= exponent
-    return "" if whole else last
+    is_complete = end is not None and len(end[1]) >= decimals and len(end[2] or "") >= exponent
+    return "" if is_complete else last
 
 
 def holds_integers(line: str) -> bool:
@@ -120,16 +120,17 @@ def field_layout(text: str) -> tuple[int, int] | None:
     return (per_line, width) if per_line and width else None
 
 
-def finite_number(path: Path, text: str, line: int, what: str) -> float:
+def finite_number(path: Path, text: str, line: int, description: str) -> float:
     """Return one number of a file, or refuse it with its line, from 1."""
     if _NUMBER.fullmatch(text):
         value = float(text)
         if math.isfinite(value):
             return value
-        raise MotionFileError(path, f"{what} {shown(text)} is too large", line=line)
+        raise MotionFileError(path, f"{description} {shown(text)} is too large", line=line)
     raise MotionFileError(
         path,
-        f"{what} {shown(text)} is not a finite number: repair the line or export the record again",
+        f"{description} {shown(text)} is not a finite number: repair the line or export the "
+        "record again",
         line=line,
     )
 

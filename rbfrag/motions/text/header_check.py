@@ -95,19 +95,21 @@ def _interval(
     file: RecordFile, trace: ParsedTrace, traces: Traces
 ) -> tuple[float, tuple[str, ...]]:
     """Return the interval [s] that holds and remarks, or refuse the header's or the caller's."""
-    dt, given = trace.dt_s, file.dt_s
-    if given is not None and not math.isclose(dt, given, rel_tol=SAME_DT, abs_tol=0.0):
-        by_header, by_caller = (_agreeing(file, trace, traces, each) for each in (dt, given))
+    dt, requested = trace.dt_s, file.dt_s
+    if requested is not None and not math.isclose(dt, requested, rel_tol=SAME_DT, abs_tol=0.0):
+        by_header, by_caller = (_agreeing(file, trace, traces, value) for value in (dt, requested))
         if all(by_header) or not any(by_caller):
-            trouble = f"the header says dt = {dt:g} s, not {given:g}: omit dt_s"
+            trouble = f"the header says dt = {dt:g} s, not {requested:g}: omit dt_s"
             raise file.error(trouble, fields=("dt_s",))
-        return given, (f"{DOUBT}the header says dt = {dt:g} s; {given:g} s is what was stated",)
-    stated = _statements(trace, traces, dt)
-    for off, text, line in stated:
-        if off > DURATION_REFUSED and given is None:
+        return requested, (
+            f"{DOUBT}the header says dt = {dt:g} s; {requested:g} s is what was stated",
+        )
+    statements = _statements(trace, traces, dt)
+    for off, text, line in statements:
+        if off > DURATION_REFUSED and requested is None:
             advice = "give the correct interval with dt_s, or correct the header"
             raise file.error(f"{text}: {advice}", line, fields=("dt_s",))
-    return dt, tuple(f"{DOUBT}{text}" for off, text, _ in stated if off > DURATION_NOTED)
+    return dt, tuple(f"{DOUBT}{text}" for off, text, _ in statements if off > DURATION_NOTED)
 
 
 def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
@@ -118,8 +120,8 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
         return agreeing
     try:
         if trace.count:
-            whole = replace(file, allow_partial=False)
-            whole.missing_samples(trace.count.at(dt), trace.values.size)
+            complete = replace(file, allow_partial=False)
+            complete.missing_samples(trace.count.at(dt), trace.values.size)
         if trace.times:
             file.refuse_other_times(trace.times, dt, trace.values.size)
     except MotionFileError:
@@ -132,7 +134,7 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
     statements: list[Statement] = []
     counts = {trace.count.number if trace.count else trace.values.size, trace.values.size}
     # some count the samples and some the intervals between them
-    possible = [(npts - one) * dt for npts in counts for one in (0, 1)]
+    possible = [(npts - offset) * dt for npts in counts for offset in (0, 1)]
     for field in trace.durations:
         seconds = number_or_none(field.text) if field else None
         if field and field.text and seconds is None:
@@ -145,13 +147,13 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
         text = f"{max(counts):.12g} samples at dt = {dt:g} s last {max(possible):g} s"
         statements.append((off, f"{text}, but the header says {field.text} s", field.line))
     # printed times prove each component's own
-    if not any(each.times for each in traces):
+    if not any(other.times for other in traces):
         names = (trace.recording, trace.station, trace.event)
-        for each in traces:
-            if (each.recording, each.station, each.event) == names and each is not trace:
-                off = abs(dt - each.dt_s) / max(dt, each.dt_s)
+        for other in traces:
+            if (other.recording, other.station, other.event) == names and other is not trace:
+                off = abs(dt - other.dt_s) / max(dt, other.dt_s)
                 text = f"the component {trace.component} has dt = {dt:g} s"
-                statements.append((off, f"{text}, but {each.component} {each.dt_s:g} s", None))
+                statements.append((off, f"{text}, but {other.component} {other.dt_s:g} s", None))
     return statements
 
 
@@ -201,8 +203,8 @@ def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
         f"{peak.text} {peak.unit}"
     )
     off = math.inf
-    for each in largest:
-        low, high = sorted((each, abs(stated_peak)))
+    for sample in largest:
+        low, high = sorted((sample, abs(stated_peak)))
         # what the header's last digit cannot show is no difference
         if not high - low > last_digit(peak.text):
             return 1.0, text

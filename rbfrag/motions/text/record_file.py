@@ -179,13 +179,13 @@ class RecordFile:
         location = self.label(span, _LOCATION)
         return (LOCATION + location,) if location else ()
 
-    def find(self, span: range, pattern: re.Pattern[str], what: str) -> HeaderField:
+    def find(self, span: range, pattern: re.Pattern[str], description: str) -> HeaderField:
         """Return the first match's group 1 among the lines of a span, which must have it."""
         field = self.optional(span, pattern)
         if field is None:
             raise self.error(
-                f"the header has no {what}: the file is truncated or its header damaged; export "
-                "the record again",
+                f"the header has no {description}: the file is truncated or its header damaged; "
+                "export the record again",
                 span.start + 1,
             )
         return field
@@ -205,24 +205,24 @@ class RecordFile:
 
         Some agencies split a recording into one file a channel, so that this is no error.
         """
-        stated = self.label(span, _CHANNELS)
-        if not stated or int(stated) <= channels:
+        declared = self.label(span, _CHANNELS)
+        if not declared or int(declared) <= channels:
             return ()
-        return (f"the header says {stated} channels, but the file holds {channels}",)
+        return (f"the header says {declared} channels, but the file holds {channels}",)
 
     # what header and caller must agree on
 
-    def positive(self, field: HeaderField, what: str) -> float:
+    def positive(self, field: HeaderField, description: str) -> float:
         """Return a field's number, which must be above zero."""
-        return positive_number(self.path, field, what)
+        return positive_number(self.path, field, description)
 
-    def count(self, field: HeaderField, what: str, of: str = "") -> Count:
+    def count(self, field: HeaderField, description: str, of: str = "") -> Count:
         """Return the number of samples that a field states, a whole number of at least 1."""
         digits = field.text.removesuffix(".")
         # int() refuses thousands of digits in words of its own
         if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
             return Count(int(digits), field.line, of)
-        raise self.error(f"{what} {shown(field.text)} is not a count of samples", field.line)
+        raise self.error(f"{description} {shown(field.text)} is not a count of samples", field.line)
 
     def require_units(self, states: str = "the file has") -> None:
         """Refuse a file that states no unit of acceleration unless the caller states it."""
@@ -233,9 +233,9 @@ class RecordFile:
                 fields=("units",),
             )
 
-    def dt(self, field: HeaderField, what: str = "dt") -> float:
+    def dt(self, field: HeaderField, description: str = "dt") -> float:
         """Return the sampling interval [s] that a field states."""
-        return self.possible_dt(self.positive(field, what), field.line)
+        return self.possible_dt(self.positive(field, description), field.line)
 
     def possible_dt(self, dt: float, line: int | None) -> float:
         """Return the header's sampling interval [s], which must be positive and finite."""
@@ -302,16 +302,16 @@ class RecordFile:
             )
         return first, self.data(first, stop)
 
-    def free_numbers(self, rows: Sequence[str], first_line: int, what: str) -> FloatArray:
+    def free_numbers(self, rows: Sequence[str], first_line: int, description: str) -> FloatArray:
         """Return blank-separated numbers of rows, of which the first is this line, from 1."""
 
         def lines() -> list[int]:
             return [line for line, row in enumerate(rows, first_line) for _ in row.split()]
 
-        return self.numbers(" ".join(rows).split(), lines, what)
+        return self.numbers(" ".join(rows).split(), lines, description)
 
     def numbers(
-        self, tokens: Sequence[str], lines: Callable[[], Sequence[int]], what: str
+        self, tokens: Sequence[str], lines: Callable[[], Sequence[int]], description: str
     ) -> FloatArray:
         """Return the numbers that are printed as tokens; `lines` gives the line of each, from 1."""
         try:
@@ -324,12 +324,14 @@ class RecordFile:
             return numbers
         return np.array(
             [
-                finite_number(self.path, token.strip(), line, what)
+                finite_number(self.path, token.strip(), line, description)
                 for token, line in zip(tokens, lines(), strict=True)
             ]
         )
 
-    def table(self, rows: Sequence[str], first_line: int, columns: int, what: str) -> FloatArray:
+    def table(
+        self, rows: Sequence[str], first_line: int, columns: int, description: str
+    ) -> FloatArray:
         """Return blank-separated columns of numbers, shape (rows, columns)."""
         for number, row in enumerate(rows, first_line):
             width = len(row.split())
@@ -339,10 +341,10 @@ class RecordFile:
                     "line or export the record again",
                     number,
                 )
-        return self.free_numbers(rows, first_line, what).reshape(-1, columns)
+        return self.free_numbers(rows, first_line, description).reshape(-1, columns)
 
     def fixed_width(
-        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], what: str
+        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], description: str
     ) -> FloatArray:
         """Return numbers in columns of a fixed width, which may touch.
 
@@ -350,14 +352,16 @@ class RecordFile:
             rows: the lines that hold them; only the last may hold fewer than the others.
             first_line: 1-based line of the first.
             layout: fields a line, and characters a field, the number at its right end.
-            what: what the numbers are, for messages.
+            description: what the numbers are, for messages.
         """
         per_line, width = layout
         rows = [row.rstrip() for row in rows]
-        whole = width * per_line
+        row_width = width * per_line
         for at, row in enumerate(rows):
             # a character too many or too few would shift every field after it
-            if len(row) != whole and (at < len(rows) - 1 or len(row) % width or len(row) > whole):
+            if len(row) != row_width and (
+                at < len(rows) - 1 or len(row) % width or len(row) > row_width
+            ):
                 raise self.error(
                     f"the line has {len(row)} characters, which are not {per_line} fields of "
                     f"{width}: repair the line or export the record again",
@@ -375,7 +379,7 @@ class RecordFile:
             return np.array(
                 [
                     finite_number(
-                        self.path, row[start : start + width].strip(), first_line + at, what
+                        self.path, row[start : start + width].strip(), first_line + at, description
                     )
                     for at, row in enumerate(rows)
                     for start in range(0, len(row), width)
@@ -384,10 +388,10 @@ class RecordFile:
         return numbers
 
     def fixed_table(
-        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], what: str
+        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], description: str
     ) -> FloatArray:
         """Return columns of a fixed width, shape (rows, fields a line)."""
-        numbers = self.fixed_width(rows, first_line, layout, what)
+        numbers = self.fixed_width(rows, first_line, layout, description)
         if numbers.size % layout[0]:
             raise self.error(
                 f"the last row does not have {layout[0]} columns: the file is truncated",
@@ -434,11 +438,11 @@ def number_or_none(text: str) -> float | None:
         return None
 
 
-def positive_number(path: Path, field: HeaderField, what: str) -> float:
+def positive_number(path: Path, field: HeaderField, description: str) -> float:
     """Return a field's number, which must be above zero."""
-    value = finite_number(path, field.text, field.line, what)
+    value = finite_number(path, field.text, field.line, description)
     if value <= 0.0:
-        raise MotionFileError(path, f"{what} {field.text} must be positive", line=field.line)
+        raise MotionFileError(path, f"{description} {field.text} must be positive", line=field.line)
     return value
 
 

@@ -27,14 +27,14 @@ CHUNK = 1 << 14
 """Elements of one chunk."""
 
 
-def common_shape(given: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
+def common_shape(inputs: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
     """Return the arguments as arrays of floats, and the shape they broadcast to.
 
     Raises:
         InputError: an argument holds no numbers, or the shapes do not go together.
     """
     arrays: dict[str, FloatArray] = {}
-    for name, value in given.items():
+    for name, value in inputs.items():
         try:
             arrays[name] = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
@@ -197,10 +197,10 @@ class BlockArray(Tabular):
         """Why an element is no block, as text; empty where it is one."""
         return np.array(REASONS)[self.reason_code]
 
-    def at(self, places: NDArray[np.intp]) -> BlockArray:
+    def at(self, indices: NDArray[np.intp]) -> BlockArray:
         """Return some of the blocks; a single one among many stays one."""
         parts: list[Any] = [self.tan_alpha1, self.tan_alpha3, self.half_s1_m, self.reason_code]
-        return BlockArray(*(each if each.size == 1 else each[places] for each in parts))
+        return BlockArray(*(part if part.size == 1 else part[indices] for part in parts))
 
     @property
     def inertia_m2(self) -> FloatArray:
@@ -256,13 +256,13 @@ class BlockArray(Tabular):
 _Columns = tuple[FloatArray, FloatArray, FloatArray, CodeArray]
 
 
-def _blocks(formula: Callable[..., _Columns], given: dict[str, ArrayLike]) -> BlockArray:
-    arrays, shape = common_shape(given)
+def _blocks(formula: Callable[..., _Columns], inputs: dict[str, ArrayLike]) -> BlockArray:
+    arrays, shape = common_shape(inputs)
     t1, t3, h = (np.empty(shape) for _ in range(3))
     reason = np.empty(shape, dtype=np.int8)
-    whole = [np.broadcast_to(array, shape) for array in arrays.values()]
+    columns = [np.broadcast_to(array, shape) for array in arrays.values()]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        in_chunks(formula, whole, (t1, t3, h, reason))
+        in_chunks(formula, columns, (t1, t3, h, reason))
     return BlockArray(t1, t3, h, reason)
 
 

@@ -74,46 +74,46 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
     if suffix not in (".toml", ".csv"):
         raise InputError(f"{source}: unsupported block file: use .toml or .csv, not {suffix!r}")
     text = source_text(source, "a block file", _LARGEST_BYTES)
-    stated = toml_document(text, source) if suffix == ".toml" else _from_csv(source, text)
+    fields = toml_document(text, source) if suffix == ".toml" else _from_csv(source, text)
     if gamma_deg is not None:
-        if "gamma_deg" in stated:
+        if "gamma_deg" in fields:
             raise InputError(f"{source}: gamma_deg is in the file and given again: give it once")
-        stated["gamma_deg"] = gamma_deg
-    conditions = {key: stated.pop(key) for key in CONDITIONS if key in stated}
+        fields["gamma_deg"] = gamma_deg
+    conditions = {key: fields.pop(key) for key in CONDITIONS if key in fields}
     if not isinstance(conditions.get("back_fracture", True), bool):
         raise InputError(
             f"{source}: back_fracture = {conditions['back_fracture']!r}: use true or false"
         )
     try:
-        block = _block(stated)
+        block = _block(fields)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     return BlockFile(os.fspath(path), block, conditions)
 
 
-def _block(stated: dict[str, Any]) -> Block:
-    keys = set(stated)
+def _block(fields: dict[str, Any]) -> Block:
+    keys = set(fields)
     for names, make in (
         (POLYGON, Block.from_polygon),
         (ANGLES, Block.from_angles),
         (FRACTURES, Block.from_fractures),
     ):
         if keys == set(names):
-            return make(**stated)
-    known = {*POLYGON, *ANGLES, *FRACTURES}
-    unknown = sorted(keys - known)
+            return make(**fields)
+    accepted = {*POLYGON, *ANGLES, *FRACTURES}
+    unknown = sorted(keys - accepted)
     if unknown:
         raise InputError(
             f"unknown key {unknown[0]!r}: the keys of a block file are "
-            f"{', '.join(sorted(known))}, {', '.join(CONDITIONS)}"
+            f"{', '.join(sorted(accepted))}, {', '.join(CONDITIONS)}"
         )
     forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
-    given = ", ".join(sorted(keys)) or "none of them"
-    raise InputError(f"a block is given by exactly one of {forms}; the file has {given}")
+    keys_found = ", ".join(sorted(keys)) or "none of them"
+    raise InputError(f"a block is given by exactly one of {forms}; the file has {keys_found}")
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:
-    stated: dict[str, Any] = {"vertices_m": []}
+    fields: dict[str, Any] = {"vertices_m": []}
     header: list[str] | None = None
     for line, cells in csv_rows(text, source):
         row = [cell.strip() for cell in cells]
@@ -121,7 +121,7 @@ def _from_csv(source: Path, text: str) -> dict[str, Any]:
         if not any(row):
             continue
         if row[0].startswith("#"):
-            _comment(stated, ",".join(cells).strip()[1:], where)
+            _comment(fields, ",".join(cells).strip()[1:], where)
         elif header is None:
             header = row
             if header != ["x_m", "y_m", "contact"]:
@@ -130,18 +130,18 @@ def _from_csv(source: Path, text: str) -> dict[str, Any]:
                     "x_m,y_m,contact (contact empty for other vertices)"
                 )
         else:
-            _vertex(stated, row, where)
+            _vertex(fields, row, where)
     if header is None:
         raise InputError(f"{source}: no outline: the header must be x_m,y_m,contact")
-    missing = [name for name in _CONTACTS if name not in stated]
+    missing = [name for name in _CONTACTS if name not in fields]
     if missing:
         raise InputError(
             f"{source}: no vertex is marked as {' or '.join(missing)} in the column contact"
         )
-    return stated
+    return fields
 
 
-def _comment(stated: dict[str, Any], text: str, where: str) -> None:
+def _comment(fields: dict[str, Any], text: str, where: str) -> None:
     name, separator, value = text.partition("=")
     key = name.strip()
     if not separator or not key.isidentifier():
@@ -150,26 +150,26 @@ def _comment(stated: dict[str, Any], text: str, where: str) -> None:
         raise InputError(
             f"{where}: unknown name {key!r}: use gamma_deg or one of {', '.join(CONDITIONS)}"
         )
-    if key in stated:
+    if key in fields:
         raise InputError(f"{where}: {key} is given twice")
     if key == "back_fracture":
         truth = {"true": True, "false": False}
-        stated[key] = truth.get(value.strip().lower(), value.strip())
+        fields[key] = truth.get(value.strip().lower(), value.strip())
     else:
-        stated[key] = _number(value, key, where)
+        fields[key] = _number(value, key, where)
 
 
-def _vertex(stated: dict[str, Any], row: list[str], where: str) -> None:
+def _vertex(fields: dict[str, Any], row: list[str], where: str) -> None:
     if len(row) not in (2, 3):
         raise InputError(f"{where}: {len(row)} cells instead of x_m,y_m,contact")
-    vertices = stated["vertices_m"]
+    vertices = fields["vertices_m"]
     if len(row) == 3 and row[2]:
         contact = row[2].lower()
         if contact not in _CONTACTS:
             raise InputError(f"{where}: unknown contact {row[2]!r}: use heel, back, toe or nothing")
-        if contact in stated:
+        if contact in fields:
             raise InputError(f"{where}: a second {contact}: each contact is one vertex")
-        stated[contact] = len(vertices)
+        fields[contact] = len(vertices)
     vertices.append((_number(row[0], "x_m", where), _number(row[1], "y_m", where)))
 
 

@@ -136,20 +136,20 @@ class ContactHull:
         along = np.column_stack([np.cos(turn), np.sin(turn)])
         across = np.column_stack([-along[:, 1], along[:, 0]])
         inertia = np.einsum("mi,ij,mj->m", across, self.inertia_m2[:2, :2], across)
-        places = along @ self.corners_m.T
-        forward, backward = places.max(axis=1), -places.min(axis=1)
+        offsets = along @ self.corners_m.T
+        forward, backward = offsets.max(axis=1), -offsets.min(axis=1)
         h = self.height_m
         about_forward = inertia + forward**2 + h * h
         about_backward = inertia + backward**2 + h * h
-        kept = inertia + h * h - forward * backward
+        momentum = inertia + h * h - forward * backward
         return TwoCorneredBlocks(
             azimuth_deg=np.asarray(azimuth_deg, dtype=np.float64),
             kr_forward=forward / h,
             kr_backward=backward / h,
             p2_forward=STANDARD_GRAVITY_M_S2 * np.hypot(forward, h) / about_forward,
             p2_backward=STANDARD_GRAVITY_M_S2 * np.hypot(backward, h) / about_backward,
-            restitution_forward=kept / about_backward,
-            restitution_backward=kept / about_forward,
+            restitution_forward=momentum / about_backward,
+            restitution_backward=momentum / about_forward,
         )
 
     def weakest(self) -> Weakest:
@@ -365,10 +365,10 @@ def mesh_block(
     if density_kg_m3 is not None:
         density_kg_m3 = positive(density_kg_m3, "density_kg_m3", "kg/m³")
     axes = list(PLAN_AXES[up])
-    places = (vertices_m - mass.centre_m)[:, axes]
+    positions = (vertices_m - mass.centre_m)[:, axes]
     inertia = mass.inertia_m2[np.ix_(axes, axes)]
     hulls = {
-        height: _contact_hull(places, inertia, height)
+        height: _contact_hull(positions, inertia, height)
         for height in sorted({contact_mm, *OTHER_CONTACTS_MM})
     }
     hull = hulls[contact_mm]
@@ -384,14 +384,14 @@ def mesh_block(
         inertia_m2=mass.inertia_m2,
         hull=hull,
         hulls=tuple(hulls.values()),
-        outline_m=_convex(places[:, :2]),
+        outline_m=_convex(positions[:, :2]),
         warnings=(*warnings, *_doubts(extent_m, hull, tuple(hulls.values()))),
     )
 
 
-def _contact_hull(places: Array, inertia: Array, contact_mm: float) -> ContactHull:
-    lowest = places[:, 2].min()
-    points = places[places[:, 2] <= lowest + 1e-3 * contact_mm, :2]
+def _contact_hull(positions: Array, inertia: Array, contact_mm: float) -> ContactHull:
+    lowest = positions[:, 2].min()
+    points = positions[positions[:, 2] <= lowest + 1e-3 * contact_mm, :2]
     return ContactHull(contact_mm, points, _convex(points), -float(lowest), inertia)
 
 
@@ -420,9 +420,9 @@ def _spread(hull: ContactHull) -> dict[str, Any]:
     return {"contact_mm": hull.contact_mm, "contacts": len(hull.points_m), **row}
 
 
-def _not_at_rest(name: str, hull: ContactHull, others: tuple[ContactHull, ...]) -> str:
+def _not_at_rest(name: str, hull: ContactHull, alternatives: tuple[ContactHull, ...]) -> str:
     azimuth, distance = hull.nearest_edge()
-    rests = [f"{other.contact_mm:g}" for other in others if other.stands]
+    rests = [f"{other.contact_mm:g}" for other in alternatives if other.stands]
     within = f" (it stands within {', '.join(rests)} mm)" if rests else ""
     return (
         f"{name}: not its resting pose: the centre of mass lies {-distance:.3g} m outside its "

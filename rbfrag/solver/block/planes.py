@@ -108,9 +108,9 @@ def plane_of(text: object, name: str) -> Plane:
     return plane
 
 
-def line_of(one: Plane, other: Plane) -> tuple[float, float]:
+def line_of(first: Plane, second: Plane) -> tuple[float, float]:
     """Return plunge and trend of the line of two planes that are not parallel [deg]."""
-    (a, b, c), (d, e, f) = one.pole, other.pole
+    (a, b, c), (d, e, f) = first.pole, second.pole
     x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
     if z > 0.0:
         x, y, z = -x, -y, -z
@@ -120,8 +120,8 @@ def line_of(one: Plane, other: Plane) -> tuple[float, float]:
     )
 
 
-def _between_deg(one: Plane, other: Plane) -> float:
-    cosine = abs(sum(a * b for a, b in zip(one.pole, other.pole, strict=True)))
+def _between_deg(first: Plane, second: Plane) -> float:
+    cosine = abs(sum(a * b for a, b in zip(first.pole, second.pole, strict=True)))
     return math.degrees(math.acos(min(cosine, 1.0)))
 
 

@@ -69,18 +69,18 @@ def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Ru
     # kernels take flat arrays of one memory order: one compilation, whatever the caller's shape
     shape = sizes.shape
     flat_kr = np.ascontiguousarray(strengths).reshape(-1)
-    whole = np.empty((3, flat_kr.size), dtype=np.int64)
+    counts = np.empty((3, flat_kr.size), dtype=np.int64)
     real = np.empty((4, flat_kr.size))
     p = np.sqrt(sizes).reshape(-1)
-    run_batch(excitation.nodes, flat_kr, p, PH_MAX, whole, real)
+    run_batch(excitation.nodes, flat_kr, p, PH_MAX, counts, real)
     return Runs(
-        outcome=whole[0].reshape(shape),
+        outcome=counts[0].reshape(shape),
         # the critical angle of the model is atan(k_r), whatever the dip
         theta_n=(real[0] / np.arctan(flat_kr)).reshape(shape),
         peak_rad=real[0].reshape(shape),
         started_s=real[1].reshape(shape),
         verdict_s=real[2].reshape(shape),
         error_rad=real[3].reshape(shape),
-        steps=whole[1].reshape(shape),
-        samples_moved=whole[2].reshape(shape),
+        steps=counts[1].reshape(shape),
+        samples_moved=counts[2].reshape(shape),
     )

@@ -139,8 +139,8 @@ def last_resort() -> str | None:
         state = folder.lstat()
     except OSError:
         return None
-    own = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid()
-    return str(folder) if own and not state.st_mode & 0o077 else None
+    is_private_dir = stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid()
+    return str(folder) if is_private_dir and not state.st_mode & 0o077 else None
 
 
 def where_kept() -> str:
@@ -202,8 +202,8 @@ def _once_for_literals(compiled: Any) -> None:
 
     def by_types_alone(args: Any, kws: Any) -> Any:
         return template(
-            tuple(without_literal(each) for each in args),
-            {name: without_literal(each) for name, each in kws.items()},
+            tuple(without_literal(argument) for argument in args),
+            {name: without_literal(argument) for name, argument in kws.items()},
         )
 
     compiled.get_call_template = by_types_alone

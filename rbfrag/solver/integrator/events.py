@@ -166,28 +166,28 @@ def examine_step(
     peak_at = -1.0
     lowest = math.inf
     rising = u_start > 0.0
-    left = 0.0
+    tau_left = 0.0
     theta_left = theta
     ends = (first, second, 1.0)
     for stretch in range(3):
-        right = ends[stretch]
-        if right < 0.0:
+        tau_right = ends[stretch]
+        if tau_right < 0.0:
             continue
         at_end = stretch == 2
-        theta_right = theta_end if at_end else rotation(theta, u, order, right)
+        theta_right = theta_end if at_end else rotation(theta, u, order, tau_right)
         if rising:
             if not at_end and theta_right > peak:
                 peak = theta_right
-                peak_at = right
+                peak_at = tau_right
         elif theta_right <= 0.0:
             # a stretch that begins at 0 and falls is an impact at its beginning
             if theta_left > 0.0:
-                left = bracketed_root(OF_ROTATION, theta, u, order, left, right)
-            return Inside(left, peak, peak_at, lowest)
+                tau_left = bracketed_root(OF_ROTATION, theta, u, order, tau_left, tau_right)
+            return Inside(tau_left, peak, peak_at, lowest)
         elif not at_end:
             lowest = min(lowest, theta_right)
         rising = not rising
-        left = right
+        tau_left = tau_right
         theta_left = theta_right
     return Inside(-1.0, peak, peak_at, lowest)
 

@@ -218,16 +218,16 @@ def rests(
     h: float,
     a: float,
     w: float,
-    known: Loads,
+    loads: Loads,
     work: ContactArrays,
 ) -> tuple[bool, Loads]:
     """Whether a block at rest stays so under two accelerations [g]; what is known of it then."""
     q = a / w
     # the loads that contacts with friction bear are a convex cone: one between two that they bear
-    if known.low <= q <= known.high:
-        return True, known
+    if loads.low <= q <= loads.high:
+        return True, loads
     after, _ = one_step(corners, frame, at, h, a, w, work)
-    return at_standstill(after, frame, h), Loads(min(known.low, q), max(known.high, q))
+    return at_standstill(after, frame, h), Loads(min(loads.low, q), max(loads.high, q))
 
 
 @inner_kernel
@@ -289,18 +289,18 @@ def run_free(
     resting = at_standstill(at, frame, h)
     end_s = time_s[-1]
     since_kept = 0
-    known = UNKNOWN
+    loads = UNKNOWN
     while True:
-        free = node >= last
-        if free and last < time_s.size - 1:  # 1 + k_v <= 0 at the next node
+        past_record = node >= last
+        if past_record and last < time_s.size - 1:  # 1 + k_v <= 0 at the next node
             return FreeRun(JUMPED, now, at, steps, filled, moved_s, landed_s)
-        if free and now > end_s + FREE_MOST_S:
+        if past_record and now > end_s + FREE_MOST_S:
             return FreeRun(ENDLESS, now, at, steps, filled, moved_s, landed_s)
         a0 = a1 = 0.0
         w0 = w1 = 1.0
         length = FREE_STEP_S
         begin = now
-        if not free:
+        if not past_record:
             begin, length = time_s[node], time_s[node + 1] - time_s[node]
             a0, a1, w0, w1 = k_h[node], k_h[node + 1], w[node], w[node + 1]
             if length <= 0.0 or now >= time_s[node + 1]:
@@ -309,17 +309,17 @@ def run_free(
         if resting:
             part = (now - begin) / length
             a, w_now = a0 + part * (a1 - a0), w0 + part * (w1 - w0)
-            stays, known = rests(corners, frame, at, h, a, w_now, known, work)
-            if stays and free:
+            stays, loads = rests(corners, frame, at, h, a, w_now, loads, work)
+            if stays and past_record:
                 return FreeRun(AT_REST, stopped_s, at, steps, filled, moved_s, landed_s)
             if stays:
                 # k_h/(1 + k_v) is monotone in the interval: rest at both ends is rest between
-                stays, known = rests(corners, frame, at, h, a1, w1, known, work)
+                stays, loads = rests(corners, frame, at, h, a1, w1, loads, work)
             if stays:
                 node += 1
                 now = time_s[node]
                 continue
-        known = UNKNOWN
+        loads = UNKNOWN
         parts = max(1, math.ceil((begin + length - now) / h - 1e-9))
         size = (begin + length - now) / parts
         first = now
@@ -348,6 +348,6 @@ def run_free(
             stop = stop_of(frame, at)
             if stop != GOES_ON:
                 return FreeRun(stop, now, at, steps, filled, moved_s, landed_s)
-        if not free:
+        if not past_record:
             node += 1
             now = time_s[node]

@@ -119,7 +119,7 @@ def after_impulses(
     work: ContactArrays,
     active: int,
     per_inertia: float,
-    free: Velocity,
+    v_free: Velocity,
     tolerance: float,
 ) -> Velocity:
     """Return the velocity at the end of a step, and leave the impulses in the work arrays.
@@ -129,14 +129,14 @@ def after_impulses(
         work: what is known of those that may touch; `across` and `along` are zero.
         active: how many may touch.
         per_inertia: mass over moment of inertia about the centroid [1/m²].
-        free: velocity without impulses.
+        v_free: velocity without impulses.
         tolerance: change of velocity in a sweep at which the impulses have converged [m/s].
     """
     if active == 1:
-        decided, velocity = _of_one(corners, work, per_inertia, free)
+        decided, velocity = _of_one(corners, work, per_inertia, v_free)
         if decided:
             return velocity
-    vx, vy, spin = free
+    vx, vy, spin = v_free
     across, along = work.across, work.along
     for k in range(active):
         work.does[k] = -1.0
@@ -180,11 +180,11 @@ def after_impulses(
         tried = tried and same
         if same and not tried:
             tried = True
-            decided, velocity = _solved(corners, work, active, per_inertia, free, tolerance)
+            decided, velocity = _solved(corners, work, active, per_inertia, v_free, tolerance)
             if decided:
                 return velocity
     else:
-        decided, velocity = _of_two(corners, work, active, per_inertia, free, tolerance)
+        decided, velocity = _of_two(corners, work, active, per_inertia, v_free, tolerance)
         if decided:
             return velocity
     return Velocity(vx, vy, spin)
@@ -192,7 +192,7 @@ def after_impulses(
 
 @inner_kernel
 def _of_one(
-    corners: Corners, work: ContactArrays, per_inertia: float, free: Velocity
+    corners: Corners, work: ContactArrays, per_inertia: float, v_free: Velocity
 ) -> tuple[bool, Velocity]:
     """Solve for the impulse of the only corner that may touch.
 
@@ -207,11 +207,11 @@ def _of_one(
     tt = 1.0 + mt * mt * per_inertia
     # friction would drive the corner into its plane as fast as the push lifts it (Painlevé)
     if nn - friction * abs(nt) <= SINGULAR:
-        return False, free
-    off = work.least[0] - (free.vx * nx + free.vy * ny + free.spin * mn)
+        return False, v_free
+    off = work.least[0] - (v_free.vx * nx + v_free.vy * ny + v_free.spin * mn)
     if off <= 0.0:  # it parts from its plane by itself
-        return True, free
-    slips = free.vx * ny - free.vy * nx + free.spin * mt
+        return True, v_free
+    slips = v_free.vx * ny - v_free.vy * nx + v_free.spin * mt
     # it sticks if Coulomb's law allows: both speeds are those that are asked for
     push = (off * tt + slips * nt) / (nn * tt - nt * nt)
     grip = -(slips + nt * push) / tt
@@ -224,9 +224,9 @@ def _of_one(
             grip = -friction * push
     work.across[i], work.along[i] = push, grip
     return True, Velocity(
-        free.vx + push * nx + grip * ny,
-        free.vy + push * ny - grip * nx,
-        free.spin + (push * mn + grip * mt) * per_inertia,
+        v_free.vx + push * nx + grip * ny,
+        v_free.vy + push * ny - grip * nx,
+        v_free.spin + (push * mn + grip * mt) * per_inertia,
     )
 
 
@@ -236,7 +236,7 @@ def _of_two(
     work: ContactArrays,
     active: int,
     per_inertia: float,
-    free: Velocity,
+    v_free: Velocity,
     tolerance: float,
 ) -> tuple[bool, Velocity]:
     """Solve for the impulses of two corners that push, trying all that they may do.
@@ -254,15 +254,15 @@ def _of_two(
         if work.does[k] == OPEN:
             continue
         if work.approach[k] > LANDING_M_S and work.least[k] > 0.0:  # it rebounds
-            return False, free
+            return False, v_free
         if first < 0:
             first = k
         elif second < 0:
             second = k
         else:
-            return False, free
+            return False, v_free
     if second < 0:
-        return False, free
+        return False, v_free
     for way in range(2 * _WAYS):
         if way == _WAYS:
             # no velocity lets two corners that stick out of their planes: they stay there
@@ -270,10 +270,10 @@ def _of_two(
             work.least[second] = min(work.least[second], 0.0)
         # DOWN, UP and STUCK of both in turn, without STUCK twice
         work.does[first], work.does[second] = 1 + way % _WAYS // 3, 1 + way % _WAYS % 3
-        decided, velocity = _solved(corners, work, active, per_inertia, free, tolerance)
+        decided, velocity = _solved(corners, work, active, per_inertia, v_free, tolerance)
         if decided:
             return True, velocity
-    return False, free
+    return False, v_free
 
 
 @inner_kernel
@@ -282,7 +282,7 @@ def _solved(
     work: ContactArrays,
     active: int,
     per_inertia: float,
-    free: Velocity,
+    v_free: Velocity,
     slack: float,
 ) -> tuple[bool, Velocity]:
     """Solve for the impulses of corners that do what is said of them.
@@ -295,13 +295,13 @@ def _solved(
     """
     n = _fill_columns(corners, work, active, per_inertia)
     if n > UNKNOWNS_MOST:
-        return False, free
-    _fill_equations(corners, work, active, n, free)
+        return False, v_free
+    _fill_equations(corners, work, active, n, v_free)
     if not _eliminated(work.equations, n):
-        return False, free
-    velocity = _substituted(work, n, free)
+        return False, v_free
+    velocity = _substituted(work, n, v_free)
     if not _keeps_coulomb(corners, work, active, velocity, slack):
-        return False, free
+        return False, v_free
     _put_impulses(work, active)
     return True, velocity
 
@@ -336,7 +336,7 @@ def _fill_columns(corners: Corners, work: ContactArrays, active: int, per_inerti
 
 @inner_kernel
 def _fill_equations(
-    corners: Corners, work: ContactArrays, active: int, n: int, free: Velocity
+    corners: Corners, work: ContactArrays, active: int, n: int, v_free: Velocity
 ) -> None:
     """Fill an equation for each unknown: the speed of its corner at the end of the step."""
     equations, columns = work.equations, work.columns
@@ -350,12 +350,12 @@ def _fill_equations(
         # across the plane the least that is permitted
         for j in range(n):
             equations[row, j] = columns[j, 0] * nx + columns[j, 1] * ny + columns[j, 2] * mn
-        equations[row, 3] = work.least[k] - (free.vx * nx + free.vy * ny + free.spin * mn)
+        equations[row, 3] = work.least[k] - (v_free.vx * nx + v_free.vy * ny + v_free.spin * mn)
         row += 1
         if work.does[k] == STUCK:  # along it none
             for j in range(n):
                 equations[row, j] = columns[j, 0] * ny - columns[j, 1] * nx + columns[j, 2] * mt
-            equations[row, 3] = -(free.vx * ny - free.vy * nx + free.spin * mt)
+            equations[row, 3] = -(v_free.vx * ny - v_free.vy * nx + v_free.spin * mt)
             row += 1
 
 
@@ -375,10 +375,10 @@ def _eliminated(equations: FloatArray, n: int) -> bool:
 
 
 @inner_kernel
-def _substituted(work: ContactArrays, n: int, free: Velocity) -> Velocity:
+def _substituted(work: ContactArrays, n: int, v_free: Velocity) -> Velocity:
     """Solve triangular equations, in place of their right sides; return the velocity."""
     equations, columns = work.equations, work.columns
-    vx, vy, spin = free
+    vx, vy, spin = v_free
     for j in range(n - 1, -1, -1):
         impulse = equations[j, 3]
         for c in range(j + 1, n):

@@ -171,8 +171,8 @@ def cross_interval(
     impact_at = -1.0
     steps = 0
     fallen = False
-    whole = corner.p * (nodes.interval_s[i] * (1.0 - tau))
-    parts, part, ph = even_parts(whole, 1.0 - tau, rules.ph_max)
+    total = corner.p * (nodes.interval_s[i] * (1.0 - tau))
+    parts, part, ph = even_parts(total, 1.0 - tau, rules.ph_max)
     for number in range(parts):
         at = tau + number * part
         forward = excitation_over(nodes.k_h, nodes.w, i, at, part)
@@ -324,11 +324,11 @@ def end_of_run(
         return RockingEnd(UNDETERMINED, 0, math.nan, forward, backward)
     if side == 0:
         return RockingEnd(STABLE, 0, math.nan, forward, backward)
-    free = after_record(toe, heel, side, state, off, rules.slowest)
-    verdict_s = nodes.time_s[last] if free.outcome == TOPPLED else math.nan
-    forward = higher(forward, free.forward.x, free.forward.error)
-    backward = higher(backward, free.backward.x, free.backward.error)
-    return RockingEnd(free.outcome, free.side, verdict_s, forward, backward)
+    end = after_record(toe, heel, side, state, off, rules.slowest)
+    verdict_s = nodes.time_s[last] if end.outcome == TOPPLED else math.nan
+    forward = higher(forward, end.forward.x, end.forward.error)
+    backward = higher(backward, end.backward.x, end.backward.error)
+    return RockingEnd(end.outcome, end.side, verdict_s, forward, backward)
 
 
 @bare_kernel

@@ -67,17 +67,17 @@ def _add_moments(moments: FloatArray, weighted: float, z: float) -> None:
 
 @within
 def _add_products(
-    row: FloatArray, weight: float, left: float, a: float, v: float, a2: float, w2: float
+    row: FloatArray, weight: float, remaining: float, a: float, v: float, a2: float, w2: float
 ) -> None:
-    """Add a point to the integrals of X Y2 and, weighted by `left`, of (1 - tau) X Y2."""
+    """Add a point to the integrals of X Y2 and, weighted by `remaining`, of (1 - tau) X Y2."""
     row[10] += weight * a * a2
     row[11] += weight * a * w2
     row[12] += weight * v * a2
     row[13] += weight * v * w2
-    row[14] += left * a * a2
-    row[15] += left * a * w2
-    row[16] += left * v * a2
-    row[17] += left * v * w2
+    row[14] += remaining * a * a2
+    row[15] += remaining * a * w2
+    row[16] += remaining * v * a2
+    row[17] += remaining * v * w2
 
 
 @inner_kernel
@@ -128,23 +128,23 @@ def fill_spans(
         row = rows[number]
         # a first pass for the length, which the moments are taken over, and the bound of theta''
         first = number * length
-        whole = 0.0
+        span_s = 0.0
         size = 0.0
         for i in range(first, first + length):
-            whole += interval_s[i]
+            span_s += interval_s[i]
             size = max(size, abs(k_h[i]) + abs(w[i]))
         size = max(size, abs(k_h[first + length]) + abs(w[first + length]))
         row[:] = 0.0
-        row[0] = whole
+        row[0] = span_s
         row[1] = size
-        if whole <= 0.0:
+        if span_s <= 0.0:
             continue
         a_moments, w_moments = row[2:6], row[6:10]
         # rate and value of the double integrals of a and of w
         ra, rw, va, vw = 0.0, 0.0, 0.0, 0.0
         at = 0.0
         for i in range(first, first + length):
-            part = interval_s[i] / whole
+            part = interval_s[i] / span_s
             if part <= 0.0:
                 continue
             da = k_h[i + 1] - k_h[i]

@@ -65,7 +65,7 @@ class Run(NamedTuple):
     history_length: int
 
 
-class Known(NamedTuple):
+class TrajectoryBounds(NamedTuple):
     """What is known of a trajectory up to a place.
 
     Args:
@@ -86,7 +86,7 @@ class Progress(NamedTuple):
         node: the node; the last one of the record, or that of the verdict, at the end.
         moving: whether the block is off its base.
         state: of the block.
-        known: of the trajectory so far.
+        bounds: of the trajectory so far.
         started_s: first motion [s], NaN for none.
         lost: whether an impact may as well have been a fall: the error hid the difference.
         steps: integration steps so far.
@@ -99,7 +99,7 @@ class Progress(NamedTuple):
     node: int
     moving: bool
     state: State
-    known: Known
+    bounds: TrajectoryBounds
     started_s: float
     lost: bool
     steps: int
@@ -118,8 +118,8 @@ def standing(corner: Corner) -> State:
 @within
 def beginning(corner: Corner) -> Progress:
     """Return a run at the beginning of its record."""
-    known = Known(0.0, 0.0, Peak(0.0, 0.0))
-    return Progress(0, False, standing(corner), known, math.nan, False, 0, 0, math.nan, 0.0, 0)
+    bounds = TrajectoryBounds(0.0, 0.0, Peak(0.0, 0.0))
+    return Progress(0, False, standing(corner), bounds, math.nan, False, 0, 0, math.nan, 0.0, 0)
 
 
 @inner_kernel
@@ -144,7 +144,7 @@ class ArcEnd(NamedTuple):
 
     Args:
         state: of the block at its end.
-        known: of the trajectory.
+        bounds: of the trajectory.
         impact_at: fraction of the interval at which the block closes its contact, or -1; `state`
             then holds the rate of the impact.
         verdict_at: fraction at the end of the first step past which it has toppled, or -1.
@@ -154,7 +154,7 @@ class ArcEnd(NamedTuple):
     """
 
     state: State
-    known: Known
+    bounds: TrajectoryBounds
     impact_at: float
     verdict_at: float
     verdict_error: float
@@ -169,7 +169,7 @@ def cross_interval(
     rules: StepRules,
     place: Place,
     state: State,
-    known: Known,
+    bounds: TrajectoryBounds,
     lifting: bool,
     rows: FloatArray,
     filled: int,
@@ -181,13 +181,13 @@ def cross_interval(
         nodes: the excitation.
         place: where to begin.
         state: state of the block there.
-        known: what is known of the trajectory.
+        bounds: what is known of the trajectory.
         lifting: the threshold is being crossed from below: the first step holds no impact.
         rows: history to be filled with peaks; with one, the run goes on after the verdict.
         filled: how many of its columns are.
         u: work, shape (9,).
     """
-    error, drift, peak = known
+    error, drift, peak = bounds
     i, tau = place.interval, place.fraction
     order = rules.order
     keeps = rows.shape[1] > 0
@@ -196,8 +196,8 @@ def cross_interval(
     verdict_error = 0.0
     steps = 0
     # a step holds the truncation at rounding only up to ph_max (see `taylor.PH_MAX`)
-    whole = corner.p * (nodes.interval_s[i] * (1.0 - tau))
-    parts, part, ph = even_parts(whole, 1.0 - tau, rules.ph_max)
+    total = corner.p * (nodes.interval_s[i] * (1.0 - tau))
+    parts, part, ph = even_parts(total, 1.0 - tau, rules.ph_max)
     for number in range(parts):
         at = tau + number * part
         step = take_step(order, u, ph, state, excitation_over(nodes.k_h, nodes.w, i, at, part))
@@ -244,44 +244,46 @@ def cross_interval(
             verdict_error = error
             if not keeps:
                 break
-    known = Known(error, drift, peak)
-    return ArcEnd(state, known, impact_at, verdict_at, verdict_error, steps, filled)
+    bounds = TrajectoryBounds(error, drift, peak)
+    return ArcEnd(state, bounds, impact_at, verdict_at, verdict_error, steps, filled)
 
 
 @within
 def errors_after_impact(
-    known: Known, rate: float, threshold: float, corner: Corner
-) -> tuple[Known, bool]:
+    bounds: TrajectoryBounds, rate: float, threshold: float, corner: Corner
+) -> tuple[TrajectoryBounds, bool]:
     """Carry the errors through an impact, which takes away theta' and with it its error.
 
     Args:
-        known: what is known of the trajectory before it.
+        bounds: what is known of the trajectory before it.
         rate: theta'/p of the impact.
         threshold: k_h - (1 + k_v) k_r there.
 
     Returns:
         What is known after it, and whether the error hides what comes then.
     """
-    error, drift, peak = known
+    error, drift, peak = bounds
     impact = abs(rate)
     push = max(threshold * corner.cos, 0.0)  # theta''/p² at theta = 0
     if impact <= 2.0 * error or impact * impact <= 4.0 * push * drift:
         # a graze: whether it touches at all is below the error, and if it does not it
         # keeps its speed
         error += impact + math.sqrt(2.0 * push * drift)
-        return Known(error, drift, peak), error > 0.25 * corner.theta_c
+        return TrajectoryBounds(error, drift, peak), error > 0.25 * corner.theta_c
     if threshold > 0.0:
         # motion restarts at once; only the error of its starting time is left
         late = 2.0 * drift / impact
         error = push * late
-        return Known(error, error * late, peak), False
-    return Known(0.0, 0.0, peak), False
+        return TrajectoryBounds(error, error * late, peak), False
+    return TrajectoryBounds(0.0, 0.0, peak), False
 
 
 @inner_kernel
-def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float, float]:
+def after_record(
+    state: State, bounds: TrajectoryBounds, theta_c: float
+) -> tuple[int, float, float]:
     """Return outcome, peak rotation and its error of free motion after the record, by energy."""
-    error = known.error
+    error = bounds.error
     border = upright_rate(state.sin, state.cos)
     margin = state.rate - border
     # nearer to the border than the error: neither outcome is known
@@ -289,7 +291,7 @@ def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float
         return UNDETERMINED, math.nan, error
     if margin > 0.0:
         return TOPPLED, math.nan, error
-    peak = known.peak
+    peak = bounds.peak
     if state.rate > 0.0:
         x_top = left_at_turn(border, state.rate)
         x = math.atan2(state.sin, state.cos)
@@ -301,20 +303,20 @@ def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float
 @inner_kernel
 def end_of_run(nodes: Nodes, corner: Corner, progress: Progress) -> Run:
     """Return what became of a block whose run is at its end."""
-    known, decided_s = progress.known, progress.decided_s
+    bounds, decided_s = progress.bounds, progress.decided_s
     outcome, peak, error = TOPPLED, math.nan, progress.decided_error
     if math.isnan(decided_s):
-        error = known.error
+        error = bounds.error
         if nodes.last < nodes.k_h.size - 1:
             outcome = JUMP
             decided_s = time_of_jump(nodes.time_s, nodes.interval_s, nodes.w, nodes.last)
         elif progress.lost:  # the block may be another one since an impact that the error hid
             outcome = UNDETERMINED
         elif progress.moving:
-            outcome, peak, error = after_record(progress.state, known, corner.theta_c)
+            outcome, peak, error = after_record(progress.state, bounds, corner.theta_c)
             decided_s = math.nan if outcome == STABLE else nodes.time_s[nodes.last]
         else:
-            outcome, peak, error = STABLE, known.peak.x, known.peak.error
+            outcome, peak, error = STABLE, bounds.peak.x, bounds.peak.error
     return Run(
         outcome, peak, progress.started_s, decided_s, error, progress.steps, progress.samples,
         progress.filled,
@@ -346,7 +348,7 @@ def advance(
     level = Thresholds(1.0, corner.kr, 0.0, 0.0, False)
     keeps = rows.shape[1] > 0
     (
-        i, moving, state, known, started_s, lost, steps, samples, decided_s, decided_error, filled
+        i, moving, state, bounds, started_s, lost, steps, samples, decided_s, decided_error, filled
     ) = progress  # fmt: skip
     tau = 0.0  # position inside interval i
     counted = -1  # interval counted last
@@ -380,9 +382,9 @@ def advance(
                 counted = i
                 samples += 1
             arc = cross_interval(
-                nodes, corner, rules, Place(i, tau), state, known, lifting, rows, filled, u
+                nodes, corner, rules, Place(i, tau), state, bounds, lifting, rows, filled, u
             )
-            state, known, filled = arc.state, arc.known, arc.filled
+            state, bounds, filled = arc.state, arc.bounds, arc.filled
             steps += arc.steps
             if arc.verdict_at >= 0.0 and math.isnan(decided_s):
                 decided_s = time_s[i] + arc.verdict_at * interval_s[i]
@@ -394,7 +396,7 @@ def advance(
                 # k_h - (1 + k_v) k_r, a straight line between both ends of the interval
                 threshold = nodes.k_h[i] - nodes.w[i] * corner.kr
                 threshold += (nodes.k_h[i + 1] - nodes.w[i + 1] * corner.kr - threshold) * tau
-                known, hidden = errors_after_impact(known, state.rate, threshold, corner)
+                bounds, hidden = errors_after_impact(bounds, state.rate, threshold, corner)
                 lost = lost or hidden
                 filled = noted(rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, EVENT)
                 moving = lifting = False
@@ -409,13 +411,13 @@ def advance(
             if state.theta > corner.theta_c + 0.5 * math.pi:
                 break
         elif state.sin < 0.0 and irrecoverable(
-            state.rate, state.sin, state.cos, nodes.tail_min_q[i], known.error
+            state.rate, state.sin, state.cos, nodes.tail_min_q[i], bounds.error
         ):
             decided_s = time_s[i]
-            decided_error = known.error
+            decided_error = bounds.error
 
     return Progress(
-        i, moving, state, known, started_s, lost, steps, samples, decided_s, decided_error, filled
+        i, moving, state, bounds, started_s, lost, steps, samples, decided_s, decided_error, filled
     )  # fmt: skip
 
 

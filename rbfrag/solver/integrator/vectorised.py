@@ -34,8 +34,8 @@ from rbfrag.solver.integrator.step import (
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
 from rbfrag.solver.integrator.toppling_kernel import (
     TOPPLED,
-    Known,
     Progress,
+    TrajectoryBounds,
     advance,
     beginning,
     end_of_run,
@@ -51,13 +51,13 @@ FEW = 3
 PH, SIN, COS, K_H, DK_H, W, DW, THETA, RATE, ERROR, DRIFT, PEAK, LEAST_Q, APART = (
     row * BATCH for row in range(14)
 )
-TAKEN = 14
+INPUT_ROWS = 14
 
 # ... and of what it gives. (Arrays of their own would have to be told apart at each step.)
 TURNED, U_START, U_END, V_START, V_END, U5, U6, U7, U8, SIN_END, COS_END, ALONE, FALLS = (
     row * BATCH for row in range(13)
 )
-GIVEN = 13
+OUTPUT_ROWS = 13
 
 SLOT = np.dtype(
     [
@@ -139,14 +139,14 @@ def enter(progress: Progress, place: Any, x: FloatArray, slot: int) -> None:
     place.number = 0
     place.length_s = -1.0
     place.node, place.lost = progress.node, progress.lost
-    place.peak, place.peak_error = progress.known.peak
+    place.peak, place.peak_error = progress.bounds.peak
     place.started_s, place.steps, place.samples = (
         progress.started_s, progress.steps, progress.samples
     )  # fmt: skip
     x[THETA + slot], x[RATE + slot], x[SIN + slot], x[COS + slot] = progress.state
-    x[ERROR + slot] = progress.known.error
-    x[DRIFT + slot] = progress.known.drift
-    x[PEAK + slot] = progress.known.peak.x
+    x[ERROR + slot] = progress.bounds.error
+    x[DRIFT + slot] = progress.bounds.drift
+    x[PEAK + slot] = progress.bounds.peak.x
 
 
 @within
@@ -164,12 +164,12 @@ def put_down(place: Any, x: FloatArray, slot: int) -> None:
 def put_down_progress(place: Any) -> Progress:
     """Return how far a run is whose state has been put down."""
     state = State(place.theta, place.rate, place.sin, place.cos)
-    known = Known(place.error, place.drift, Peak(place.peak, place.peak_error))
+    bounds = TrajectoryBounds(place.error, place.drift, Peak(place.peak, place.peak_error))
     return Progress(
         place.node,
         True,
         state,
-        known,
+        bounds,
         place.started_s,
         place.lost > 0,
         place.steps,
@@ -183,7 +183,7 @@ def put_down_progress(place: Any) -> Progress:
 @inner_kernel
 def move_slot(x: FloatArray, y: FloatArray, slots: np.ndarray, source: int, slot: int) -> None:
     """Let a run change its slot."""
-    for row in range(TAKEN):
+    for row in range(INPUT_ROWS):
         x[row * BATCH + slot] = x[row * BATCH + source]
     y[ALONE + slot] = y[ALONE + source]
     y[FALLS + slot] = y[FALLS + source]
@@ -192,7 +192,7 @@ def move_slot(x: FloatArray, y: FloatArray, slots: np.ndarray, source: int, slot
 
 @kernel
 def run_batch(
-    nodes: Nodes, kr: FloatArray, p: FloatArray, ph_max: float, whole: IntArray, real: FloatArray
+    nodes: Nodes, kr: FloatArray, p: FloatArray, ph_max: float, counts: IntArray, real: FloatArray
 ) -> None:
     """Run blocks over one record, order 8, side by side.
 
@@ -201,7 +201,7 @@ def run_batch(
         kr: rocking acceleration coefficients, shape (m,).
         p: frequency parameters [1/s], shape (m,).
         ph_max: greatest p·h of one step.
-        whole: filled with outcome, steps and samples moved, shape (3, m).
+        counts: filled with outcome, steps and samples moved, shape (3, m).
         real: filled with peak, start, verdict and error, shape (4, m).
     """
     # The loops over slots stand here: in functions of their own, numba would count the references
@@ -210,8 +210,8 @@ def run_batch(
     tail_min_q = nodes.tail_min_q
     last = nodes.last
     rules = StepRules(ORDER, ph_max)
-    x = np.ones(TAKEN * BATCH)
-    y = np.zeros(GIVEN * BATCH)
+    x = np.ones(INPUT_ROWS * BATCH)
+    y = np.zeros(OUTPUT_ROWS * BATCH)
     slots = np.zeros(BATCH, SLOT)
     no_rows, u = np.empty((4, 0)), np.empty(9)
     running = min(BATCH, kr.size)
@@ -274,8 +274,8 @@ def run_batch(
                 place.steps += place.parts
                 place.samples += 1
                 if falls:
-                    whole[0, place.job], real[0, place.job] = TOPPLED, math.nan
-                    whole[1, place.job], whole[2, place.job] = place.steps, place.samples
+                    counts[0, place.job], real[0, place.job] = TOPPLED, math.nan
+                    counts[1, place.job], counts[2, place.job] = place.steps, place.samples
                     real[1, place.job], real[2, place.job] = place.started_s, time_s[place.node]
                     real[3, place.job] = x[ERROR + slot]
             # a run that has just begun has no state in the slot yet
@@ -297,7 +297,7 @@ def run_batch(
                     enter(progress, place, x, slot)
                 else:
                     run = end_of_run(nodes, corner, progress)
-                    whole[0, j], whole[1, j], whole[2, j] = (
+                    counts[0, j], counts[1, j], counts[2, j] = (
                         run.outcome,
                         run.steps,
                         run.samples_moved,

@@ -68,32 +68,35 @@ def free_block(supported_block: SupportedBlock) -> FreeBlock:
     Raises:
         InputError: a block that does not stand of itself, a restitution outside (0, 1].
     """
-    given = supported_block.settings.get("restitution")
-    if given is not None:
-        given = number(given, "restitution", "the coefficient of restitution")
-        if not 0.0 < given <= 1.0:
+    restitution = supported_block.settings.get("restitution")
+    if restitution is not None:
+        restitution = number(restitution, "restitution", "the coefficient of restitution")
+        if not 0.0 < restitution <= 1.0:
             raise InputError(
-                f"restitution = {given:g}: give the coefficient of restitution, above 0 and up to 1"
+                f"restitution = {restitution:g}: give the coefficient of restitution, above 0 and "
+                "up to 1"
             )
     if supported_block.block is None:
         assert supported_block.p2 is not None
         return rectangle(
             positive(supported_block.p2, "p2", "1/s²"),
             positive(supported_block.yield_g, "kr", "g"),
-            given,
+            restitution,
         )
-    return _of_shape(supported_block.block, supported_block.beta_rad, given)
+    return _of_shape(supported_block.block, supported_block.beta_rad, restitution)
 
 
-def rectangle(p2: float, kr: float, given: float | None) -> FreeBlock:
+def rectangle(p2: float, kr: float, restitution: float | None) -> FreeBlock:
     """Return the rectangle on level ground that has these numbers.
 
     Args:
         p2: frequency parameter p² [1/s²].
         kr: tangent of the critical angle.
-        given: restitution; None for that of the rectangle (Housner 1963).
+        restitution: restitution; None for that of the rectangle (Housner 1963).
     """
-    both = corner(kr, math.sqrt(p2), restitution_of_rectangle(kr) if given is None else given)
+    both = corner(
+        kr, math.sqrt(p2), restitution_of_rectangle(kr) if restitution is None else restitution
+    )
     # half of the sides: the base is level, and the centroid above its middle
     half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
     return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
@@ -107,7 +110,7 @@ def restitution_of_rectangle(kr: float) -> float:
     return 1.0 - 1.5 * kr * kr / (1.0 + kr * kr)
 
 
-def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
+def _of_shape(block: Block, beta_rad: float, restitution: float | None) -> FreeBlock:
     balances = (
         ("forward over its toe", "alpha3 - beta", math.radians(block.alpha3_deg) - beta_rad),
         ("backward over its heel", "beta - alpha1", beta_rad - math.radians(block.alpha1_deg)),
@@ -124,10 +127,10 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
                 f"{name} = {math.degrees(balance):.6g} degrees: a block rocks about a corner whose "
                 "critical angle is below 90 degrees"
             )
-    about_toe, about_heel, kept = moments_about_corners(block.inertia_m2, block.heel, block.toe)
+    about_toe, about_heel, momentum = moments_about_corners(block.inertia_m2, block.heel, block.toe)
     return FreeBlock(
-        toe=_corner(balances[0][2], block.r3_m, about_toe, kept / about_heel, given),
-        heel=_corner(balances[1][2], block.r1_m, about_heel, kept / about_toe, given),
+        toe=_corner(balances[0][2], block.r3_m, about_toe, momentum / about_heel, restitution),
+        heel=_corner(balances[1][2], block.r1_m, about_heel, momentum / about_toe, restitution),
         toe_m=block.base_m,
         centroid_m=block.centroid,
         beta_rad=beta_rad,
@@ -135,11 +138,13 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
 
 
 def _corner(
-    balance: float, arm_m: float, inertia_m2: float, kept: float, given: float | None
+    balance: float, arm_m: float, inertia_m2: float, calculated: float, restitution: float | None
 ) -> Corner:
     # p_i² = g r_i/I_i, as (4.27) for the toe
     p2 = STANDARD_GRAVITY_M_S2 * arm_m / inertia_m2
-    return corner(math.tan(balance), math.sqrt(p2), kept if given is None else given)
+    return corner(
+        math.tan(balance), math.sqrt(p2), calculated if restitution is None else restitution
+    )
 
 
 class Rocking(Kind):
@@ -160,7 +165,7 @@ class Rocking(Kind):
         if math.isnan(error_of(run, outcome)):  # beyond any number: nothing is known of the end
             outcome = Outcome.UNDETERMINED
         # of a block that has overturned a peak is only where the run was stopped
-        known = outcome is Outcome.STABLE
+        has_peak = outcome is Outcome.STABLE
         senses = peaks(run, outcome)
         ratios = (run.forward.x / block.toe.theta_c, run.backward.x / block.heel.theta_c)
         traced = rocking_history(excited, block, run.impacts)
@@ -168,8 +173,8 @@ class Rocking(Kind):
         return Response(
             kind=self.kind,
             outcome=outcome,
-            peak_theta_n=max(ratios) if known else None,
-            peak_theta_rad=max(run.forward.x, run.backward.x) if known else None,
+            peak_theta_n=max(ratios) if has_peak else None,
+            peak_theta_rad=max(run.forward.x, run.backward.x) if has_peak else None,
             critical_angle_deg=math.degrees(block.toe.theta_c),
             started_s=finite_or_none(run.started_s),
             toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
@@ -187,7 +192,7 @@ class Rocking(Kind):
             peak_backward_rad=senses[1],
             impacts=run.impacts,
             sensitive=sensitive,
-            peak_spread=spread if known else None,
+            peak_spread=spread if has_peak else None,
         )
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
@@ -198,11 +203,11 @@ class Rocking(Kind):
             refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
             end = simulate(excited, block)
             outcome = OUTCOMES[end.outcome]
-            known = outcome is Outcome.STABLE
+            has_peak = outcome is Outcome.STABLE
             return RunEnd(
                 outcome=outcome,
                 moved=math.isfinite(end.started_s),
-                peak_rad=max(end.forward.x, end.backward.x) if known else None,
+                peak_rad=max(end.forward.x, end.backward.x) if has_peak else None,
                 peak_displacement_m=None,
                 error=error_of(end, outcome),
             )

@@ -59,8 +59,8 @@ class Toppling(Kind):
         need, at_s = needs or (None, None)
         history = answer.history if shaking.history else None
         if need is not None and _is_followed_with_toe(supported_block, needs):
-            whole = _with_toe(supported_block, shaking.excitation, history=shaking.history)
-            answer = replace(response_of(self.kind, whole, shaking), state=None)
+            simulation = _with_toe(supported_block, shaking.excitation, history=shaking.history)
+            answer = replace(response_of(self.kind, simulation, shaking), state=None)
             gives_way = slides_at_toe(need, f"{at_s:.2f} s", phi_deg, slips_g)
             answer = replace(answer, warnings=(*answer.warnings, gives_way))
             history = answer.history

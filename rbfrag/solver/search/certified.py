@@ -212,7 +212,9 @@ def certified_map(
                 count, reached = count + 1, bottom
     rows = intervals[:count]
     # without a map the search ends at the first block that topples, and is complete by that
-    done = full or not bool(((rows["verdict"] == TOPPLES) | np.isfinite(rows["point"])).any())
+    is_complete = full or not bool(
+        ((rows["verdict"] == TOPPLES) | np.isfinite(rows["point"])).any()
+    )
     return CertifiedMap(
         k_up=k_up,
         low=rows["low"].copy(),
@@ -220,7 +222,7 @@ def certified_map(
         verdict=rows["verdict"].copy(),
         point=rows["point"].copy(),
         reached=reached,
-        complete=not done or reached <= bottom,
+        complete=not is_complete or reached <= bottom,
         runs=int(total["trajectories"]),
         steps=int(total["steps"]),
     )

@@ -173,7 +173,7 @@ def _ends(
     bracket = bracket_of(of_map)
     undecided = bracket.undecided if bracket else of_map.undecided_above(bottom)
     upper: float | None = of_map.k_up if of_map.k_up > bottom else None
-    known, runs = bracket and bracket.lower, 0
+    strongest, runs = bracket and bracket.lower, 0
     if undecided <= SLIVERS * pga:
         if bracket is None:
             return Ends(None, None, True, undecided, 0)
@@ -181,9 +181,9 @@ def _ends(
         if lower is not None:
             return Ends(lower, bracket.upper, True, undecided, runs)
         # nothing topples above, but of no block just below is it sure
-        known, upper = None, bracket.upper
-    low, high = of_map.open_above(known or bottom)
-    seen = strongest_seen(excitation, p2, low, high, known)
+        strongest, upper = None, bracket.upper
+    low, high = of_map.open_above(strongest or bottom)
+    seen = strongest_seen(excitation, p2, low, high, strongest)
     lower = None
     if seen.kr is not None:
         lower, upper = seen.kr / pga, seen.upper

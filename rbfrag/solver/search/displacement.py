@@ -49,15 +49,17 @@ class SlidingBlocks:
     slide_m: Callable[[Excitation, float], float]
 
     @cached_property
-    def known(self) -> dict[float, float]:
+    def slides_m(self) -> dict[float, float]:
         """Displacements that were simulated, by k_y/PGA."""
         return {}
 
     def displacement_m(self, ky_over_pga: float) -> float:
         """Return the permanent displacement down a level plane [m]; NaN after a jump."""
-        if ky_over_pga not in self.known:
-            self.known[ky_over_pga] = self.slide_m(self.excited, ky_over_pga * self.excited.pga_g)
-        return self.known[ky_over_pga]
+        if ky_over_pga not in self.slides_m:
+            self.slides_m[ky_over_pga] = self.slide_m(
+                self.excited, ky_over_pga * self.excited.pga_g
+            )
+        return self.slides_m[ky_over_pga]
 
     def points(self, ky_over_pga: Sequence[float]) -> SearchPoints:
         """Return the displacements of blocks of these strengths."""
@@ -94,7 +96,7 @@ def critical_of(
     limit = positive(search_limit, "search_limit", "k_y/PGA")
     width = positive(tolerance, "tolerance", "k_y/PGA")
     excited = blocks.excited
-    before = len(blocks.known)
+    before = len(blocks.slides_m)
     low = high = None
     ends: list[float] = []
     status: Status = "no_motion"
@@ -113,7 +115,7 @@ def critical_of(
             status = "found"
             low, high = _bracket(blocks, distance, limit, top, width)
             ends = sorted({low, high}, reverse=True)
-    runs = len(blocks.known) - before
+    runs = len(blocks.slides_m) - before
     return CriticalSlide(
         kind=kind,
         p2=math.nan,
@@ -139,7 +141,7 @@ def _bracket(
     blocks: SlidingBlocks, distance: float, low: float, high: float, width: float
 ) -> tuple[float, float]:
     # the displacement falls with the strength: what is known already narrows the bracket
-    for k, slid in sorted(blocks.known.items()):
+    for k, slid in sorted(blocks.slides_m.items()):
         if slid > distance:
             low = max(low, k)
         else:

@@ -253,12 +253,12 @@ def mixed_pair(
         if state.rate < 0.0:
             continue
         turn = Place(place.interval, 0.0)
-        left = 1.0 - tau
-        if excitation.p * excitation.interval_s[i] * left <= excitation.ph_max and u[0] < 0.0:
+        remaining = 1.0 - tau
+        if excitation.p * excitation.interval_s[i] * remaining <= excitation.ph_max and u[0] < 0.0:
             # the interval was one step, whose series is still there: the root of its rate, and
             # a little later, where theta' >= 0 is certain
             turned = bracketed_root(OF_RATE, state.theta, u, ORDER, 0.0, 1.0)
-            turn = Place(i, min(tau + turned * left + 1e-13, 1.0))
+            turn = Place(i, min(tau + turned * remaining + 1e-13, 1.0))
         # from above: a block that starts anew is bounded by a start at `landed`, which is no later;
         # one still in motion by the upper trajectory, which must not end before
         anew = integrate_excursion(
@@ -390,8 +390,10 @@ def not_before(place: Place, node: int) -> Place:
 
 
 @within
-def later(one: Place, other: Place) -> Place:
+def later(first: Place, second: Place) -> Place:
     """Return the later of two places."""
-    if other.interval > one.interval:
-        return other
-    return other if other.interval == one.interval and other.fraction > one.fraction else one
+    if second.interval > first.interval:
+        return second
+    return (
+        second if second.interval == first.interval and second.fraction > first.fraction else first
+    )

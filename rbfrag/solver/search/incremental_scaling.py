@@ -124,11 +124,11 @@ class ScaleSearch:
     def points(self, critical_rad: float) -> SearchPoints:
         """Return the two runs of the bracket, or the last safe one, by falling k/PGA."""
         ends = (self.lower, self.scale, None if self.scale else self.scale_limit)
-        kept = [run for run in self.runs if run.scale in ends]
+        ends_runs = [run for run in self.runs if run.scale in ends]
         return SearchPoints(
-            kr_over_pga=np.array([self.k_over_pga(run.scale) for run in kept]),
-            theta_n=np.array([run.theta_n(critical_rad) for run in kept]),
-            outcome=tuple(run.outcome.value for run in kept),
+            kr_over_pga=np.array([self.k_over_pga(run.scale) for run in ends_runs]),
+            theta_n=np.array([run.theta_n(critical_rad) for run in ends_runs]),
+            outcome=tuple(run.outcome.value for run in ends_runs),
         )
 
     def intervals(self) -> OutcomeIntervals:
@@ -143,7 +143,7 @@ class ScaleSearch:
         rests = () if self.starts is None else (self.starts,)
         at_rest = [ScaledRun(scale, 0.0, Outcome.STABLE, "safe", "") for scale in rests]
         seen = [run for run in self.runs if self.scale is not None or run.scale <= self.scale_limit]
-        for run in sorted((*seen, *at_rest), key=lambda each: -each.scale):
+        for run in sorted((*seen, *at_rest), key=lambda item: -item.scale):
             word = _MAP_WORDS.get(run.verdict)
             if word is not None:
                 k = self.k_over_pga(run.scale)
@@ -299,7 +299,7 @@ def scaled_run(run: Simulation, scale: float, fails_rad: float) -> ScaledRun:
     ending = ""
     if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
         ending = run.ending or outcome.advice
-    return ScaledRun(scale, peak, outcome, verdict, ending, run.free is not None)
+    return ScaledRun(scale, peak, outcome, verdict, ending, run.free_motion is not None)
 
 
 def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: float) -> SearchPoints:
@@ -326,7 +326,10 @@ def _search(start: ScaleSearch, run: Callable[[float], ScaledRun], rules: ScanRu
     more, safe = _close_in(run, safe, runs[-1].scale, rules.bracket, ("safe",))
     runs += more
     # closing in may have met a lower scale of another verdict than the one it began with
-    first = min((each for each in runs if each.verdict != "safe"), key=lambda each: each.scale)
+    first = min(
+        (candidate for candidate in runs if candidate.verdict != "safe"),
+        key=lambda candidate: candidate.scale,
+    )
     if first.verdict == "undecided":
         first = _first_decided(run, runs, first, limit, rules)
     if first.verdict != "fails":  # the model ends before the block fails, or it is too close
@@ -393,17 +396,17 @@ def _first_decided(
         The run there, or that which was undecided where none fails.
     """
     passed: tuple[Verdict, ...] = ("safe", "undecided")
-    highest = max(each.scale for each in runs)
-    if all(each.verdict in passed for each in runs):
+    highest = max(item.scale for item in runs)
+    if all(item.verdict in passed for item in runs):
         runs += _scan(run, highest, limit, rules.ratio, passed)[0]
-    later = [each for each in runs if each.verdict not in passed]
+    later = [item for item in runs if item.verdict not in passed]
     if not later:
         return undecided
-    high = min(each.scale for each in later)
-    low = max(each.scale for each in runs if each.scale < high)
+    high = min(item.scale for item in later)
+    low = max(item.scale for item in runs if item.scale < high)
     closer, _ = _close_in(run, low, high, rules.bracket, passed)
     runs += closer
-    return min((*later, *closer), key=lambda each: (each.verdict in passed, each.scale))
+    return min((*later, *closer), key=lambda item: (item.verdict in passed, item.scale))
 
 
 def _look_beyond(
@@ -427,7 +430,7 @@ def _result(
     limit: float,
     ended: str = "",
 ) -> ScaleSearch:
-    runs = sorted(runs, key=lambda each: each.scale)
+    runs = sorted(runs, key=lambda item: item.scale)
     warnings = list(start.warnings)
     if ended:
         text = (
@@ -435,10 +438,10 @@ def _result(
             "block fails there is unknown"
         )
         warnings.append(Diagnostic(text, "beyond_model"))
-    if any(each.verdict == "undecided" for each in runs):
+    if any(item.verdict == "undecided" for item in runs):
         text = "some runs end closer to failure than their error: they count as not safe"
         warnings.append(Diagnostic(text, "near_limit"))
-    if any(each.lost_contact for each in runs):
+    if any(item.lost_contact for item in runs):
         text = (
             "past a lost contact the block is assumed to fall on its planes without rebound, which "
             "rigid contact does not decide: another impact may bring it down at another scale"
@@ -455,7 +458,7 @@ def _result(
         scale_limit=limit,
         ended=ended,
         reentrant=scale is not None
-        and any(each.verdict == "safe" and each.scale > scale for each in runs),
+        and any(item.verdict == "safe" and item.scale > scale for item in runs),
         runs=tuple(runs),
         warnings=tuple(warnings),
     )

@@ -71,7 +71,9 @@ def outcome_intervals(
     return OutcomeIntervals(
         k_lo=ratio[:-1][wide],
         k_hi=ratio[1:][wide],
-        outcome=tuple(each for each, kept in zip(kept_outcomes, wide, strict=True) if kept),  # type: ignore[misc]
+        outcome=tuple(
+            outcome for outcome, is_wide in zip(kept_outcomes, wide, strict=True) if is_wide
+        ),  # type: ignore[misc]
     )
 
 

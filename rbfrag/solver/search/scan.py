@@ -51,7 +51,7 @@ class Seen(NamedTuple):
 
 
 def strongest_seen(
-    excitation: Excitation, p2: float, low: FloatArray, high: FloatArray, known: float | None
+    excitation: Excitation, p2: float, low: FloatArray, high: FloatArray, toppling_kr: float | None
 ) -> Seen:
     """Return the strongest block seen to topple among those without a verdict.
 
@@ -63,11 +63,11 @@ def strongest_seen(
         p2: frequency parameter p² [1/s²].
         low: lower ends of the intervals of k_r without a verdict, shape (n,).
         high: their upper ends, shape (n,).
-        known: a k_r that topples; None for none.
+        toppling_kr: a k_r that topples; None for none.
     """
     runs, gaps = 0, np.empty(0, dtype=np.int64)
     kr, theta_n = np.empty(0), np.empty(0)
-    best = known
+    best = toppling_kr
     trials = _spread(low, high, FIRST_RUNS)
     for round_number in range(ROUNDS + 2):
         if best is not None:
@@ -135,8 +135,8 @@ def _spread(low: FloatArray, high: FloatArray, number: int) -> FloatArray:
     """Return points of intervals, equally spaced in ln k_r, at least one in each of the widest."""
     widest = np.argsort(low - high, kind="stable")[:number]
     low, width = low[widest], np.log(high[widest] / low[widest])
-    each = np.maximum(np.ceil(number * width / width.sum()), 1.0).astype(np.int64)
-    of = np.repeat(np.arange(each.size), each)
-    place = np.arange(of.size) - np.repeat(np.cumsum(each) - each, each)
-    points: FloatArray = low[of] * np.exp(width[of] * (place + 0.5) / each[of])
+    counts = np.maximum(np.ceil(number * width / width.sum()), 1.0).astype(np.int64)
+    of = np.repeat(np.arange(counts.size), counts)
+    place = np.arange(of.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    points: FloatArray = low[of] * np.exp(width[of] * (place + 0.5) / counts[of])
     return points

@@ -51,7 +51,7 @@ from rbfrag.solver.stability.modes import (
 NOTHING = -1
 """Mode and state code of an element without an answer."""
 
-_USABLE: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
+_VALIDITY: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
     "beta_deg": (5, lambda beta: np.abs(beta) < 90.0),
     "phi_deg": (6, lambda phi: (phi >= 0.0) & (phi < 90.0)),
     "kv": (7, lambda kv: (kv > -1.0) & (kv < math.inf)),
@@ -169,23 +169,23 @@ def stability_arrays(
         joint["water_m"] = _undrained(joint["water_m"], drainage)
     if nan not in ("propagate", "raise"):
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
-    given = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
+    fields = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
-        given["phi_back_deg"] = phi_back_deg
+        fields["phi_back_deg"] = phi_back_deg
     refuse_half(*(joint.get(name) for name in ("jrc", "jcs_mpa", "joint_length_m")))
     on_base = {"cohesion_pa": cohesion_pa, **joint}
     strength: dict[str, Any] = {n: value for n, value in on_base.items() if value is not None}
     if strength:
         density = ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3
-        given |= {**strength, "density_kg_m3": density}
+        fields |= {**strength, "density_kg_m3": density}
     if joint.get("water_m") is not None and not back_fracture:
         raise InputError(NO_FRACTURE, fields=("water_m", "back_fracture"))
-    arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
+    arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **fields})
 
     def formula(
-        t1: FloatArray, t3: FloatArray, h: FloatArray, bad: Any, *others: Any
+        t1: FloatArray, t3: FloatArray, h: FloatArray, bad: Any, *arrays: Any
     ) -> tuple[Any, ...]:
-        there = dict(zip(given, others, strict=True))
+        there = dict(zip(fields, arrays, strict=True))
         reason = _reasons(bad, t1.size, there)
         # NaN and harmless planes give no warning and no mode by chance
         if reason.any():
@@ -210,7 +210,7 @@ def stability_arrays(
             )  # fmt: skip
             reason[(reason == 0) & (holds ^ True) & (there["water_m"] > 0.0)] = _SPILLS
             water = Water(
-                *(np.where(there["water_m"] > 0.0, each, 0.0) for each in vars(water).values())
+                *(np.where(there["water_m"] > 0.0, values, 0.0) for values in vars(water).values())
             )
         planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], functions, bond, water)
         if "jrc" in there:
@@ -233,9 +233,9 @@ def stability_arrays(
     codes = [np.empty(shape, dtype=np.int8) for _ in range(3)]
     k, ky, p2, secant_deg = (np.empty(shape) for _ in range(4))
     lifts = np.empty(shape, dtype=np.bool_)
-    whole = (blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, blocks.reason_code)
-    inputs: list[Any] = [np.broadcast_to(array, shape) for array in whole]
-    inputs += [arrays[name] for name in given]
+    columns = (blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, blocks.reason_code)
+    inputs: list[Any] = [np.broadcast_to(array, shape) for array in columns]
+    inputs += [arrays[name] for name in fields]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2], lifts, secant_deg))
     result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2], lifts, secant_deg)
@@ -282,37 +282,37 @@ def _yields(
     floats = np.array(np.broadcast_to(planes.floats(k, SLIDE, cot), t1.shape))
     mode = planes.mode(t1, t3, cot < 0.0, back_fracture=back_fracture)
     for code in (TOPPLE, SLUMP, CONFINED_TOPPLE):
-        here = np.flatnonzero(mode == code)
-        if here.size:
-            a1, a3 = t1[here], t3[here]
+        rows = np.flatnonzero(mode == code)
+        if rows.size:
+            a1, a3 = t1[rows], t3[rows]
             # in units of half the S1, as `Block.arms` has them
             arms = (a1, -1.0), (-a3, 1.0), (a3, -1.0), (a1, -1.0)
-            own = _at(planes, here)
-            k[here], _, lifts[here] = own.yield_of(code, arms, cot[here])
-            floats[here] = own.floats(k[here], code, cot[here])
+            rows_planes = _at(planes, rows)
+            k[rows], _, lifts[rows] = rows_planes.yield_of(code, arms, cot[rows])
+            floats[rows] = rows_planes.floats(k[rows], code, cot[rows])
     if not back_fracture:
         # the weight passes upslope of the heel, and nothing stands there to lean on
         k[planes.tan_beta < t1] = -math.inf
     return mode, k, ky, lifts, floats
 
 
-def _at(planes: Planes[Any], here: NDArray[np.intp]) -> Planes[Any]:
+def _at(planes: Planes[Any], rows: NDArray[np.intp]) -> Planes[Any]:
     """Return the planes of some of the blocks; single numbers hold for all."""
     names = ("tan_beta", "mu1", "mu2", "weight", "bond")
     values = {name: getattr(planes, name) for name in names}
     parts: dict[str, Any] = {
-        name: value[here] for name, value in values.items() if isinstance(value, np.ndarray)
+        name: value[rows] for name, value in values.items() if isinstance(value, np.ndarray)
     }
     if planes.water is not None:
-        parts["water"] = Water(*(each[here] for each in vars(planes.water).values()))
+        parts["water"] = Water(*(values[rows] for values in vars(planes.water).values()))
     return replace(planes, **parts)
 
 
-def _reasons(bad: CodeArray, size: int, given: Mapping[str, Any]) -> CodeArray:
+def _reasons(bad: CodeArray, size: int, inputs: Mapping[str, Any]) -> CodeArray:
     reason = np.broadcast_to(bad, (size,)).astype(np.int8)
-    for name, (code, fine) in _USABLE.items():
-        if name in given:
-            usable = fine(np.asarray(given[name]))
-            if not np.all(usable):
-                reason[~usable & (reason == 0)] = code
+    for name, (code, fine) in _VALIDITY.items():
+        if name in inputs:
+            valid = fine(np.asarray(inputs[name]))
+            if not np.all(valid):
+                reason[~valid & (reason == 0)] = code
     return reason

@@ -117,11 +117,11 @@ def rocking_at_rest(
     forward = (tan_alpha3 - tan_beta) / where(steep[0] > 0.0, steep[0], 1.0)
     backward = (tan_beta - tan_alpha1) / where(steep[1] > 0.0, steep[1], 1.0)
     heel, toe = ((half_s1_m * t, -half_s1_m) for t in (tan_alpha1, tan_alpha3))
-    about_toe, about_heel, kept = moments_about_corners(inertia_m2, heel, toe)
+    about_toe, about_heel, momentum = moments_about_corners(inertia_m2, heel, toe)
     per_moment = where(
         forward <= backward,
         corner_distance(half_s1_m, tan_alpha3, functions) / about_toe,
         corner_distance(half_s1_m, tan_alpha1, functions) / about_heel,
     )
-    restitution = where(kept > 0.0, kept, 0.0) / sqrt(about_toe * about_heel)
+    restitution = where(momentum > 0.0, momentum, 0.0) / sqrt(about_toe * about_heel)
     return forward, backward, STANDARD_GRAVITY_M_S2 * per_moment, restitution, least

@@ -270,12 +270,12 @@ def refuse_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
     Raises:
         InputError: JRC without JCS, JCS without JRC, or a length without both.
     """
-    given = {"jrc": jrc, "jcs_mpa": jcs_mpa, "joint_length_m": joint_length_m}
-    there = [name for name, value in given.items() if value is not None]
+    inputs = {"jrc": jrc, "jcs_mpa": jcs_mpa, "joint_length_m": joint_length_m}
+    present = [name for name, value in inputs.items() if value is not None]
     for name in OF_ROUGHNESS:
-        if there and given[name] is None:
+        if present and inputs[name] is None:
             raise InputError(
                 f"{name} is missing: the roughness of a joint is jrc with jcs_mpa, and phi_deg is "
                 "then its residual friction angle",
-                fields=(name, *there),
+                fields=(name, *present),
             )

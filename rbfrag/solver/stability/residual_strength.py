@@ -62,18 +62,18 @@ def after_first_slip(
     """
     from rbfrag.solver.stability.single import refuse_undecided, stability
 
-    stated = dict(planes)
-    residual_deg = stated.pop("phi_residual_deg", None)
+    keywords = dict(planes)
+    residual_deg = keywords.pop("phi_residual_deg", None)
     if residual_deg is None:
-        return stated, ()
-    first = stability(block, **stated)
+        return keywords, ()
+    first = stability(block, **keywords)
     refuse_undecided(first)
-    left = {name: value for name, value in stated.items() if name not in ENDED}
-    left["phi_deg"] = residual_deg
-    if stability(block, **left).yield_acceleration <= 0.0:
+    remaining = {name: value for name, value in keywords.items() if name not in ENDED}
+    remaining["phi_deg"] = residual_deg
+    if stability(block, **remaining).yield_acceleration <= 0.0:
         finding = {"k": first.yield_acceleration, "mode": words_of_mode(first.mode)}
         raise InputError(SLIPS_ON.format(**finding), fields=("phi_residual_deg",))
-    return left, (AFTER_SLIP,)
+    return remaining, (AFTER_SLIP,)
 
 
 def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:

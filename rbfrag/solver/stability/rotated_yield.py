@@ -142,7 +142,7 @@ def kct_after_rotation(
 
     limit_deg = confined_limit_deg(block, back_follows=share)
     on_its_face = limit_deg == 180.0 - block.gamma_deg
-    why = "the front face meets the base" if on_its_face else _FREE
+    why = "the front face meets the base" if on_its_face else _EDGE_NORMAL
     k: N = _over(theta_deg, formula, limit_deg, why)
     return k
 
@@ -161,7 +161,7 @@ class RotatedYield(NamedTuple):
     end: str
 
 
-_FREE = "the base edge stands normal to the back plane"
+_EDGE_NORMAL = "the base edge stands normal to the back plane"
 
 
 def confined_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
@@ -174,11 +174,11 @@ def confined_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
         block: the block, with γ above 90°.
         back_follows: share of the rotation by which the back plane turns, from 0 to 1.
     """
-    free, face = block.gamma_deg - 90.0, 180.0 - block.gamma_deg
+    square, face = block.gamma_deg - 90.0, 180.0 - block.gamma_deg
     stays = 1.0 - _share(back_follows)
     if stays == 1.0:
-        return free
-    return min(free / stays, face) if stays > 0.0 else face
+        return square
+    return min(square / stays, face) if stays > 0.0 else face
 
 
 def slump_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
@@ -202,10 +202,10 @@ BY_MODE: Mapping[ModeName, RotatedYield] = {
 
 
 def _share(back_follows: float) -> float:
-    what = "a share of the block's rotation from 0 to 1"
-    share = number(back_follows, "back_follows", what)
+    expected = "a share of the block's rotation from 0 to 1"
+    share = number(back_follows, "back_follows", expected)
     if not 0.0 <= share <= 1.0:
-        raise InputError(f"back_follows = {share:g} is out of range: give {what}")
+        raise InputError(f"back_follows = {share:g} is out of range: give {expected}")
     return share
 
 
@@ -247,11 +247,11 @@ def _wave(turn: Any) -> tuple[Any, Any]:
 
 
 def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: str) -> Any:
-    what = f"a rotation from 0 to {limit_deg:.6g} degrees, where {why}"
+    expected = f"a rotation from 0 to {limit_deg:.6g} degrees, where {why}"
     if isinstance(theta_deg, int | float | str) or not hasattr(theta_deg, "__len__"):
-        theta = number(theta_deg, "theta_deg", what)
+        theta = number(theta_deg, "theta_deg", expected)
         if not 0.0 <= theta <= limit_deg:
-            raise InputError(f"theta_deg = {theta:g} is out of range: give {what}")
+            raise InputError(f"theta_deg = {theta:g} is out of range: give {expected}")
         turn = math.radians(theta)
         return float(formula(turn, math.cos(turn), math.sin(turn), SCALAR))
     # Kept apart so that single numbers do not load numpy.
@@ -260,7 +260,7 @@ def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: st
     thetas = np.asarray(theta_deg, dtype=np.float64)
     outside = ~((thetas >= 0.0) & (thetas <= limit_deg))
     if outside.any():
-        raise InputError(f"theta_deg = {thetas[outside][0]:g} is out of range: give {what}")
+        raise InputError(f"theta_deg = {thetas[outside][0]:g} is out of range: give {expected}")
     turns = np.radians(thetas)
     with np.errstate(invalid="ignore", divide="ignore"):
         return formula(turns, np.cos(turns), np.sin(turns), array_elementwise())

@@ -264,16 +264,16 @@ def stability(
     slips_g = math.inf
     if finding.mode == "topple":
         slips_g = toe_slips_g(block, beta_deg, finding.phi_deg, push)
-    own = {mode: k if mode == finding.mode else None for mode in MODES}
+    yields = {mode: k if mode == finding.mode else None for mode in MODES}
     return Stability(
         block=block,
         mode=finding.mode,
         state=finding.state,
         yield_acceleration=k,
         ky=planes.ky,
-        kr=own["topple"],
-        ks=own["slump"],
-        kct=own["confined_topple"],
+        kr=yields["topple"],
+        ks=yields["slump"],
+        kct=yields["confined_topple"],
         delta_deg=beta_deg + degrees_of(k / planes.weight) if math.isfinite(k) else None,
         beta_deg=beta_deg,
         phi_deg=finding.phi_deg,

@@ -16,7 +16,7 @@ from benchmarks.extended.double_double import Pair, add, div, mul, sine_versine,
 from benchmarks.extended.toppling import HIGHEST, _series, _value
 from rbfrag.solver.integrator.state import Corner, Peak, State, StepExcitation
 from rbfrag.solver.integrator.step import drift_of_step, take_step
-from rbfrag.solver.integrator.toppling_kernel import Known, errors_after_impact
+from rbfrag.solver.integrator.toppling_kernel import TrajectoryBounds, errors_after_impact
 from rbfrag.solver.results import FloatArray
 
 ORDER = 8
@@ -154,10 +154,10 @@ CORNER = Corner(0.2, math.atan(0.2), math.sin(math.atan(0.2)), math.cos(math.ata
 
 def through(
     impact: float, threshold: float, drift: float, error: float = 0.0
-) -> tuple[Known, bool]:
-    known = Known(error, drift, Peak(0.0, 0.0))
-    after, hidden = errors_after_impact(known, -impact, threshold, CORNER)
-    return Known(*after), hidden
+) -> tuple[TrajectoryBounds, bool]:
+    bounds = TrajectoryBounds(error, drift, Peak(0.0, 0.0))
+    after, hidden = errors_after_impact(bounds, -impact, threshold, CORNER)
+    return TrajectoryBounds(*after), hidden
 
 
 @pytest.mark.parametrize("impact", [1e-3, 1e-2, 0.3])

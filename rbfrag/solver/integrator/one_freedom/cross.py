@@ -88,7 +88,7 @@ def cross_interval(
     series: FloatArray,
     line: Line,
     tau: float,
-    own: float,
+    frequency: float,
     state: PhaseState,
     peak: Peak,
     history: FloatArray,
@@ -100,7 +100,7 @@ def cross_interval(
         table: coefficients of the equation of the present sense.
         series: work array for the series of a step.
         tau: where in it the motion is.
-        own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
+        frequency: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
         state: state of the block.
         peak: greatest x so far.
         history: as for the phase.
@@ -110,7 +110,7 @@ def cross_interval(
     order, parts = rules.order, 1
     if not rules.uniform:
         # the second harmonics change by 2 x': a fast block shortens its own time by moving
-        turn = max(own, 2.0 * abs(state.rate)) * (line.h * (1.0 - tau))
+        turn = max(frequency, 2.0 * abs(state.rate)) * (line.h * (1.0 - tau))
         parts = max(1, math.ceil(turn / rules.turn_max))
         # short steps need no high order: the terms beyond are below rounding
         if turn < TURN_OF_ORDER_5:
@@ -118,9 +118,9 @@ def cross_interval(
         elif turn < TURN_OF_ORDER_6:
             order = min(order, 6)
     first, size = tau, (1.0 - tau) / parts
-    done = steps = splits = 0
-    while done < parts:
-        at = first + done * size
+    finished = steps = splits = 0
+    while finished < parts:
+        at = first + finished * size
         step = Step(
             size * line.h,
             line.a0 + (line.a1 - line.a0) * at,
@@ -134,10 +134,10 @@ def cross_interval(
             # the state changes faster than its own time says, near D = 0: halve what is left
             splits += 1
             order, first = rules.order, at
-            parts = 2 * (parts - done)
-            size, done = (1.0 - first) / parts, 0
+            parts = 2 * (parts - finished)
+            size, finished = (1.0 - first) / parts, 0
             continue
-        arrival = arrive(rules, table, series[0], order, own, state, step)
+        arrival = arrive(rules, table, series[0], order, frequency, state, step)
         # a turn inside the step is a peak of its own, though the step goes on
         if arrival.turn_tau >= 0.0:
             peak = higher(peak, arrival.turn_x, state.error_x)
@@ -148,7 +148,7 @@ def cross_interval(
         tau = at + size * arrival.tau
         if arrival.kind != PASSED:
             return Crossing(arrival.kind, arrival.condition, tau, state, peak, filled, steps)
-        done += 1
+        finished += 1
     return Crossing(PASSED, 0, tau, state, peak, filled, steps)
 
 
@@ -158,7 +158,7 @@ def arrive(
     table: FloatArray,
     u: FloatArray,
     order: int,
-    own: float,
+    frequency: float,
     state: PhaseState,
     step: Step,
 ) -> Arrival:
@@ -168,7 +168,7 @@ def arrive(
         table: coefficients of the equation of the present sense.
         u: Taylor coefficients of U.
         order: degree of U.
-        own: rate of the block's own time [1/s].
+        frequency: rate of the block's own time [1/s].
         state: state at the start.
         step: length and accelerations.
     """
@@ -181,7 +181,7 @@ def arrive(
             leading = 2
     event = find_event(u, order, leading, rules, state, x_end)
     kind, tau = event.kind, event.tau
-    growth = error_growth(rules, table, u, order, own, state, step, tau, event.x)
+    growth = error_growth(rules, table, u, order, frequency, state, step, tau, event.x)
     x, rate, cos, sin = state.x, state.rate, state.cos, state.sin
     if tau > 0.0:
         x = event.x if kind < AT_HIGHEST else rotation(state.x, u, order, tau)

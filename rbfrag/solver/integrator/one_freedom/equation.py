@@ -83,29 +83,29 @@ class Equation:
         return all(row.constant for row in everywhere) and not self.braking.coefficients[0]
 
     @cached_property
-    def own_rate_at_rest(self) -> float:
+    def frequency_at_rest(self) -> float:
         """Rate of the block's own time at x = 0 [1/s], as steps are measured by."""
-        # (N + M)/D as in step.own_rate; D = 0 must not divide by zero
-        own2 = abs(self.driving(0.0)) + abs(self.resistance(0.0))
-        return math.sqrt(own2 / max(abs(self.inertia(0.0)), 1e-300))
+        # (N + M)/D as in step.local_frequency; D = 0 must not divide by zero
+        frequency2 = abs(self.driving(0.0)) + abs(self.resistance(0.0))
+        return math.sqrt(frequency2 / max(abs(self.inertia(0.0)), 1e-300))
 
     def first_without_strength(self, limit: float) -> float:
         """Return the least x at which a block at rest moves of itself, or `limit`."""
         # a strength of three harmonics has few zeros: a scan of the range does not miss the first
-        places = limit * np.arange(_LOOKS + 1) / _LOOKS
-        weak = np.flatnonzero(self.resistance.at(places[1:]) <= 0.0)
+        points = limit * np.arange(_LOOKS + 1) / _LOOKS
+        weak = np.flatnonzero(self.resistance.at(points[1:]) <= 0.0)
         # with strength everywhere the model ends at its limit first
         if not weak.size:
             return limit
-        before, here = float(places[weak[0]]), float(places[weak[0] + 1])
+        lower, upper = float(points[weak[0]]), float(points[weak[0] + 1])
         # bisection to rounding: the result is a critical rotation that answers are divided by
-        while here - before > 1e-15 * limit:
-            middle = 0.5 * (before + here)
+        while upper - lower > 1e-15 * limit:
+            middle = 0.5 * (lower + upper)
             # neighbouring numbers: nothing is left to halve
-            if not before < middle < here:
+            if not lower < middle < upper:
                 break
-            before, here = (before, middle) if self.resistance(middle) <= 0.0 else (middle, here)
-        return here
+            lower, upper = (lower, middle) if self.resistance(middle) <= 0.0 else (middle, upper)
+        return upper
 
     def threshold(self, x: float) -> float:
         """Return the k_h that starts the motion at a position where 1 + k_v = 1."""

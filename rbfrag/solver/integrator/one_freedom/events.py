@@ -103,7 +103,7 @@ def first_standstill(series: FloatArray, degree: int) -> float:
 
 @inner_kernel
 def root_between(
-    u: FloatArray, order: int, what: int, target: float, low: float, high: float
+    u: FloatArray, order: int, quantity: int, target: float, low: float, high: float
 ) -> float:
     """Root in [low, high], to rounding, by Newton's method kept inside a bracket.
 
@@ -114,33 +114,33 @@ def root_between(
     Args:
         u: Taylor coefficients.
         order: their degree.
-        what: `TRAVEL`, `RATE` or `ACCELERATION`.
+        quantity: `TRAVEL`, `RATE` or `ACCELERATION`.
         target: travel to reach.
         low: end where the sign is that of the function just after the start.
         high: end where the sign is the other, or the value zero.
     """
     # the sign at the low end is taken from the high one: at the low end the function may vanish
     sign_low = 1.0
-    at_high = value_of(u, order, what, target, high)
+    at_high = value_of(u, order, quantity, target, high)
     if at_high == 0.0:
         return high
     if at_high > 0.0:
         sign_low = -1.0
     tau = 0.5 * (low + high)
     for _ in range(100):
-        here = value_of(u, order, what, target, tau)
-        if here == 0.0:
+        current = value_of(u, order, quantity, target, tau)
+        if current == 0.0:
             return tau
-        if here * sign_low > 0.0:
+        if current * sign_low > 0.0:
             low = tau
         else:
             high = tau
         derivative = 0.0  # of U' it is not worth its work: bisection
-        if what == TRAVEL:
+        if quantity == TRAVEL:
             derivative = value(u, order, tau)
-        elif what == RATE:
+        elif quantity == RATE:
             derivative = slope(u, order, tau)
-        following = tau - here / derivative if derivative != 0.0 else low - 1.0
+        following = tau - current / derivative if derivative != 0.0 else low - 1.0
         # outside the bracket Newton has lost the root: halve
         if not low < following < high:
             following = 0.5 * (low + high)
@@ -151,11 +151,11 @@ def root_between(
 
 
 @within
-def value_of(u: FloatArray, order: int, what: int, target: float, tau: float) -> float:
+def value_of(u: FloatArray, order: int, quantity: int, target: float, tau: float) -> float:
     """Return the function whose root is looked for."""
-    if what == TRAVEL:
+    if quantity == TRAVEL:
         return rotation(0.0, u, order, tau) - target
-    if what == RATE:
+    if quantity == RATE:
         return value(u, order, tau)
     return slope(u, order, tau)
 

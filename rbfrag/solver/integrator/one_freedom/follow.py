@@ -338,7 +338,7 @@ def _refuse_endless(mechanism: Mechanism, excitation: Excitation, turn_max: floa
     if equation.uniform:
         return
     duration_s = float(excitation.time_s[-1] - excitation.time_s[0])
-    steps = equation.own_rate_at_rest * duration_s / turn_max
+    steps = equation.frequency_at_rest * duration_s / turn_max
     if steps > MOST_STEPS:
         raise InputError(
             f"the block is so small that one run would take {steps:.1g} steps over this record: "

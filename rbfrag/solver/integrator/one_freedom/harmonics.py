@@ -110,8 +110,8 @@ class Harmonics:
     @cached_property
     def _numbers(self) -> tuple[float, ...]:
         # a e^{inθ} + its conjugate = 2 Re a cos nθ - 2 Im a sin nθ
-        a0, *others = self.half
-        return (a0.real, *(part for a in others for part in (2.0 * a.real, -2.0 * a.imag)))
+        a0, *higher = self.half
+        return (a0.real, *(part for a in higher for part in (2.0 * a.real, -2.0 * a.imag)))
 
     @cached_property
     def coefficients(self) -> FloatArray:

@@ -40,7 +40,12 @@ from rbfrag.solver.integrator.one_freedom.state import (
     certain_since,
     resting,
 )
-from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum, own_rate
+from rbfrag.solver.integrator.one_freedom.step import (
+    DRIVING,
+    RESISTANCE,
+    harmonic_sum,
+    local_frequency,
+)
 from rbfrag.solver.integrator.rest import Thresholds, depart
 from rbfrag.solver.integrator.state import EVENT, Line, Peak, Place, line_at, noted, time_of_jump
 from rbfrag.solver.results import FloatArray
@@ -108,12 +113,17 @@ def run_phase(
         elif jumps_after(record, node):
             stop = JUMPED
             break
-        free = node >= record.last
+        past_record = node >= record.last
         forward = state.sense > 0 or not rules.sticks
         table = rules.forward if forward else rules.reverse
 
         # whole intervals in which nothing happens, where an interval is one exact step
-        if rules.uniform and not (free or jumped) and tau == 0.0 and state.rate * state.sense > 0.0:
+        if (
+            rules.uniform
+            and not (past_record or jumped)
+            and tau == 0.0
+            and state.rate * state.sense > 0.0
+        ):
             conditions = work.conditions_forward if forward else work.conditions_reverse
             far = coast(
                 record, rules, table, conditions, node, state, peak, certain_s, history, filled
@@ -125,16 +135,18 @@ def run_phase(
                 node, counted = far.node, far.node - 1
                 state, peak, certain_s, filled = far.state, far.peak, far.certain_s, far.filled
                 continue
-        own = 0.0 if rules.uniform else own_rate(table, state.cos, state.sin)
+        frequency = 0.0 if rules.uniform else local_frequency(table, state.cos, state.sin)
         # after the record any length of step will do: nothing drives the block any more
-        line = line_at(record, node, free_s, FREE_STEP_S if rules.uniform else rules.turn_max / own)
+        line = line_at(
+            record, node, free_s, FREE_STEP_S if rules.uniform else rules.turn_max / frequency
+        )
         if line.h * (1.0 - tau) <= 0.0:  # a jump of the record, or a start at an interval's end
             moving = not rules.sticks or state.rate != 0.0
             if moving:
                 filled = noted(history, filled, line.start_s, state.x, state.rate, node)
             node, tau, jumped = node + 1, 0.0, True
             continue
-        if not free and node != counted:
+        if not past_record and node != counted:
             moved, counted = moved + 1, node
         if jumped:
             jumped = False
@@ -143,7 +155,7 @@ def run_phase(
                 stop = VIOLATED
                 break
         crossing = cross_interval(
-            rules, table, work.series, line, tau, own, state, peak, history, filled
+            rules, table, work.series, line, tau, frequency, state, peak, history, filled
         )
         state, peak, filled = crossing.state, crossing.peak, crossing.filled
         steps += crossing.steps
@@ -157,19 +169,19 @@ def run_phase(
             stopped_s, certain_s = line.start_s + tau * line.h, math.nan
             filled = noted(history, filled, stopped_s, state.x, 0.0, EVENT)
             # what is left of an interval of the record goes on from the same place
-            if free:
+            if past_record:
                 free_s, tau = free_s + tau * line.h, 0.0
             elif tau >= 1.0:
                 node, tau = node + 1, 0.0
             continue
         tau = 0.0
-        if free:
+        if past_record:
             free_s += line.h
         else:
             node += 1
         now_s = record.time_s[node] + free_s
-        filled = noted(history, filled, now_s, state.x, state.rate, EVENT if free else node)
-        certain_s = certain_at(record, rules, state, node, free, now_s, certain_s)
+        filled = noted(history, filled, now_s, state.x, state.rate, EVENT if past_record else node)
+        certain_s = certain_at(record, rules, state, node, past_record, now_s, certain_s)
 
     stop_s, end = ended(record, stop, line, Place(node, tau), free_s, state)
     return PhaseRun(
@@ -199,7 +211,7 @@ def certain_at(
     rules: PhaseRules,
     state: PhaseState,
     node: int,
-    free: bool,
+    past_record: bool,
     now_s: float,
     since_s: float,
 ) -> float:
@@ -207,7 +219,7 @@ def certain_at(
     driving = harmonic_sum(rules.forward, DRIVING, state.cos, state.sin)
     resistance = harmonic_sum(rules.forward, RESISTANCE, state.cos, state.sin)
     # after the record k_h is zero for ever: the block goes on only if it has no strength left
-    least_q = 0.0 if free else record.tail_min_q[node]
+    least_q = 0.0 if past_record else record.tail_min_q[node]
     return certain_since(since_s, now_s, state.rate, driving, resistance, least_q)
 
 

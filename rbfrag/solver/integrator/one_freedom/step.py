@@ -165,16 +165,16 @@ def fill_step(
             turn_s2 += uj * c2[k - j]
         squared[k] = square
         # what is known of (D U')_k: the driving terms less Q U² less the D_j U'_(k-j) with j > 0
-        known = hh * (a0 * n + da * n_before - w0 * m - dw * m_before)
+        explicit = hh * (a0 * n + da * n_before - w0 * m - dw * m_before)
         n_before = n
         m_before = m
         for j in range(k + 1):
-            known -= q[j] * squared[k - j]
+            explicit -= q[j] * squared[k - j]
         # D_0 is divided by at the end: it is not zero, least_condition() sees to it
         for j in range(1, k + 1):
-            known -= d[j] * (k - j + 1) * u[k - j + 1]
+            explicit -= d[j] * (k - j + 1) * u[k - j + 1]
         part = 1.0 / (k + 1)
-        u[k + 1] = known * inverse * part
+        u[k + 1] = explicit * inverse * part
         c1[k + 1] = -turn_c * part
         s1[k + 1] = turn_s * part
         c2[k + 1] = -2.0 * turn_c2 * part
@@ -182,7 +182,7 @@ def fill_step(
 
 
 @within
-def own_rate(table: FloatArray, c: float, s: float) -> float:
+def local_frequency(table: FloatArray, c: float, s: float) -> float:
     """Return the rate of the block's own time [1/s]: sqrt((N + M)/D), p of a toppling block."""
     driving = abs(harmonic_sum(table, DRIVING, c, s))
     resistance = abs(harmonic_sum(table, RESISTANCE, c, s))
@@ -200,7 +200,7 @@ def converges_slowly(u: FloatArray, order: int) -> bool:
 
 
 @within
-def truncation(u: FloatArray, order: int, own: float, rate: float, h: float) -> float:
+def truncation(u: FloatArray, order: int, frequency: float, rate: float, h: float) -> float:
     """Return a bound on what the terms left out add to x at the end of a step.
 
     The first two of them follow from the last two of the series as those did from earlier ones.
@@ -209,13 +209,13 @@ def truncation(u: FloatArray, order: int, own: float, rate: float, h: float) -> 
     Args:
         u: Taylor coefficients of U.
         order: degree of U.
-        own: rate of the block's own time [1/s].
+        frequency: rate of the block's own time [1/s].
         rate: rate at the start [1/s].
         h: length of the step [s].
     """
     last_terms: float = abs(u[order]) + abs(u[order - 1])
     # every second term falls by about (own h)²/(n (n + 1)); 64 leaves a margin of eight in own h
-    ratio = 64.0 * (own * own + 4.0 * rate * rate) * h * h
+    ratio = 64.0 * (frequency * frequency + 4.0 * rate * rate) * h * h
     return min(1.0, ratio / (order * (order + 1))) * last_terms / order
 
 
@@ -242,7 +242,7 @@ def error_growth(
     table: FloatArray,
     u: FloatArray,
     order: int,
-    own: float,
+    frequency: float,
     state: PhaseState,
     step: Step,
     tau: float,
@@ -254,7 +254,7 @@ def error_growth(
         table: coefficients of the equation of the present sense.
         u: Taylor coefficients of U.
         order: degree of U.
-        own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
+        frequency: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
         state: state at the start.
         step: length and accelerations.
         tau: fraction of the step that is taken.
@@ -262,7 +262,7 @@ def error_growth(
     """
     by_x, by_rate, left_out = 0.0, 0.0, 0.0
     if not rules.uniform:
-        left_out = truncation(u, order, own, state.rate, step.h)
+        left_out = truncation(u, order, frequency, state.rate, step.h)
         by_x, by_rate = sensitivity(table, state, step, u[1] / (step.h * step.h))
     # the linearised equation to second order in the span
     span_s = tau * step.h
@@ -274,7 +274,7 @@ def error_growth(
     # truncation of x and, as its derivative by tau, of the rate; a few roundings of each
     error_x += left_out + EPSILON * (2.0 * abs(x) + abs(u[0]))
     error_rate += order * left_out / step.h
-    error_rate += EPSILON * (2.0 * abs(state.rate) + 4.0 * own * own * span_s)
+    error_rate += EPSILON * (2.0 * abs(state.rate) + 4.0 * frequency * frequency * span_s)
     if rules.uniform:
         error_rate += 4.0 * EPSILON * (abs(u[1]) + abs(u[2])) / step.h
     return Errors(error_x, error_rate)
