@@ -1,4 +1,4 @@
-"""Records in a zip: its members are named as files below it, ``FILE.zip/chan001.v2``.
+"""Records in a zip: its members are addressed as files below it, ``FILE.zip/chan001.v2``.
 
 Nothing is unpacked to a disk. What a zip states of its sizes is bounded before anything is read,
 and no more is read than it states.
@@ -35,7 +35,7 @@ _END, _END_64, _END_FORMAT = b"PK\x05\x06", b"PK\x06\x07", "<4s4H2LH"
 
 
 def archive_of(path: Path) -> Path | None:
-    """Return the zip that a path leads into; None for a file of its own, or none at all."""
+    """Return the zip that a path leads into; None for a separate file or a missing one."""
     if os.path.exists(path):  # noqa: PTH110  # no name is too long for it
         return None
     return next((above for above in path.parents if is_archive(above)), None)
@@ -65,7 +65,7 @@ def is_there(path: Path) -> bool:
 
 
 def records_among(files: Iterable[Path]) -> list[Path]:
-    """Return those of the files of a folder or zip that are looked at, sorted.
+    """Return the record files of a folder or zip, sorted.
 
     Hidden files are not, nor texts about records, nor the spectra (V3) of a record (V2) beside
     them.
@@ -163,7 +163,7 @@ def _opened(archive: Path) -> Iterator[_Members]:
 
 
 def _check_directory(archive: Path, file: BinaryIO) -> None:
-    """Refuse a zip whose list of members no memory would hold."""
+    """Reject a zip whose directory would not fit into memory."""
     file.seek(max(file.seek(0, os.SEEK_END) - _TAIL_BYTES, 0))
     tail = file.read(_TAIL_BYTES)
     at = tail.rfind(_END)

@@ -1,4 +1,4 @@
-"""What a component's name says of its direction; a horizontal motion with its vertical one."""
+"""Direction of a component by its name; pairing of a horizontal motion with its vertical one."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def bare_name(component: str) -> str:
 
 
 def is_vertical_name(component: str) -> bool | None:
-    """Return whether a component is vertical; None when its name does not say.
+    """Return whether a component is vertical; None if its name does not show it.
 
     Args:
         component: as the file names it: ``UP``, ``+V``, ``HNZ``, ``360``, ``N10E``, ``NORTE``.
@@ -79,7 +79,7 @@ def is_vertical_name(component: str) -> bool | None:
 
 
 def is_downward_name(component: str) -> bool:
-    """Return whether a component's name says that its positive samples are downward.
+    """Return whether positive samples are downward by the component's name.
 
     Args:
         component: as the file names it: ``DOWN``, ``DWN``, ``DN``.
@@ -89,7 +89,7 @@ def is_downward_name(component: str) -> bool:
 
 
 def azimuth_deg(component: str) -> float | None:
-    """Return the azimuth of a component [deg], clockwise from north; None if not stated.
+    """Return the azimuth of a component [deg], clockwise from north; None if unknown.
 
     Args:
         component: as the file names it: ``360``, ``90°``, ``N10E``, ``S62W``, ``EAST``, ``E-O``,
@@ -132,7 +132,7 @@ def _direction(name: str) -> tuple[bool | None, float | None]:
 
 
 def _after_station(name: str) -> str:
-    """Return what follows the code of a station in a name; empty where there is none."""
+    """Return the part of a name after the station code; empty if there is none."""
     after = _AFTER_STATION.fullmatch(name)
     return next(filter(None, after.groups())) if after else ""
 
@@ -171,7 +171,7 @@ def why_not_together(
     start_time: tuple[datetime | None, datetime | None],
     lead_in_samples: tuple[int, int],
 ) -> str:
-    """Return why a horizontal and a vertical motion do not fit together; empty when they do.
+    """Return the reason why a horizontal and a vertical motion do not match; empty if they do.
 
     Different lengths are no reason: the ground of the shorter one is at rest after its end.
 
@@ -226,12 +226,12 @@ def companion(horizontal: GroundMotion, vertical: GroundMotion) -> GroundMotion:
 
 
 def lead_in_samples(motion: GroundMotion) -> int:
-    """Return how many zeros processing put before the first sample of the file."""
+    """Return the number of zeros that processing added before the first sample of the file."""
     return lead_in_of(motion.processing_applied)
 
 
 def lead_in_of(applied: object) -> int:
-    """Return the zeros before the first sample, as stored parameters of processing say.
+    """Return the number of zeros before the first sample, from stored processing parameters.
 
     Args:
         applied: `processing_applied` of a motion or of a stored row, or None.

@@ -18,7 +18,7 @@ FORMATS = ("csv", "at2")
 def export_motions(
     motions: Sequence[GroundMotion], path: str | os.PathLike[str], *, file_format: str | None = None
 ) -> str:
-    """Write motions into one file, whole or not at all; their samples read back bit for bit.
+    """Write motions into one file, completely or not at all; samples are read back bit for bit.
 
     Args:
         motions: equally spaced motions; a CSV takes several, an AT2 file one.

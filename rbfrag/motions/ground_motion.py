@@ -1,4 +1,4 @@
-"""One accelerogram, the input of everything else."""
+"""Accelerogram: the input of all other computations."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class GroundMotion:
         event: str = "",
         component: str = "",
     ) -> Self:
-        """Return a motion given by nodes (time, acceleration), linear between them.
+        """Return a motion from nodes (time, acceleration), linear between them.
 
         Args:
             time_s: node times [s], non-decreasing; a time given twice is a jump, so a
@@ -207,7 +207,7 @@ class GroundMotion:
 
     @property
     def location(self) -> str:
-        """Place of the sensor as the file's header names it; empty where it does not."""
+        """Location of the sensor by the file's header; empty if unknown."""
         remarks = (remark for remark in self.remarks if remark.startswith(LOCATION))
         return next(remarks, "").removeprefix(LOCATION)
 
@@ -222,7 +222,7 @@ class GroundMotion:
         return " ".join(parts) or self.source_file or "motion"
 
     def __repr__(self) -> str:
-        """Return what it is, in one line."""
+        """Return a one-line description."""
         step = "nodes" if self.dt_s is None else f"samples of {self.dt_s:g} s"
         return f"GroundMotion({self.label!r}, {self.npts} {step}, PGA {self.pga_g:.3g} g)"
 

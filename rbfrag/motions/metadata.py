@@ -1,4 +1,4 @@
-"""What a table states about the traces of record files, which their headers do not."""
+"""Metadata table of record files, for facts that their headers lack."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LARGEST_MAGNITUDE = 10.0
 
 @dataclass(frozen=True)
 class TraceMetadata:
-    """What the table states about one trace; empty or None where it states nothing.
+    """Metadata of one trace; empty or None for missing cells.
 
     Args:
         line: line of the table, from 1.
@@ -90,7 +90,7 @@ class MotionMetadata:
     _by_file: Mapping[Path, tuple[TraceMetadata, ...]] = field(repr=False, compare=False)
 
     def file(self, path: str | os.PathLike[str]) -> list[TraceMetadata]:
-        """Return the rows of a file by trace index; none when the table does not name it.
+        """Return the rows of a file by trace index; empty if the table lacks it.
 
         A zip's rows are those of each of its members that has none of its own.
         """
@@ -100,7 +100,7 @@ class MotionMetadata:
         return []
 
     def trace(self, path: str | os.PathLike[str], trace_index: int) -> TraceMetadata | None:
-        """Return the row of one trace, or None when the table does not name it."""
+        """Return the row of one trace, or None if the table lacks it."""
         for row in self.file(path):
             if row.trace_index in (None, trace_index):
                 return row
@@ -108,7 +108,7 @@ class MotionMetadata:
 
 
 def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
-    """Return what a CSV states about the traces of record files.
+    """Return the metadata of record files from a CSV.
 
     Args:
         path: CSV with the columns of :data:`COLUMNS` (``file`` at least). Files are named
@@ -201,7 +201,7 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
 
 
 def _edits(first: str, second: str) -> int:
-    """Return how many letters must be put in, taken out or replaced to make one text the other."""
+    """Return the edit distance of two texts: letters inserted, deleted or replaced."""
     before = list(range(len(second) + 1))
     for i, a in enumerate(first, 1):
         row = [i]

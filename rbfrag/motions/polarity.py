@@ -1,4 +1,4 @@
-"""Which sign of a record drives a block forward."""
+"""Polarity: the sign of a record that drives a block forward."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ _REMARK = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 
 @dataclass(frozen=True)
 class HighPass:
-    """What is applied to an uncorrected record, in this order.
+    """Processing of an uncorrected record, in this order.
 
     Args:
         taper_s: length of a cosine taper at each end [s], after the mean was removed.
@@ -80,7 +80,7 @@ DEFAULT_HIGH_PASS = HighPass()
 
 
 def says_corrected(words: str) -> bool | None:
-    """Return whether a record is corrected by what is said of its processing; None for nothing.
+    """Return whether a description of processing means a corrected record; None for no description.
 
     The leading word or phrase of :data:`PROCESSING_WORDS` decides; case, hyphens and text in
     brackets do not matter, and further text is a remark.

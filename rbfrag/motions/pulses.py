@@ -1,4 +1,4 @@
-"""A pulse whose toppling has a closed form, for where there are no records."""
+"""Pulse whose toppling has a closed form, as a substitute for records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signs that a motion is not what it should be, each with a sentence for people."""
+"""Quality flags of a motion, each with an explanation."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ PGD_IN_DOUBT = frozenset({"final_velocity", "final_displacement"})
 
 @dataclass(frozen=True)
 class QualityFlag:
-    """One doubt about a motion: its name as stored, and value, limit and meaning in a sentence."""
+    """Quality flag of a motion: its stored name, and a sentence with value, limit and meaning."""
 
     code: str
     sentence: Diagnostic
 
 
 def is_on_structure(motion: GroundMotion) -> bool:
-    """Return whether the header names a place other than the ground and the free field."""
+    """Return whether the header's location is not on the ground or in the free field."""
     return bool(motion.location) and not _ON_THE_GROUND.match(motion.location)
 
 
 def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
-    """Return every doubt about a motion; an ordinary corrected record has none.
+    """Return all quality flags of a motion; an ordinary corrected record has none.
 
     Args:
         motion: any ground motion. Motions from nodes are taken to be analytic: only their

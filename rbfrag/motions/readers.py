@@ -1,4 +1,4 @@
-"""Reading accelerograms: the format is recognised by content, never by the file's name."""
+"""Reading accelerograms: the format is identified by content, not by the file's name."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def read_motions(
     allow_partial: bool = False,
     gain: float | Mapping[int, float] | None = None,
 ) -> list[GroundMotion]:
-    """Return every acceleration trace of a file, as the file has it.
+    """Return every acceleration trace of a file, unprocessed.
 
     Args:
         path: a file in any of the formats of :data:`READERS`; a member of a zip, as
@@ -124,7 +124,7 @@ def motions_in(
     dt_s: float | None = None,
     gain: float | None = None,
 ) -> list[GroundMotion]:
-    """Return every acceleration trace of a file that is no file here, such as one sent.
+    """Return every acceleration trace of content without a local file, such as an upload.
 
     Args:
         raw: what the file holds.
@@ -285,7 +285,7 @@ def read_motion(
 
 
 def as_motion(motion: MotionLike, name: str = "motion") -> GroundMotion:
-    """Return a motion that an argument gives, reading it where a file is named.
+    """Return the motion of an argument, read from a file if it is a path.
 
     Args:
         motion: a motion, or a file of one as for :func:`read_motion`.

@@ -50,7 +50,7 @@ class _Steps(NamedTuple):
 
 
 def spectral_accelerations(acceleration_g: FloatArray, interval_s: FloatArray) -> dict[str, float]:
-    """Return the spectral accelerations that are stored [g], by the names of `PERIODS_S`.
+    """Return the stored spectral accelerations [g], by the names of `PERIODS_S`.
 
     Args:
         acceleration_g: samples [g], shape (n,), n >= 1; the ground is at rest after the last.
@@ -86,7 +86,7 @@ def spectral_acceleration(
 
 
 def _states(a: FloatArray, h: FloatArray, root: complex) -> ComplexArray:
-    """Return z [g·s] at every node, by z_{i+1} = exp(λ h) z_i − what the interval adds.
+    """Return z [g·s] at every node, by z_{i+1} = exp(λ h) z_i − the contribution of the interval.
 
     The equations of a matrix with two diagonals, solved from the first row downwards.
     """
@@ -122,7 +122,7 @@ def _weights(h: FloatArray, root: complex) -> tuple[ComplexArray, ComplexArray, 
 
 
 def _free_vibration(z: complex, root: complex) -> float:
-    """Return the first maximum of |Im z| where the ground stays at rest; later ones are less."""
+    """Return the first maximum of |Im z| with the ground at rest; later ones are smaller."""
     # u' = Re z + Im z Re λ / Im λ is zero where arg z equals that of −λ̄
     turning = math.atan2(root.imag, -root.real)
     phase = (turning - math.atan2(z.imag, z.real)) % math.pi
@@ -130,7 +130,7 @@ def _free_vibration(z: complex, root: complex) -> float:
 
 
 def _within(steps: _Steps, root: complex, greatest: float) -> float:
-    """Return the greatest |Im z| inside the steps, by halving those that may hold more.
+    """Return the maximum |Im z| within the steps, by bisecting those that may contain a larger one.
 
     Within a step z is a linear function and C exp(λ t), so that the chord of its ends is
     exceeded by at most h²/8 |λ²| |C|, which falls by four or more with each halving.

@@ -1,4 +1,4 @@
-"""The motions of the demonstration: recorded ones where they are installed."""
+"""Motions of the demonstration: recorded ones where they are installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PULSES_FOLDER = "rbfrag-demo-pulses"
 
 
 def demo_motions(folder: Path) -> tuple[list[Path], str]:
-    """Return the files of the demonstration, and a sentence about where they come from.
+    """Return the files of the demonstration, and a sentence about their origin.
 
     Args:
         folder: where analytic pulses are written when no records are installed.

@@ -1,4 +1,4 @@
-"""The toppling spectrum X(p): the toppling velocity that a motion reaches by itself.
+"""Toppling spectrum X(p): the maximum toppling velocity of an excursion from rest.
 
 With a(t) in g, linear between nodes, and the ground at rest after the last one,
 
@@ -112,7 +112,7 @@ def _without_rest(a: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the greatest H [g·s] of each p [1/s], shape of p; H is zero after the record."""
+    """Return the maximum H [g·s] for each p [1/s], shape of p; H is zero after the record."""
     greatest = np.zeros(p.size)
     if not h.size:
         return greatest
@@ -134,7 +134,7 @@ def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatAr
 def _fill_remaining(
     remaining: FloatArray, a: FloatArray, weights: tuple[FloatArray, ...], diagonals: FloatArray
 ) -> None:
-    """Fill H [g·s] at every node, by H_i = exp(−p h) H_{i+1} + what the interval adds.
+    """Fill H [g·s] at every node, by H_i = exp(−p h) H_{i+1} + the contribution of the interval.
 
     These are the equations of a matrix with two diagonals, solved from the last row upwards.
 
@@ -199,7 +199,7 @@ def _turning_values(
 
 
 def _weights(h: FloatArray, p: FloatArray | float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return, for intervals of length h [s], what H takes over from their ends.
+    """Return, for intervals of length h [s], the weights of their end values in H.
 
     Returns:
         exp(−p h); and h ∫_0^1 (1 − u) exp(−p h u) du and h ∫_0^1 u exp(−p h u) du [s], the

@@ -69,7 +69,7 @@ def acceleration_unit(text: str) -> str:
 
 
 def unit_in_g(unit: str) -> float:
-    """Return how many g one unit of acceleration is (multiply samples by it).
+    """Return one unit of acceleration in g (multiply samples by it).
 
     Args:
         unit: any spelling that :func:`acceleration_unit` knows.
@@ -78,7 +78,7 @@ def unit_in_g(unit: str) -> float:
 
 
 def stated_in_g(text: str) -> float:
-    """Return how many g one unit is that a header states, g/10 among them.
+    """Return the unit of a header in g, g/10 among them.
 
     Raises:
         InputError: no unit of acceleration.

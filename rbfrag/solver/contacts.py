@@ -1,4 +1,4 @@
-"""Where the corners of a block are, and which of them touch its planes."""
+"""Positions of the corners of a block, and their contacts with its planes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ a few times 1e-9 of it."""
 def corner_at(
     centroid: tuple[float, float], turned_rad: float, arm: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return where a corner is whose arm from the centroid is that of the block not turned [m]."""
+    """Return the position [m] of a corner from its arm about the centroid before rotation."""
     c, s = math.cos(turned_rad), math.sin(turned_rad)
     return centroid[0] + arm[0] * c - arm[1] * s, centroid[1] + arm[0] * s + arm[1] * c
 
@@ -67,7 +67,7 @@ def gap_m(block: Block, pose: Pose) -> float:
 
 
 def touching(supported_block: SupportedBlock, pose: Pose) -> tuple[str, ...]:
-    """Return which corners of a block touch which plane."""
+    """Return the corners of a block that touch each plane."""
     block = supported_block.block
     assert block is not None
     corners = corners_of(supported_block, block)

@@ -1,4 +1,4 @@
-"""The critical value of one accelerogram: the one function that every kind answers through."""
+"""Critical value of one accelerogram, for every kind of failure."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def critical(
     scan_ratio: float | None = None,
     bracket: float | None = None,
 ) -> CriticalResult:
-    """Return the strongest block that a ground motion brings down, with its bracket.
+    """Return the strongest block that fails in a ground motion, with its bracket.
 
     Toppling: the largest k_r/PGA that topples at `p2`. Sliding: the largest k_y/PGA that slides
     further than `displacement_m`. Slumping and confined toppling: the smallest factor on the record
@@ -114,7 +114,7 @@ def critical(
 
 
 def kind_of(kind: str | None, options: Mapping[str, Any]) -> Kind:
-    """Return the model of a search, by name or by what is given."""
+    """Return the model of a search, by name or by its inputs."""
     if kind is not None:
         return model_of_kind(kind)
     if "p2" in options:
@@ -131,7 +131,7 @@ def kind_of(kind: str | None, options: Mapping[str, Any]) -> Kind:
 
 
 def judged_at_rest(options: Mapping[str, Any]) -> Stability:
-    """Return the stability of a block with its dip, or refuse one that no earthquake decides about.
+    """Return the stability of a block with its dip; reject blocks that fail or are locked at rest.
 
     Without a friction angle it is one that topples.
     """

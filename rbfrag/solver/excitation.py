@@ -1,4 +1,4 @@
-"""What drives a block: horizontal and vertical ground acceleration at common nodes."""
+"""Excitation of a block: horizontal and vertical ground acceleration at common nodes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BLOCK = 16
 
 
 class Nodes(NamedTuple):
-    """An excitation as the kernels take it; the names are those of :class:`Excitation`.
+    """Excitation as used by the kernels; the names are those of :class:`Excitation`.
 
     Args:
         time_s: node times [s], shape (n,).
@@ -85,7 +85,7 @@ class Excitation:
 
     @cached_property
     def tail_min_q(self) -> FloatArray:
-        """Least q from each node to the end, rest after the record included (so <= 0).
+        """Minimum q from each node to the end, rest after the record included (so <= 0).
 
         q is a ratio of two straight lines between nodes, hence monotone there, and its
         least value is at a node. Minus infinity where a jump is still to come: nothing is
@@ -98,24 +98,24 @@ class Excitation:
 
     @cached_property
     def tail_max_q(self) -> FloatArray:
-        """Greatest q from each node to the end, rest included; infinite where a jump is to come."""
+        """Maximum q from each node to the end, rest included; infinite before a jump."""
         filled = np.append(self.q, 0.0)
         filled[self.jump_node : self.w.size] = np.inf
         return np.ascontiguousarray(np.maximum.accumulate(filled[::-1])[::-1][:-1])
 
     @cached_property
     def block_max_q(self) -> FloatArray:
-        """Greatest q of each block of `BLOCK` nodes."""
+        """Maximum q of each block of `BLOCK` nodes."""
         return np.maximum.reduceat(self.q, np.arange(0, self.q.size, BLOCK))
 
     @cached_property
     def block_min_q(self) -> FloatArray:
-        """Least q of each block of `BLOCK` nodes."""
+        """Minimum q of each block of `BLOCK` nodes."""
         return np.minimum.reduceat(self.q, np.arange(0, self.q.size, BLOCK))
 
     @cached_property
     def nodes(self) -> Nodes:
-        """What a kernel needs of all this."""
+        """Arrays of the excitation that a kernel needs."""
         return Nodes(
             self.time_s, self.interval_s, self.k_h, self.w, self.tail_min_q,
             self.block_max_q, self.block_min_q,
@@ -125,12 +125,12 @@ class Excitation:
 
     @cached_property
     def min_q(self) -> float:
-        """Least q over the record."""
+        """Minimum q over the record."""
         return float(self.q.min())
 
     @cached_property
     def max_q(self) -> float:
-        """Greatest q over the record: no block with k_r at or above it ever lifts."""
+        """Maximum q over the record: no block with k_r at or above it uplifts."""
         return float(self.q.max())
 
     def scaled(self, factor: float) -> Excitation:
@@ -151,7 +151,7 @@ class Excitation:
         )
 
     def with_rest_after(self, duration_s: float, intervals: int) -> Excitation:
-        """Return the same shaking and a stretch of rest after it, to which the last sample jumps.
+        """Return the same shaking followed by a stretch of rest, to which the last sample jumps.
 
         Args:
             duration_s: length of the rest [s].
@@ -170,7 +170,7 @@ class Excitation:
 def excitation(
     motion: GroundMotion, vertical: GroundMotion | None = None, polarity: Polarity = "forward"
 ) -> Excitation:
-    """Bring a horizontal motion and its optional vertical to common nodes.
+    """Resample a horizontal motion and its optional vertical at common nodes.
 
     Args:
         motion: horizontal motion; its positive samples drive forward rotation under
@@ -254,5 +254,5 @@ def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> 
 def motion_remarks(
     motion: GroundMotion, vertical: GroundMotion | None, excited: Excitation
 ) -> tuple[str, ...]:
-    """Return the sentences about suspicious motions that an answer carries."""
+    """Return the warnings about suspicious motions that an answer includes."""
     return (*motion_warnings(motion, vertical), *excited.warnings)

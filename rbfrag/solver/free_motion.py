@@ -1,4 +1,4 @@
-"""A block on its planes where no mechanism describes it any more: `free_motion`.
+"""Motion of a block on its planes after its mechanism has ended: `free_motion`.
 
 Which corners touch is found step by step (`rbfrag.solver.integrator.free_body`). Impacts take the
 speed towards the plane and leave the rest: rigid bodies without rebound. Rigid contact does not
@@ -64,7 +64,7 @@ ON_ITS_FACE = "at {:.3f} s the block lies on its front face"
 
 @dataclass(frozen=True)
 class Release:
-    """Where and how fast a block is when its mechanism ends.
+    """Position and velocity of a block when its mechanism ends.
 
     Args:
         time_s: when [s].
@@ -110,7 +110,7 @@ class FreeError(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """What became of a block without a mechanism.
+    """Motion of a block after its mechanism has ended.
 
     Args:
         outcome: how it ended.
@@ -149,7 +149,9 @@ class FreeMotion:
 
     @cached_property
     def _alternatives(self) -> tuple[_Path, ...]:
-        """The runs by other laws, which take as long as the motion itself has taken."""
+        """Runs with alternative laws of impact and friction, which take as long as the motion
+        itself.
+        """
         return self.by_other_laws()
 
     @cached_property
@@ -164,7 +166,7 @@ class FreeMotion:
 
     @cached_property
     def by_law(self) -> tuple[Pose, ...]:
-        """Where the coarse run and those by other laws rest; () where not all of them do."""
+        """Resting places of the coarse run and of the alternative laws; () unless all runs rest."""
         paths = (self.coarse, *self._alternatives)
         if any(path.run.stop != AT_REST for path in paths):
             return ()
@@ -187,7 +189,7 @@ class FreeMotion:
 
     @cached_property
     def changes(self) -> tuple[ModeChange, ...]:
-        """What the block did, one entry where it does something else than before."""
+        """Modes of the motion, one entry for each change."""
         time_s, _, _, _, *velocities, touch = self.rows
         moving = np.any(velocities, axis=0)  # rest changes nothing of what it does
         time_s, touch, backward = time_s[moving], touch[moving], velocities[2][moving] > 0.0
@@ -206,7 +208,7 @@ class FreeMotion:
 
 
 class _Path(NamedTuple):
-    """One run: its history, and least, greatest and last rotation [rad] and displacement [m]."""
+    """One run: its history, and minimum, maximum and final rotation [rad] and displacement [m]."""
 
     run: FreeRun
     rows: FloatArray
@@ -218,7 +220,7 @@ class _Path(NamedTuple):
         return self.run.stop in (BACKWARD, FORWARD)
 
     def beside(self, other: _Path) -> FreeError:
-        """Return how far apart two runs are."""
+        """Return the differences between two runs."""
         rotations = zip(self.rotations, other.rotations, strict=True)
         slips = zip(self.slips, other.slips, strict=True)
         return FreeError(*(max(abs(a - b) for a, b in pairs) for pairs in (rotations, slips)))
@@ -232,7 +234,7 @@ def free_motion(
     at_toe: bool = False,
     by_law: tuple[Pose, ...] = (),
 ) -> FreeMotion:
-    """Return what a block does from where its mechanism has left it.
+    """Return the motion of a block from the end of its mechanism.
 
     Args:
         release: where and how fast it is.
@@ -339,7 +341,7 @@ def _extremes_and_end(begin: float, values: FloatArray, end: float) -> tuple[flo
 
 
 def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FloatArray:
-    """Return how far a contact has slipped along the base [m]."""
+    """Return the slip of a contact along the base [m]."""
     x, turned = rows[1], rows[3]
     start = contact[0] - block.heel[0]
     slips: FloatArray = x + contact[0] * np.cos(turned) - contact[1] * np.sin(turned) - start
@@ -377,7 +379,7 @@ another."""
 
 
 def _named(touch: int, *, backward: bool) -> str:
-    """Return what a moving block does, by what touches its planes."""
+    """Return the mode of a moving block, by its contacts with its planes."""
     if touch & HEEL and touch & TOE:
         return SLIDES
     if touch & HEEL:
@@ -394,7 +396,7 @@ _MOMENT_S = 1e-6
 
 
 def released(time_s: float, pose: Callable[[float], Pose], position: float, rate: float) -> Release:
-    """Return where and how fast a mechanism leaves its block.
+    """Return position and velocity of a block at the end of its mechanism.
 
     Args:
         time_s: when [s].

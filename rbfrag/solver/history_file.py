@@ -1,4 +1,4 @@
-"""The motion of a block in time as CSV."""
+"""History of the block's motion as CSV."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ does not apply."""
 
 
 def write_history(response: Response, path: str | os.PathLike[str]) -> None:
-    """Write the motion of the block in time as CSV, whole or not at all.
+    """Write the history of the block's motion as CSV, completely or not at all.
 
     Args:
         response: a response that was asked for with its history.
@@ -77,7 +77,7 @@ def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float 
 
 
 def _written(values: FloatArray) -> list[float | str]:
-    """Return numbers as they are written; nothing where there is none."""
+    """Return numbers in their written form; NaN as an empty cell."""
     return [value if math.isfinite(value) else "" for value in values.tolist()]
 
 

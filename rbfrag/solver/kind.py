@@ -1,4 +1,4 @@
-"""What a kind of failure is: how a block of it answers.
+"""Interface of a kind of failure: response, run and critical value of its blocks.
 
 A kind is a line of facts in `rbfrag.solver.kinds` and one object, ``MODEL``, in the file of its
 name in `rbfrag/solver/models`. Who computes asks these, never for the name.
@@ -28,7 +28,7 @@ SHAKING = ("vertical", "polarity", "search_limit")
 
 @dataclass(frozen=True)
 class SupportedBlock:
-    """A block, its planes and the settings of its motion, as a model sees them.
+    """A block, its planes and the settings of its motion, as used by a model.
 
     Args:
         block: its shape and size; None where numbers describe it.
@@ -61,7 +61,7 @@ class SupportedBlock:
     def of(
         cls, block: Block, judged: Stability, mode: ModeName | None, settings: Mapping[str, Any]
     ) -> SupportedBlock:
-        """Return a block whose stability is known, as a model of a mode sees it."""
+        """Return the supported block of a model from a block and its stability."""
         return cls(
             block,
             math.radians(judged.beta_deg),
@@ -82,7 +82,7 @@ class SupportedBlock:
 
 @dataclass(frozen=True, eq=False)
 class Shaking:
-    """What a model is asked: which motion, and what to keep.
+    """Excitation of one response, and the options of its result.
 
     Args:
         vertical: vertical motion of the same recording, upward positive.
@@ -110,7 +110,7 @@ class Shaking:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What an answer should say about the block and about the motion."""
+        """Warnings about the block and about the motion."""
         return (*self.remarks, *motion_remarks(self.motion, self.vertical, self.excitation))
 
 
@@ -143,7 +143,7 @@ Runner = Callable[[Excitation], RunEnd]
 
 
 class Kind(KindSpec):
-    """Base of the kinds: the facts of one, and what it answers without a search.
+    """Base class of the kinds: static facts, and answers without a search.
 
     Attributes:
         carries_state: whether a motion leaves a block somewhere else than it found it.
@@ -153,15 +153,15 @@ class Kind(KindSpec):
 
     @classmethod
     def named(cls, kind: str) -> Self:
-        """Return the model of a kind with the facts of it."""
+        """Return the model of a kind with its static facts."""
         return cls(**vars(facts_of(kind)))
 
     def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
-        """Return what the block does."""
+        """Return the response of the block."""
         raise NotImplementedError
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
-        """Return a function that says how the block ends under an excitation."""
+        """Return a function that gives the end of the block's run under an excitation."""
         raise NotImplementedError
 
     def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
@@ -174,7 +174,7 @@ class Kind(KindSpec):
         raise InputError(f"no critical values of kind {self.kind} are computed{why}")
 
     def refuse_foreign(self, options: Iterable[str], allowed: Sequence[str]) -> None:
-        """Refuse an option that is not among the kind's own."""
+        """Reject an option that the kind does not support."""
         foreign = sorted(set(options) - set(allowed))
         if foreign:
             remedy = f"its options are {' and '.join(allowed)}" if allowed else "omit it"

@@ -1,4 +1,4 @@
-"""The kinds that there are: a line of facts each, for which no model is loaded.
+"""Kinds of failure: one line of static facts each, for which no model is loaded.
 
 What a kind does is in its model, `rbfrag/solver/models/<kind>.py`; see
 :func:`rbfrag.solver.models.model_of_kind`.
@@ -20,7 +20,7 @@ PLANES = ("beta_deg", "phi_deg", "phi_back_deg", "water_m", "drainage", "density
 
 @dataclass(frozen=True)
 class KindSpec:
-    """What is known of a kind of failure before anything is computed.
+    """Static facts of a kind of failure.
 
     Args:
         mode: failure mode of its blocks; None where no geometry chooses it.
@@ -47,7 +47,7 @@ class KindSpec:
 
     @property
     def searchable(self) -> bool:
-        """Whether it has a critical value."""
+        """True if the kind has a critical value."""
         return bool(self.search_needs)
 
 
@@ -85,7 +85,7 @@ FREE_STANDING = next(facts.kind for facts in KINDS.values() if facts.free_standi
 
 
 def facts_of(kind: str) -> KindSpec:
-    """Return the facts of the kind of that name."""
+    """Return the facts of a kind by name."""
     if kind not in KINDS:
         raise InputError(
             f"unknown kind {kind!r}: use one of {', '.join(sorted(KINDS))} "
@@ -95,7 +95,7 @@ def facts_of(kind: str) -> KindSpec:
 
 
 def mode_of_kind(kind: str) -> str:
-    """Return the failure mode of the blocks of a kind; empty for no kind, or one without."""
+    """Return the failure mode of a kind's blocks; empty for no kind, or one without a mode."""
     facts = KINDS.get(kind)
     return "" if facts is None else facts.mode or ""
 
@@ -114,7 +114,7 @@ def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindSpec:
 
 
 def stands_free_of(facts: KindSpec, back_fracture: bool) -> bool:
-    """Return whether a block is asked of a kind of backed blocks though nothing backs it.
+    """Return whether a free-standing block is used with a kind of backed blocks.
 
     Args:
         back_fracture: whether there is a plane behind the block.
@@ -135,5 +135,5 @@ BY_MECHANICS, FOLLOWED = "by mechanics", "followed in time"
 
 
 def by_model(names: str) -> str:
-    """Return how it is answered where models of these names answer."""
+    """Return the text for an answer by the models of these names."""
     return f"model {names}"

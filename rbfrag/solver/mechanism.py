@@ -1,5 +1,6 @@
-"""Kinds that state a mechanism of one degree of freedom: how they answer, and what is known of one
-block's mechanism at rest."""
+"""Kinds with a mechanism of one degree of freedom: their response, and the mechanism of one block
+at rest.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from rbfrag.solver.stability.single import refuse_undecided, stability
 
 
 def driven_up_below(supported_block: SupportedBlock) -> float:
-    """Return the k_h/(1 + k_v) below which the whole block slides up its back plane.
+    """Return the k_h/(1 + k_v) below which the entire block slides up its back plane.
 
     -tan(γ + β + φ_back); minus infinity for a block that no pulse drives up it.
     """
@@ -34,7 +35,7 @@ def driven_up_below(supported_block: SupportedBlock) -> float:
 
 
 class MechanismKind(Kind):
-    """A kind that states a mechanism; the engine for one degree of freedom runs it.
+    """A kind defined by a mechanism, which the engine for one degree of freedom integrates.
 
     Attributes:
         yield_name: symbol of its yield acceleration.
@@ -48,7 +49,7 @@ class MechanismKind(Kind):
         raise NotImplementedError
 
     def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
-        """Return what the block does.
+        """Return the response of the block.
 
         Raises:
             InputError: the base has cohesion.
@@ -62,7 +63,7 @@ class MechanismKind(Kind):
         return response_of(self.kind, simulation, shaking)
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
-        """Return a function that says how the block ends under an excitation."""
+        """Return a function that gives the end of the block's run under an excitation."""
         mechanism = self._without_cohesion(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
@@ -84,7 +85,7 @@ class MechanismKind(Kind):
 
 @dataclass(frozen=True, eq=False)
 class ShakenMechanism:
-    """A stable block of a mechanism that rotates.
+    """A stable block with a rotational mechanism.
 
     Args:
         mechanism: its motion.
@@ -103,7 +104,7 @@ class ShakenMechanism:
     supported_block: SupportedBlock
 
     def run(self, excited: Excitation, *, stepwise: bool = True) -> Simulation:
-        """Follow the block under an excitation; `stepwise` as of :func:`simulate_block`."""
+        """Simulate the block under an excitation; `stepwise` as of :func:`simulate_block`."""
         return simulate_block(self.mechanism, self.supported_block, excited, stepwise=stepwise)
 
 

@@ -1,4 +1,4 @@
-"""The motion in time that a kernel kept: nodes that it moved through, and events between them."""
+"""Time history recorded by a kernel: nodes at which the block moves, and events between them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def with_free_motion(excited: Excitation, p: float) -> Excitation:
 def node_history(
     excited: Excitation, longer: Excitation, rows: FloatArray, *, toppled: bool
 ) -> ResponseHistory:
-    """Return the history of a run; the nodes of rest, which kernels skip, are put back.
+    """Return the history of a run, with the nodes of rest, which kernels skip, inserted again.
 
     Args:
         excited: the excitation; all its nodes are shown unless the block topples.

@@ -1,4 +1,4 @@
-"""Single numbers as people give them: taken as floats, or refused with the permitted range."""
+"""Validation of single numbers: converted to floats, or rejected with the permitted range."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def number(value: object, name: str, expected: str) -> float:
 
 
 def positive(value: object, name: str, unit: str) -> float:
-    """Return a finite number above zero as a float, or refuse it."""
+    """Return a finite number above zero as a float, or reject it."""
     expected = f"a number above 0 [{unit}]" if unit else "a number above 0"
     result = number(value, name, expected)
     if result <= 0.0:
@@ -36,7 +36,7 @@ def positive(value: object, name: str, unit: str) -> float:
 
 
 def not_negative(value: object, name: str, unit: str) -> float:
-    """Return a finite number of zero or more as a float, or refuse it."""
+    """Return a finite number of zero or more as a float, or reject it."""
     expected = f"0 or more [{unit}]"
     result = number(value, name, expected)
     if result < 0.0:
@@ -45,7 +45,7 @@ def not_negative(value: object, name: str, unit: str) -> float:
 
 
 def angle(value: object, name: str, above: float, below: float) -> float:
-    """Return an angle between two limits, both excluded, or refuse it [deg]."""
+    """Return an angle between two limits, both excluded, or reject it [deg]."""
     expected = f"an angle between {above:g} and {below:g} degrees"
     result = number(value, name, expected)
     if not above < result < below:
@@ -57,7 +57,7 @@ def angle(value: object, name: str, above: float, below: float) -> float:
 
 
 def friction_angle(value: object, name: str) -> float:
-    """Return a friction angle, from 0 and below 90 degrees, or refuse it [deg]."""
+    """Return a friction angle, from 0 and below 90 degrees, or reject it [deg]."""
     expected = "a friction angle from 0 to below 90 degrees"
     result = number(value, name, expected)
     if not 0.0 <= result < 90.0:
@@ -66,7 +66,7 @@ def friction_angle(value: object, name: str) -> float:
 
 
 def vertical_g(value: object) -> float:
-    """Return a vertical ground acceleration above -1 g, or refuse it [g]."""
+    """Return a vertical ground acceleration above -1 g, or reject it [g]."""
     result = number(value, "kv", "the vertical acceleration of the ground in g, up positive")
     if result <= -1.0:
         raise InputError(
@@ -77,12 +77,12 @@ def vertical_g(value: object) -> float:
 
 
 def finite_or_none(value: float | None) -> float | None:
-    """Return a number, or None where there is none: kernels and formulas say NaN or infinity."""
+    """Return a number, or None for NaN and infinity."""
     return value if value is not None and math.isfinite(value) else None
 
 
 def json_value(value: Any) -> Any:
-    """Return a value of an answer as JSON knows it: infinities and NaN are None."""
+    """Return a value of an answer in JSON form: infinities and NaN are None."""
     if isinstance(value, float):
         return finite_or_none(value)
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""What a block does under a ground motion: the one function that every model answers through."""
+"""Response of a block to a ground motion, for every kind of failure."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def respond(
     history: bool = False,
     **of_kind: Any,
 ) -> Response:
-    """Return what a block does under a ground motion, or under several one after another.
+    """Return the response of a block to a ground motion, or to several in sequence.
 
     The block is given in one of three ways: `p2` and `kr` (it topples, or rocks on level ground if
     `kind` says so), `ky` (it slides), or `block` with `beta_deg` and `phi_deg`, whose failure mode
@@ -160,7 +160,7 @@ def respond(
 def known_by_numbers(
     kind: str | None, numbers: Mapping[str, float | None], settings: Mapping[str, Any]
 ) -> tuple[Kind, SupportedBlock]:
-    """Return a block that is given by numbers, and the model that answers for it.
+    """Return a block defined by p2 and kr or by ky, and its model.
 
     Args:
         kind: the model; None for that of the mode which the numbers mean.
@@ -203,7 +203,7 @@ def known_by_numbers(
 
 @dataclass(frozen=True, eq=False)
 class _Shaken:
-    """What shakes the block, as :func:`respond` was asked."""
+    """Motions and options of a call of :func:`respond`."""
 
     motion: MotionLike | Sequence[MotionLike]
     vertical: MotionLike | Sequence[MotionLike | None] | None
@@ -216,7 +216,7 @@ class _Shaken:
         self, model: Kind, supported_block: SupportedBlock, remarks: tuple[str, ...] = (),
         mode: ModeName | None = None,
     ) -> Response:  # fmt: skip
-        """Return what a model answers about a block of a failure mode; None for the model's."""
+        """Return the response of a block by a model, for a failure mode; None for the model's."""
         if self.start is not None and not model.carries_state:
             raise InputError(f"start cannot be combined with {model.kind}: {STARTS_ANEW}")
 
@@ -254,7 +254,7 @@ def _vertical(vertical: Any) -> GroundMotion | None:
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> SupportedBlock:
-    """Return a block of which frequency parameter [1/s²] and yield acceleration [g] are known."""
+    """Return a block defined by its frequency parameter [1/s²] and yield acceleration [g]."""
     rough_rad = 0.5 * math.pi
     return SupportedBlock(None, 0.0, rough_rad, rough_rad, kr, settings=settings, p2=p2)
 
@@ -262,14 +262,14 @@ def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> Suppo
 def _site(
     block: Block, judged: Stability, model: Kind, settings: Mapping[str, Any]
 ) -> SupportedBlock:
-    """Return the block on its planes as the model that its mode calls for, or another, sees it."""
+    """Return the supported block in the form that its model uses."""
     if not model.free_standing:
         refuse_undecided(judged)
     return SupportedBlock.of(block, judged, model.mode, settings)
 
 
 def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
-    """Return what is known about the block that the answer of a model should say."""
+    """Return the warnings about the block for the answer of a model."""
     if model.mode == judged.mode:
         unbacked = stands_free_of(model, judged.back_fracture)
         note = Diagnostic(NOT_BACKED, "free_standing")
@@ -285,7 +285,7 @@ def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
 
 
 def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> SupportedBlock:
-    """Return a plane of which only the yield acceleration is known."""
+    """Return a plane defined by its yield acceleration alone."""
     ky = positive(ky, "ky", "the yield acceleration coefficient of sliding, in g")
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
     phi_rad = math.radians(beta_deg) + math.atan(ky)
@@ -301,7 +301,7 @@ def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> Suppo
 
 
 def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> Kind:
-    """Return the model that numbers alone suffice for, unless another one that they describe."""
+    """Return the model for which numbers suffice, unless another one was requested."""
     if kind is None:
         return model_of_mode(mode)
     model = model_of_kind(kind)

@@ -1,4 +1,4 @@
-"""What a known motion does to a block that is not known exactly: the share of simulated draws."""
+"""Response of an uncertain block to a given motion: the fraction of simulated draws that fails."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FAILS_BY = "displacement_m"
 
 @dataclass(frozen=True, repr=False)
 class DrawnResponses(Result):
-    """What one motion did to the draws of one block.
+    """Responses of the draws of one block to one motion.
 
     Args:
         kind: the model that was run.
@@ -117,7 +117,7 @@ def respond_draws(
     draws: int = 200,
     seed: int = 1,
 ) -> DrawnResponses:
-    """Return which share of the blocks that one may be fails under a ground motion.
+    """Return the fraction of a block's draws that fails under a ground motion.
 
     Each draw is simulated, none is emulated. A block is given by `p2` and `kr` (it topples, or
     rocks if `kind` says so) or by `ky` (it slides), as for :func:`rbfrag.respond`, by medians with
@@ -207,7 +207,7 @@ def respond_draws(
 
 
 def wilson(failed: int, count: int) -> tuple[float, float]:
-    """Return the interval of a share that a count leaves open, at :data:`LEVEL`.
+    """Return the Wilson confidence interval of a fraction from counts, at :data:`LEVEL`.
 
     Wilson (1927), Journal of the American Statistical Association 22, 209-212: also where none or
     all have failed it is not a point.
@@ -222,7 +222,7 @@ def wilson(failed: int, count: int) -> tuple[float, float]:
 
 
 def _checked(draws: object, seed: object) -> tuple[int, np.random.Generator]:
-    """Return the number of draws and a generator, or refuse what is none."""
+    """Return the number of draws and a generator, or reject invalid input."""
     for name, value, least, most in (("draws", draws, 1, MOST_DRAWS), ("seed", seed, 0, 2**63 - 1)):
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise InputError(f"{name} = {value!r}: give a whole number from {least} to {most}")
@@ -274,7 +274,7 @@ def _picked(
     count: int,
     generator: np.random.Generator,
 ) -> dict[str, FloatArray]:
-    """Return so many of the draws that are given, taken by their weights."""
+    """Return a number of the given draws, sampled by their weights."""
     try:
         raw_weights = np.asarray(1.0 if weights is None else weights, dtype=np.float64)
         *columns, weight = np.broadcast_arrays(*values.values(), raw_weights)

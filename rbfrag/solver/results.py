@@ -1,4 +1,4 @@
-"""What the solver answers: plain frozen data."""
+"""Results of the solver: plain frozen data."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ RESOLUTION = 1e-6
 
 
 class Outcome(StrEnum):
-    """How a run ended. Each member says in one sentence what to make of it."""
+    """Outcome of a run. Each member has a sentence that explains it."""
 
     advice: str
 
@@ -103,7 +103,7 @@ class ResponseHistory:
 
 @dataclass(frozen=True)
 class ModeChange:
-    """A change of what the block does within one run.
+    """A change of the block's mode of motion within one run.
 
     Args:
         time_s: when [s].
@@ -116,7 +116,7 @@ class ModeChange:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the block is, in the base frame with the heel at rest as origin.
+    """Position of the block, in the base frame with the heel at rest as origin.
 
     Args:
         turned_rad: rotation, counter-clockwise [rad].
@@ -132,7 +132,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class BlockState:
-    """A block at rest where a motion has left it, from which another one may start.
+    """A block at rest after a motion, from which another one may start.
 
     Args:
         turned_rad: rotation, counter-clockwise with the slope falling to the right [rad].
@@ -159,7 +159,7 @@ class BlockState:
     by_law: tuple[Pose, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it with the keys of the JSON contract."""
+        """Return the state with the keys of the JSON contract."""
         return {
             "rotation_rad": self.turned_rad,
             "displacement_m": self.displacement_m,
@@ -308,7 +308,7 @@ class Response(Result):
 
     @property
     def how(self) -> str:
-        """How it was answered: ``followed in time``, or ``by mechanics`` where nothing moves it."""
+        """Source of the answer: ``followed in time``, or ``by mechanics`` without motion."""
         return BY_MECHANICS if self.started_s is None and not self.steps else FOLLOWED
 
     def sentences(self) -> Iterator[str]:
@@ -385,8 +385,8 @@ class Response(Result):
 
 @dataclass(frozen=True, eq=False)
 class SearchPoints:
-    """Blocks simulated for themselves: those of a search by falling k_r/PGA, those of an outcome
-    grid in its order.
+    """Blocks simulated individually: those of a search by falling k_r/PGA, those of an outcome grid
+    in its order.
 
     Args:
         kr_over_pga: block strength over PGA, shape (n,).
@@ -410,7 +410,7 @@ IntervalOutcome = Literal["topples", "safe", "undecided"]
 
 @dataclass(frozen=True, eq=False)
 class OutcomeIntervals:
-    """What becomes of every block of a range of k_r: a partition, by rising k_r/PGA.
+    """Outcome of every block over a range of k_r: a partition, by rising k_r/PGA.
 
     Args:
         k_lo: lower ends, k_r/PGA, shape (n,); `k_lo[i + 1] == k_hi[i]`.

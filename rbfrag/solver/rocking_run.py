@@ -1,4 +1,4 @@
-"""One free-standing block under one excitation: the public form of the kernel of two corners."""
+"""One free-standing block under one excitation: the public form of the rocking kernel."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NO_ROWS = np.empty((4, 0))
 
 @dataclass(frozen=True)
 class FreeBlock:
-    """A block that stands free on two corners.
+    """A free-standing block on two corners.
 
     Args:
         toe: the corner of forward rotation, down the base.
@@ -47,7 +47,7 @@ class FreeBlock:
 
     @property
     def slowest_p(self) -> float:
-        """The lesser of both frequency parameters p [1/s]."""
+        """The smaller of both frequency parameters p [1/s]."""
         return min(self.toe.p, self.heel.p)
 
     @property
@@ -80,7 +80,7 @@ def simulate(
 
 @dataclass(frozen=True, eq=False)
 class RockingHistory:
-    """The motion in time, and the impacts in it.
+    """Time history of the motion, and its impacts.
 
     Args:
         motion: rotation (forward positive) and its rate at nodes and events.
@@ -110,7 +110,7 @@ def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> Rock
 
 @dataclass(frozen=True)
 class CornerForce:
-    """The force on the corner in motion, where it leaves the model.
+    """Force on the rotating corner, and the instants at which it violates the model.
 
     Args:
         lifts_s: when the normal force first vanishes [s]; None if it never does.
@@ -126,7 +126,7 @@ class CornerForce:
 def corner_force(
     block: FreeBlock, history: ResponseHistory, tan_phi: float, until_s: float
 ) -> CornerForce:
-    """Return what the corner would need beyond pressure and friction.
+    """Return the force at the corner that exceeds pressure and friction.
 
     R/m = r (θ'' t - θ'² e) - g G in the base frame, with e from the corner to the centroid and t
     across it (physics of toppling, section 5); backward rotation is the mirror image.

@@ -1,4 +1,4 @@
-"""Values that are not known exactly: lognormal about a median, or between 0 and 1."""
+"""Uncertain values: lognormal about a median, or between 0 and 1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several motions, one after another: each finds the block where the one before has left it."""
+"""Several motions in sequence: each finds the block where the previous one has left it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Motions:
 def respond_in_sequence(
     run: Run, motions: Motions, *, carries_state: bool, start: BlockState | None = None
 ) -> Response:
-    """Return what a block does under several motions.
+    """Return the response of a block to several motions in sequence.
 
     Args:
         run: answers one motion.
@@ -115,7 +115,7 @@ def respond_in_sequence(
 
 
 def _too_short(overlaps_s: float, number: int) -> str:
-    """Say what it means that the next motion comes to a block that still moves.
+    """Return the warning that the next motion starts while the block still moves.
 
     The velocity of a slide grows with the velocity that it begins with, so both motions together
     slide it no less than the first by itself to its last sample and the second from rest: the sum
@@ -131,7 +131,7 @@ def _too_short(overlaps_s: float, number: int) -> str:
 
 
 def _is_over(response: Response, carries_state: bool) -> bool:
-    """Whether nothing can be said of the next motion."""
+    """Return whether the response to the next motion is undefined."""
     if carries_state:
         return response.state is None
     return response.outcome in (Outcome.TOPPLED, Outcome.JUMP)
@@ -145,7 +145,7 @@ def _why(part: Part) -> str:
 
 
 def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
-    """Return the values of a whole sequence."""
+    """Return the values of the complete sequence."""
     answers = [part.response for part in parts]
     outcome = max((answer.outcome for answer in answers), key=WORST_LAST.index)
     of_parts = (

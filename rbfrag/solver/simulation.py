@@ -1,4 +1,4 @@
-"""A block followed to its end: by its mechanism, and step by step from where that ends."""
+"""Simulation of a block to its end: by its mechanism, then step by step after that ends."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from rbfrag.solver.stability.modes import ModeName
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A block followed to its end: by its mechanism, and from where that ends step by step.
+    """Simulated motion of a block: by its mechanism, then step by step after that ends.
 
     Args:
         mechanism: the block as its model describes it.
@@ -54,7 +54,7 @@ class Simulation:
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended."""
+        """Outcome of the simulation."""
         return self._last.outcome
 
     @property
@@ -65,12 +65,12 @@ class Simulation:
 
     @property
     def pose(self) -> Pose:
-        """Where the block is at the end."""
+        """Position of the block at the end."""
         return self._last.pose
 
     @property
     def ending(self) -> str:
-        """What happened at the end; empty where there is nothing to say."""
+        """Text on the end of the motion; empty where there is none."""
         if self.free_motion is not None:
             return self.free_motion.sentence
         assert self.run is not None
@@ -84,7 +84,7 @@ class Simulation:
 
     @property
     def ended_s(self) -> float | None:
-        """Last standstill, or where the model ended [s]; None for no motion."""
+        """Last standstill, or the end of the model's validity [s]; None without motion."""
         if self.free_motion is None:
             assert self.run is not None
             return self.run.ended_s
@@ -93,7 +93,7 @@ class Simulation:
 
     @property
     def peak_rad(self) -> float | None:
-        """Greatest rotation [rad]; None for a block that only slides."""
+        """Peak rotation [rad]; None for a block that only slides."""
         peak = self.run.peak if self.run is not None and self.mechanism.rotates else None
         if self.free_motion is None:
             return peak
@@ -101,7 +101,7 @@ class Simulation:
 
     @property
     def peak_displacement_m(self) -> float:
-        """Greatest displacement along the base [m]."""
+        """Peak displacement along the base [m]."""
         slips = [self.run.peak_displacement_m] if self.run is not None else []
         return max([*slips, self.free_motion.slip_m] if self.free_motion is not None else slips)
 
@@ -115,7 +115,7 @@ class Simulation:
 
     @property
     def error(self) -> float:
-        """The same with what laws of impact and friction leave open after a lost contact.
+        """The same including the spread of the laws of impact and friction after a lost contact.
 
         Infinite also where some of them let the block fail and others do not.
         """
@@ -134,7 +134,7 @@ class Simulation:
 
     @property
     def changes(self) -> tuple[ModeChange, ...]:
-        """What the block did after its first motion."""
+        """Changes of mode after the first motion."""
         changes = () if self.run is None else self.run.changes
         free_changes = () if self.free_motion is None else self.free_motion.changes
         return (*(ModeChange(change.time_s, change.name) for change in changes), *free_changes)
@@ -164,7 +164,7 @@ class Simulation:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What the answer takes for granted, and where it ends."""
+        """Assumptions of the answer, and the limit of the model."""
         sentences = () if self.run is None else self.run.sentences
         if self.free_motion is None:
             return sentences
@@ -176,7 +176,7 @@ class Simulation:
         return (*sentences, self.free_motion.sentence) if self.free_motion.sentence else sentences
 
     def state(self, error: float, *, laws: bool) -> BlockState | None:
-        """Return where the block is left at rest; None where it is not.
+        """Return the state in which the block is left at rest; None if it is not.
 
         Args:
             error: bound on its error.
@@ -227,7 +227,7 @@ def simulate_block(
     start: BlockState | None = None,
     stepwise: bool = True,
 ) -> Simulation:
-    """Follow a block to its end.
+    """Simulate a block to its end.
 
     Args:
         mechanism: the block as its model describes it.
@@ -261,7 +261,7 @@ def simulate_block(
 
 
 def end_of(simulation: Simulation, mode: ModeName | None, about_block: tuple[str, ...]) -> RunEnd:
-    """Return how a block that was followed ends, without its history.
+    """Return the end of a simulation, without its history.
 
     Args:
         mode: failure mode of its model, in which it ends where no other motion is that of a mode.
@@ -282,7 +282,7 @@ def end_of(simulation: Simulation, mode: ModeName | None, about_block: tuple[str
 
 
 def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response:
-    """Return the answer about a block that was followed.
+    """Return the response of a simulated block.
 
     Args:
         kind: name of its model.
@@ -330,7 +330,7 @@ def response_of(kind: str, simulation: Simulation, shaking: Shaking) -> Response
 
 
 def _samples(excited: Excitation, simulation: Simulation) -> int:
-    """Return the sample intervals through which a block was followed step by step."""
+    """Return the number of sample intervals that were integrated step by step."""
     assert simulation.free_motion is not None
     history = simulation.free_motion.history
     moving = history.time_s[(history.rate_rad_s != 0.0) | (history.slip_m_s != 0.0)]
@@ -351,7 +351,7 @@ def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> Kinematics:
 
 
 def _history(simulation: Simulation, excited: Excitation) -> ResponseHistory:
-    """Put the nodes of rest, which the kernels skip, back between those of motion."""
+    """Insert the nodes of rest, which the kernels skip, between those of motion."""
     mechanism = simulation.mechanism
     parts = []
     if simulation.run is not None and simulation.run.history is not None:
@@ -408,7 +408,7 @@ def _nodes_of_rest(trajectory: Kinematics, excited: Excitation) -> FloatArray:
 
 
 def _at_start(simulation: Simulation) -> tuple[Pose, float]:
-    """Return where the motion finds the block, and its strength there; NaN if it is not known."""
+    """Return the position of the block at the start, and its strength there; NaN if undefined."""
     state, first = simulation.start, simulation.mechanism.first
     if state is None:
         return first.pose(0.0), first.forward.threshold(0.0)

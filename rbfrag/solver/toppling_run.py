@@ -36,7 +36,7 @@ def respond(
     kind: str = "toppling",
     history: bool = False,
 ) -> Response:
-    """Return what a toppling block does under a ground motion.
+    """Return the response of a toppling block to a ground motion.
 
     Args:
         motion: horizontal ground motion.
@@ -87,7 +87,7 @@ def simulate(
 
 
 def outcome_of(run: Run) -> Outcome:
-    """Return how a run ended; undetermined where its error is beyond any number."""
+    """Return the outcome of a run; undetermined if its error is not finite."""
     return Outcome.UNDETERMINED if math.isnan(run.error_rad) else OUTCOMES[run.outcome]
 
 
@@ -102,7 +102,7 @@ def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
 
 
 def refuse_endless(excited: Excitation, p2: float) -> None:
-    """Refuse a block so small that one run would not end in reasonable time."""
+    """Reject a block so small that one run would not end in reasonable time."""
     steps = math.sqrt(p2) * float(excited.time_s[-1] - excited.time_s[0]) / PH_MAX
     if steps > MOST_STEPS:
         raise InputError(
@@ -112,7 +112,7 @@ def refuse_endless(excited: Excitation, p2: float) -> None:
 
 
 def history_of(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
-    """Run again over the record and a stretch of rest after it, keeping every node."""
+    """Repeat the run over the record and a stretch of rest after it, recording every node."""
     p = math.sqrt(p2)
     longer = with_free_motion(excited, p)
     # nodes, and at most a start, a peak and an impact twice in an interval

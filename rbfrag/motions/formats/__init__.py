@@ -1,1 +1,1 @@
-"""One file a format: the pattern that recognises it, and its parse."""
+"""Record formats, one file each: the pattern that identifies a format, and its parser."""

@@ -48,7 +48,7 @@ _SPECTRA = re.compile(r"\s*response .*\bspectra\b", re.IGNORECASE)
 
 
 def recognises(head: str) -> bool:
-    """Return whether a text is of V2, or holds the spectra of V3."""
+    """Return whether a text is of V2, or contains the spectra of V3."""
     return bool(_HEAD.match(head) or _SPECTRA.match(head))
 
 

@@ -34,7 +34,7 @@ recognises = _HEAD.match
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a file.
+    """Yield the only trace of a file.
 
     The time of the recorder is no start of the samples: files differ in the zone and in whether
     it is the trigger's. Components go together by earthquake and station.

@@ -87,7 +87,7 @@ def recognises(head: str) -> bool:
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a delimited text file; such files state no number of samples."""
+    """Yield the only trace of a delimited text file; such files have no number of samples."""
     lines = file.lines
     start = _first_data_line(lines)
     header = [
@@ -230,7 +230,7 @@ def _refuse_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
 
 
 def _indexed_interval(path: Path) -> tuple[float, str] | None:
-    """The dt [s] that the index beside a file gives it, and where it does so, or None."""
+    """Return the dt [s] of a file from the index in its folder, and where it does so, or None."""
     index = path.parent / INDEX
     if not index.is_file():
         return None
@@ -252,7 +252,7 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
 
 
 def _stated_unit(file: RecordFile, header: Header) -> HeaderField | None:
-    """The unit of acceleration that the header states, once or alike several times."""
+    """Return the unit of acceleration in the header, given once or consistently several times."""
     _check_columns(file, header)
     candidates = [HeaderField(spelling, number) for number, spelling in _spellings(header)]
     units = [field for field in candidates if _is_unit(field.text)]
@@ -310,7 +310,7 @@ def _check_columns(file: RecordFile, header: Header) -> None:
 
 
 def _check_units(file: RecordFile, number: int, units: list[str]) -> None:
-    """Refuse columns whose names say nothing, but whose units do: other times, or a swap."""
+    """Reject columns whose units contradict their order: other times, or a swap."""
     at = next((place for place, unit in enumerate(units) if _is_unit(unit)), None)
     if at is None:
         return

@@ -20,7 +20,7 @@ recognises = _HEAD.match
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a file."""
+    """Yield the only trace of a file."""
     lines = file.lines
     first = next((at for at, line in enumerate(lines) if not _KEY.match(line)), len(lines))
     fields = NamedFields(file, range(first))

@@ -39,7 +39,7 @@ recognises = _HEAD.match
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a file."""
+    """Yield the only trace of a file."""
     fields, first = _header(file)
 
     def field(name: str) -> HeaderField:

@@ -63,7 +63,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 
 
 def _whole_records(file: RecordFile, pymseed: Any, raw: bytes) -> tuple[bytes, str]:
-    """The records that can be read, and a remark where others are left out."""
+    """Return the complete records, and a remark if others are omitted."""
     end = samples = 0
     try:
         for record in pymseed.MS3Record.from_buffer(raw):

@@ -45,7 +45,7 @@ def recognises(head: str) -> bool:
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of an AT2 file."""
+    """Yield the only trace of an AT2 file."""
     sampling = _sampling(file.lines)
     assert sampling is not None, "parse() is called for recognised text only"
     at, match = sampling

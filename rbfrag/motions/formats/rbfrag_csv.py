@@ -154,7 +154,7 @@ def _header(file: RecordFile, span: range) -> dict[str, Any]:
 
 
 def _valid_label(name: str, value: object) -> Any:
-    """The value of a label, or None where it is none."""
+    """Return the value of a label, or None if it is invalid."""
     if not isinstance(value, _KINDS[name]) or isinstance(value, bool) is not (
         _KINDS[name] == (bool,)
     ):

@@ -66,7 +66,7 @@ def parse(file: RecordFile) -> Iterator[ParsedTrace]:
 
 
 def _unit(file: RecordFile, header: range) -> HeaderField | None:
-    """The unit of all three columns, or None where none is stated."""
+    """Return the unit of all three columns, or None if there is none."""
     fields = []
     for at in header:
         line = file.lines[at]
@@ -92,7 +92,7 @@ def _unit(file: RecordFile, header: range) -> HeaderField | None:
 
 def _no_acceleration(file: RecordFile, quantity: str, line: int) -> Exception:
     return file.error(
-        f"the columns hold {quantity}, no acceleration: take the .acc.bbp file of the same station, "
-        "or correct the header",
+        f"the columns hold {quantity}, no acceleration: take the .acc.bbp file of the same "
+        "station, or correct the header",
         line,
     )

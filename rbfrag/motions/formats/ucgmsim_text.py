@@ -25,7 +25,7 @@ recognises = _HEAD.match
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a file.
+    """Yield the only trace of a file.
 
     The stem of its name, which the three components share, is the recording id: the file names
     no event.

@@ -100,7 +100,7 @@ def _slashed(text: str) -> list[str]:
 
 
 def _same(file: RecordFile, field: HeaderField, description: str) -> HeaderField:
-    """The one value of all channels."""
+    """Return the common value of all channels."""
     values = _slashed(field.text)
     if len(set(values)) != 1:
         raise file.error(f"the channels differ in their {description}: {field.text}", field.line)

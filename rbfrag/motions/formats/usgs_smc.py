@@ -38,7 +38,7 @@ recognises = _HEAD.match
 
 
 def parse(file: RecordFile) -> Iterator[ParsedTrace]:
-    """Yield the one trace of a file."""
+    """Yield the only trace of a file."""
     lines = file.lines
     kind = _HEAD.match(file.text)
     if kind and kind[1] != "ACCELEROGRAM":

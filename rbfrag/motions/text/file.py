@@ -1,4 +1,4 @@
-"""The text of a record's file, its lines and single numbers."""
+"""Text of a record file, its lines and single numbers."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def decoded(path: Path, raw: bytes) -> str:
 
 
 def cut_number(text: str) -> str:
-    """Return the number within which a file ends, or an empty text.
+    """Return the number at which a truncated file ends, or an empty text.
 
     A file that ends without a newline may have been cut. Its last number shows so if all those
     before it are printed with one number of decimals, and it has fewer.
@@ -99,12 +99,12 @@ def cut_number(text: str) -> str:
 
 
 def holds_integers(line: str) -> bool:
-    """Return whether a line holds integers and nothing else."""
+    """Return whether a line consists of integers."""
     return set(line) <= _OF_INTEGERS and any(character.isdigit() for character in line)
 
 
 def without_blank_end(lines: Sequence[str]) -> Sequence[str]:
-    """Return lines without the blank ones after the last that is not."""
+    """Return lines without trailing blank ones."""
     end = len(lines)
     while end and not lines[end - 1].strip():
         end -= 1
@@ -121,7 +121,7 @@ def field_layout(text: str) -> tuple[int, int] | None:
 
 
 def finite_number(path: Path, text: str, line: int, description: str) -> float:
-    """Return one number of a file, or refuse it with its line, from 1."""
+    """Return one number of a file, or reject it with its line, from 1."""
     if _NUMBER.fullmatch(text):
         value = float(text)
         if math.isfinite(value):
@@ -136,5 +136,5 @@ def finite_number(path: Path, text: str, line: int, description: str) -> float:
 
 
 def shown(text: str) -> str:
-    """Return a text as messages quote it."""
+    """Return a text quoted for messages."""
     return repr(text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}…")

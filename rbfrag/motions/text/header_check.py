@@ -1,4 +1,4 @@
-"""Header against samples: what a file says twice must agree, whatever its format.
+"""Consistency of header and samples, whatever the format.
 
 Mistakes of interval, unit and scale are factors of 2 and more. Honest headers are off by a few
 percent, where a record was cut or filtered again after its header was written.
@@ -44,7 +44,7 @@ Statement: TypeAlias = tuple[float, str, int | None]
 
 
 def agreed(file: RecordFile, traces: Traces, components: int | None) -> list[ParsedTrace]:
-    """Return traces in g with the interval that holds, or refuse what contradicts itself.
+    """Return traces in g with the valid interval, or reject contradictory files.
 
     What the caller states is believed where the header says it too, and where the header
     contradicts itself and the rest of it agrees with the caller.
@@ -87,14 +87,14 @@ def _agreed(file: RecordFile, trace: ParsedTrace, traces: Traces, doubt: str) ->
 
 
 def doubts(remarks: Sequence[str]) -> list[str]:
-    """Return those remarks of a motion that say where header and samples disagree."""
+    """Return the remarks of a motion on contradictions between header and samples."""
     return [remark for remark in remarks if remark.startswith(DOUBT)]
 
 
 def _interval(
     file: RecordFile, trace: ParsedTrace, traces: Traces
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the interval [s] that holds and remarks, or refuse the header's or the caller's."""
+    """Return the valid interval [s] and remarks, or reject the header's or the caller's."""
     dt, requested = trace.dt_s, file.dt_s
     if requested is not None and not math.isclose(dt, requested, rel_tol=SAME_DT, abs_tol=0.0):
         by_header, by_caller = (_agreeing(file, trace, traces, value) for value in (dt, requested))
@@ -113,7 +113,7 @@ def _interval(
 
 
 def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -> list[bool]:
-    """Whether each statement on time agrees with an interval [s], printed times among them."""
+    """Return whether each entry on time agrees with an interval [s], printed times included."""
     agreeing = [off <= DURATION_REFUSED for off, *_ in _statements(trace, traces, dt)]
     seconds = trace.count.seconds if trace.count else None
     if trace.times is None and seconds is None:
@@ -130,7 +130,7 @@ def _agreeing(file: RecordFile, trace: ParsedTrace, traces: Traces, dt: float) -
 
 
 def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement]:
-    """What the header says of time: durations, and the intervals of the other components."""
+    """Return the header's entries on time: durations, and the intervals of the other components."""
     statements: list[Statement] = []
     counts = {trace.count.number if trace.count else trace.values.size, trace.values.size}
     # some count the samples and some the intervals between them
@@ -160,7 +160,7 @@ def _statements(trace: ParsedTrace, traces: Traces, dt: float) -> list[Statement
 def _unit(
     file: RecordFile, trace: ParsedTrace
 ) -> tuple[float, HeaderField | None, tuple[str, ...]]:
-    """Return how many g the unit is that holds, the unit, and remarks on the peak."""
+    """Return the valid unit in g, its name, and remarks on the peak."""
     if trace.unit is None:
         file.require_units()
     field = trace.unit or HeaderField(file.units or "", 1)
@@ -183,7 +183,7 @@ def _unit(
 
 
 def _peak(trace: ParsedTrace, in_g: float, unit: str) -> tuple[float, str]:
-    """Return the factor between the largest sample and what the header says, and a sentence."""
+    """Return the ratio between the largest sample and the header's peak, and a sentence."""
     peak, samples = trace.peak, trace.values
     stated_peak = number_or_none(peak.text) if peak else None
     # zero and -999 are what programs write that do not know it

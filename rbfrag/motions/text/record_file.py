@@ -1,4 +1,4 @@
-"""One record's file as its format's parser sees it, and the traces that the parser returns.
+"""Record file as a format's parser uses it, and the traces that the parser returns.
 
 Fields are found by what they say; counts, intervals and numbers are read or refused with their
 line. What all traces go through (unit, missing samples, labels) is done once, in
@@ -46,14 +46,14 @@ _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
 
 
 class HeaderField(NamedTuple):
-    """A header field: its value as the file has it, and its line, from 1."""
+    """A header field: its text in the file, and its line, from 1."""
 
     text: str
     line: int
 
 
 class Count(NamedTuple):
-    """The number of samples that a header states, and its line.
+    """Number of samples in a header, and its line.
 
     A product of duration and frequency may be rounded; `seconds` is that duration. `of` says whose
     samples, where a file holds several traces.
@@ -70,7 +70,7 @@ class Count(NamedTuple):
 
 
 class PeakField(NamedTuple):
-    """The largest acceleration, of either sign, that a header states, its unit, and its line."""
+    """Peak acceleration in a header, of either sign, its unit, and its line."""
 
     text: str
     unit: str
@@ -78,7 +78,7 @@ class PeakField(NamedTuple):
 
 
 class PrintedTimes(NamedTuple):
-    """Times [s] beside the samples, `per_line` a line; one may be `tolerance_s` off its place."""
+    """Times [s] printed with the samples, `per_line` per line, each within `tolerance_s`."""
 
     times_s: FloatArray
     tolerance_s: float
@@ -131,7 +131,7 @@ class ParsedTrace:
 
 @dataclass(frozen=True)
 class RecordFile:
-    """A file that is being read. Every refusal is a MotionFileError that names the line.
+    """A file being read. Every rejection is a MotionFileError with the line.
 
     Args:
         text: the file's text.
@@ -157,7 +157,7 @@ class RecordFile:
     def error(
         self, trouble: str, line: int | None = None, fields: tuple[str, ...] = ()
     ) -> MotionFileError:
-        """Return the error that names this file, and its line from 1 where one is to blame."""
+        """Return an error that names this file, and the line from 1 where one is wrong."""
         return MotionFileError(self.path, trouble, line=line, fields=fields)
 
     # fields of the header
@@ -175,12 +175,14 @@ class RecordFile:
         return field.text if field else ""
 
     def location(self, span: range) -> tuple[str, ...]:
-        """Return the remark on where the sensor of a channel stands, if that is stated."""
+        """Return the remark on the location of a channel's sensor, if there is one."""
         location = self.label(span, _LOCATION)
         return (LOCATION + location,) if location else ()
 
     def find(self, span: range, pattern: re.Pattern[str], description: str) -> HeaderField:
-        """Return the first match's group 1 among the lines of a span, which must have it."""
+        """Return the first match's group 1 among the lines of a span; raise an error without a
+        match.
+        """
         field = self.optional(span, pattern)
         if field is None:
             raise self.error(
@@ -201,7 +203,7 @@ class RecordFile:
         return [range(start, end) for start, end in zip(starts, ends, strict=True)]
 
     def missing_channels(self, span: range, channels: int) -> tuple[str, ...]:
-        """Return a remark if the file holds fewer channels than its first block says.
+        """Return a remark if the file contains fewer channels than its first block declares.
 
         Some agencies split a recording into one file a channel, so that this is no error.
         """
@@ -217,7 +219,7 @@ class RecordFile:
         return positive_number(self.path, field, description)
 
     def count(self, field: HeaderField, description: str, of: str = "") -> Count:
-        """Return the number of samples that a field states, a whole number of at least 1."""
+        """Return the number of samples in a field, an integer of at least 1."""
         digits = field.text.removesuffix(".")
         # int() refuses thousands of digits in words of its own
         if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
@@ -225,7 +227,7 @@ class RecordFile:
         raise self.error(f"{description} {shown(field.text)} is not a count of samples", field.line)
 
     def require_units(self, states: str = "the file has") -> None:
-        """Refuse a file that states no unit of acceleration unless the caller states it."""
+        """Reject a file without a unit of acceleration unless the caller gives it."""
         if self.units is None:
             raise UnitNotStatedError(
                 self.path,
@@ -234,7 +236,7 @@ class RecordFile:
             )
 
     def dt(self, field: HeaderField, description: str = "dt") -> float:
-        """Return the sampling interval [s] that a field states."""
+        """Return the sampling interval [s] in a field."""
         return self.possible_dt(self.positive(field, description), field.line)
 
     def possible_dt(self, dt: float, line: int | None) -> float:
@@ -244,7 +246,7 @@ class RecordFile:
         return dt
 
     def dt_of_duration(self, duration: HeaderField, npts: float) -> float:
-        """Return the shortest decimal dt [s] with which npts samples last the printed duration."""
+        """Return the shortest decimal dt [s] for which npts samples last the printed duration."""
         seconds = self.positive(duration, "record length")
         _, _, decimals = duration.text.partition(".")
         half_digit = 0.5 * 10.0 ** -len(decimals.rstrip())
@@ -257,7 +259,7 @@ class RecordFile:
         return self.possible_dt(dt, duration.line)
 
     def missing_samples(self, count: Count, npts: int) -> str:
-        """Return a remark if not as many samples follow as the header states, or refuse the file.
+        """Return a remark if the number of samples differs from the header's, or reject the file.
 
         A file without any is refused in any case.
         """
@@ -313,7 +315,7 @@ class RecordFile:
     def numbers(
         self, tokens: Sequence[str], lines: Callable[[], Sequence[int]], description: str
     ) -> FloatArray:
-        """Return the numbers that are printed as tokens; `lines` gives the line of each, from 1."""
+        """Return the numbers printed as tokens; `lines` gives the line of each, from 1."""
         try:
             numbers = np.array(tokens, dtype=np.float64)
         except ValueError:
@@ -400,7 +402,7 @@ class RecordFile:
         return numbers.reshape(-1, layout[0])
 
     def refuse_other_times(self, times: PrintedTimes, dt: float, samples: int) -> None:
-        """Refuse printed times that the sampling interval [s] does not reproduce.
+        """Reject printed times that the sampling interval [s] does not reproduce.
 
         A missing or doubled row shows so.
         """
@@ -431,7 +433,7 @@ def peak_of(field: HeaderField | None, unit: str | None = None) -> PeakField | N
 
 
 def number_or_none(text: str) -> float | None:
-    """Return the finite number that a field of the header states, None where it states none."""
+    """Return the finite number of a header field, None if it has none."""
     try:
         return finite_number(Path(), text, 1, "")
     except MotionFileError:

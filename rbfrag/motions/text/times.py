@@ -1,4 +1,4 @@
-"""Times in record files: that of the first sample, and the interval behind a printed column."""
+"""Times in record files: that of the first sample, and the interval of a printed column."""
 
 from __future__ import annotations
 
@@ -155,11 +155,11 @@ class _Column:
         return _Column(self.times_s, np.maximum(self.tolerance_s, allowed))
 
     def is_fine(self) -> bool:
-        """Whether the start may float by its rounding without hiding a missing row."""
+        """Return whether the start may vary by its rounding without hiding a missing row."""
         return float(np.max(self.tolerance_s)) <= FINE * self.usual_step_s
 
     def may_hide_a_gap(self, mean_s: float) -> bool:
-        """Whether a missing row could pass for the rounding of coarsely printed times."""
+        """Return whether a missing row could be mistaken for rounding of coarsely printed times."""
         steps = np.diff(self.times_s)
         finest = float(np.min(self.tolerance_s))
         if np.min(steps) < 0.0 or (np.min(steps) == 0.0 and finest > FINE * mean_s):

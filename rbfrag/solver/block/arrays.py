@@ -28,7 +28,7 @@ CHUNK = 1 << 14
 
 
 def common_shape(inputs: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
-    """Return the arguments as arrays of floats, and the shape they broadcast to.
+    """Return the arguments as arrays of floats, and their broadcast shape.
 
     Raises:
         InputError: an argument holds no numbers, or the shapes do not go together.
@@ -50,7 +50,7 @@ def common_shape(inputs: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], t
 def in_chunks(
     formula: Callable[..., Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]
 ) -> None:
-    """Fill the outputs with what a formula makes of the inputs, chunk by chunk.
+    """Fill the outputs by a formula of the inputs, chunk by chunk.
 
     Args:
         formula: takes one chunk of each input, or the number where an input is a single one
@@ -96,7 +96,7 @@ _NOT_FINITE, _ANGLE, _LENGTH, _NO_BLOCK = 1, 2, 3, 4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlockArray(Tabular):
-    """Parallelogram blocks of any number; elements that are no block are NaN with a reason.
+    """Parallelogram blocks of any number; invalid elements are NaN with a reason.
 
     Args:
         tan_alpha1: tan α1, shape (...).
@@ -194,11 +194,11 @@ class BlockArray(Tabular):
 
     @property
     def reason(self) -> NDArray[np.str_]:
-        """Why an element is no block, as text; empty where it is one."""
+        """Reason why an element is not a valid block, as text; empty for valid ones."""
         return np.array(REASONS)[self.reason_code]
 
     def at(self, indices: NDArray[np.intp]) -> BlockArray:
-        """Return some of the blocks; a single one among many stays one."""
+        """Return a selection of the blocks; a single block broadcasts."""
         parts: list[Any] = [self.tan_alpha1, self.tan_alpha3, self.half_s1_m, self.reason_code]
         return BlockArray(*(part if part.size == 1 else part[indices] for part in parts))
 
@@ -282,7 +282,7 @@ def _because(code: int, holds: NDArray[np.bool_], reason: CodeArray) -> None:
 
 
 def _only_usable(reason: CodeArray, *values: FloatArray) -> tuple[FloatArray, ...]:
-    """Return the values with NaN where there is no block."""
+    """Return the values with NaN for invalid blocks."""
     if not reason.any():
         return values
     return tuple(np.where(reason == 0, value, np.nan) for value in values)

@@ -1,4 +1,4 @@
-"""A block in a file: outline, angles or spacings, and what it stands on.
+"""Block files: outline, angles or fracture spacings, and the planes below and behind the block.
 
 TOML holds one of the three descriptions of a block::
 

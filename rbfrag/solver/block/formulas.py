@@ -146,7 +146,8 @@ def parallelogram_inertia(tan_alpha1: N, tan_alpha3: N, half_s1_m: N) -> N:
 
 
 def moments_about_corners(inertia_m2: N, heel: tuple[N, N], toe: tuple[N, N]) -> tuple[N, N, N]:
-    """Return the moments of inertia about toe and heel, and what an impact keeps; per mass [m²].
+    """Return the moments of inertia about toe and heel, and the angular momentum factor of an
+    impact, per mass [m²].
 
     The last is I_C + r1·r3, the angular momentum about the corner that takes over, over the speed
     before: it is the same after the impact, whose force passes through that corner (Housner 1963).

@@ -1,4 +1,4 @@
-"""A rock block on its base and back planes: geometry, size, and what follows from them."""
+"""Geometry and size of a rock block on its base and back planes, and derived quantities."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ class Block:
     def from_polygon(
         cls, vertices_m: Sequence[Sequence[float]], heel: int, back: int, toe: int, gamma_deg: float
     ) -> Block:
-        """Return a block of any outline.
+        """Return a block of arbitrary outline.
 
         The base plane runs along x through heel and toe, the back plane through the back
         contact at gamma_deg. Heel and toe must lie on the base plane, at least one vertex besides
@@ -278,7 +278,7 @@ class Block:
 
     @property
     def confines(self) -> bool:
-        """Whether the back plane hinders a rotation about the toe (for a whole heel, γ > 90°)."""
+        """True if the back plane hinders a rotation about the toe (for an uncut heel, γ > 90°)."""
         if self.lowest_on_back == self.heel:
             return self.cot_gamma < 0.0
         # without a corner at the heel: whether the lowest contact would turn into its plane

@@ -1,4 +1,4 @@
-"""A free-standing block with three dimensions: how it rocks about its contacts in each direction.
+"""Free-standing three-dimensional block: its rocking about its contacts in each direction.
 
 A body that shaking rocks in one vertical plane turns about an axis normal to that plane through
 the outermost contact on either side. Along each azimuth it is then a block of two corners: their
@@ -77,13 +77,13 @@ class TwoCorneredBlocks(NamedTuple):
 
     @property
     def restitution(self) -> Array:
-        """Restitution of the symmetric block that loses as much in a cycle: √(e31 e13), or 0."""
+        """Restitution of the symmetric block with the same loss per cycle: √(e31 e13), or 0."""
         forward, backward = self.restitution_forward, self.restitution_backward
         return np.asarray(np.sqrt(np.maximum(forward, 0.0) * np.maximum(backward, 0.0)))
 
 
 class Weakest(NamedTuple):
-    """The direction in which the least acceleration lifts a block off.
+    """Direction in which the smallest acceleration uplifts the block.
 
     Args:
         azimuth_deg: towards which it lifts off, counter-clockwise from plan x [deg].
@@ -119,11 +119,11 @@ class ContactHull:
 
     @property
     def stands(self) -> bool:
-        """Whether the centre of mass lies above the inside of the hull."""
+        """True if the centre of mass lies above the interior of the hull."""
         return self.corners_m.size > 0 and bool(self._edges()[1].min() > 0.0)
 
     def rocking(self, azimuth_deg: Array) -> TwoCorneredBlocks:
-        """Return the block of two corners along each azimuth.
+        """Return the two-cornered block along each azimuth.
 
         p² = g R/(I + R²), e = (I + r1·r3)/(I + R²): angular momentum about the new contact is
         kept at the impact (Housner 1963 for a symmetric block). Products of inertia, which turn
@@ -153,7 +153,7 @@ class ContactHull:
         )
 
     def weakest(self) -> Weakest:
-        """Return the direction of the least k_r over all azimuths.
+        """Return the direction of the minimum k_r over all azimuths.
 
         The hull reaches least far along the normal of its nearest edge, so that no grid of
         azimuths is searched. Of equal ones it is the first counter-clockwise from plan x.
@@ -228,11 +228,11 @@ class MeshBlock(Result):
         return None if self.density_kg_m3 is None else self.density_kg_m3 * self.volume_m3
 
     def rocking(self) -> TwoCorneredBlocks:
-        """Return the blocks of two corners along :data:`LINES_DEG`."""
+        """Return the two-cornered blocks along :data:`LINES_DEG`."""
         return self.hull.rocking(LINES_DEG)
 
     def sensitivity(self) -> list[dict[str, Any]]:
-        """Return what follows from each height of contact, k_r and p² of the weaker sense.
+        """Return k_r and p² of the weaker sense for each contact height.
 
         Numbers are None where the centre of mass lies outside the contacts.
         """
@@ -284,7 +284,7 @@ class MeshBlock(Result):
         yield TextLine("Mesh", f"{self.name}, volume {rounded(self.volume_m3)} m³{mass}")
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield every value, if verbose, and the effect of the height of contact."""
+        """Yield every value, if verbose, and the effect of the contact height."""
         values = self.as_dict()
         rows = values.pop("sensitivity")
         if verbose:
@@ -321,7 +321,7 @@ class MeshBlock(Result):
 
 
 class MassProperties(NamedTuple):
-    """What a closed surface says of the body inside.
+    """Mass properties of the body inside a closed surface.
 
     Args:
         volume_m3: volume [m³].
@@ -344,7 +344,7 @@ def mesh_block(
     density_kg_m3: float | None = None,
     warnings: Sequence[str] = (),
 ) -> MeshBlock:
-    """Return the block that the vertices of a closed surface and its mass make.
+    """Return the block defined by the vertices of a closed surface and its mass.
 
     Args:
         name: what messages and rows of tables call it.
@@ -434,7 +434,7 @@ def _not_at_rest(name: str, hull: ContactHull, alternatives: tuple[ContactHull, 
 
 
 def _doubts(extent_m: float, hull: ContactHull, hulls: tuple[ContactHull, ...]) -> list[Diagnostic]:
-    """Return what an answer cannot be trusted in."""
+    """Return the reasons to doubt an answer."""
     doubts = []
     least, most = USUAL_SIZE_M
     if not least <= extent_m <= most:

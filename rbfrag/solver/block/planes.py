@@ -1,4 +1,4 @@
-"""Planes in space: their traces in the section across the face, and where a section does not do.
+"""Planes in space, their traces in the section across the face, and the limits of a section.
 
 A plane is its dip and dip direction; the section is vertical and runs down the dip of the face.
 No numpy is loaded. Formulas: apparent dips, spacings and the line of two planes of structural
@@ -38,7 +38,7 @@ class Plane(NamedTuple):
     direction_deg: float
 
     def __str__(self) -> str:
-        """Return dip and dip direction as geologists write them."""
+        """Return dip and dip direction in geological notation."""
         return f"{self.dip_deg:.4g}/{self.direction_deg:03.4g}"
 
     @property
@@ -59,7 +59,7 @@ class Plane(NamedTuple):
         return _along(self.dip_deg, math.sin(off))
 
     def spacing_factor(self, azimuth_deg: float) -> float:
-        """Return the spacing of such planes in a section over that along their normal."""
+        """Return the spacing of such planes in a section over their true spacing."""
         across = math.sin(math.radians(self.dip_deg)) * math.sin(
             math.radians(self.direction_deg - azimuth_deg)
         )
@@ -87,7 +87,7 @@ _WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?)\s*°?\s*/\s*(\d+(?:\.\d*)?)\s*°?\s*"
 
 
 def plane_of(text: object, name: str) -> Plane:
-    """Return the plane that is written as dip/dip direction: 25/102.
+    """Return the plane written as dip/dip direction: 25/102.
 
     Raises:
         InputError: it is not written so, or no dip or no azimuth.
@@ -109,7 +109,9 @@ def plane_of(text: object, name: str) -> Plane:
 
 
 def line_of(first: Plane, second: Plane) -> tuple[float, float]:
-    """Return plunge and trend of the line of two planes that are not parallel [deg]."""
+    """Return plunge and trend of the line of intersection of two planes that are not parallel
+    [deg].
+    """
     (a, b, c), (d, e, f) = first.pole, second.pole
     x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
     if z > 0.0:
@@ -126,7 +128,7 @@ def _between_deg(first: Plane, second: Plane) -> float:
 
 
 class Section(NamedTuple):
-    """What a section across the face has of a block's planes.
+    """Angles and spacing factors of a block's planes in a section across the face.
 
     Args:
         beta_deg: dip of the base, out of the slope positive [deg].
@@ -209,7 +211,7 @@ def section_of(face: Plane, base: Plane, back: Plane | None = None) -> Section:
 
 
 def _wedge(line: tuple[float, float] | None, face: Plane) -> str:
-    """Say how the line of base and back lies."""
+    """Return a sentence on the line of intersection of base and back."""
     if line is None:
         return ""
     plunge, trend = line

@@ -1,4 +1,4 @@
-"""Area, centroid and second moment of a polygon, and whether it is one."""
+"""Area, centroid and second moment of a polygon, and its validity."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class PolygonProperties:
-    """What a block needs to know of its outline.
+    """Area, centroid and inertia of an outline.
 
     Args:
         area_m2: area [m²].
@@ -136,7 +136,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def _within(a: Point, b: Point, c: Point) -> bool:
-    """Whether c, known to be in line with a and b, lies between them."""
+    """Return whether c, collinear with a and b, lies between them."""
     return min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(a[1], b[1])
 
 

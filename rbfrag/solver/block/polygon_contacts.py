@@ -49,7 +49,7 @@ class PolygonContacts:
 def polygon_contacts(
     vertices_m: Sequence[Sequence[float]], heel: int, back: int, toe: int, gamma_deg: float
 ) -> PolygonContacts:
-    """Return a polygon with its contacts, or refuse it with the reason.
+    """Return a polygon with its contacts, or reject it with the reason.
 
     The arguments and errors are those of :meth:`rbfrag.solver.block.geometry.Block.from_polygon`.
     """

@@ -1,4 +1,4 @@
-"""Many blocks under one motion in one call, with the answers of the single run, bit for bit."""
+"""Many blocks under one motion in one call; the results equal those of single runs bit for bit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rbfrag.solver.results import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """What many runs ended in; every array has the shape of the blocks that were asked for.
+    """Results of many runs; every array has the shape of the blocks in the call.
 
     Args:
         outcome: codes of `rbfrag.solver.integrator.toppling_kernel` (STABLE, TOPPLED, UNDETERMINED,

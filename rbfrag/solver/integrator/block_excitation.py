@@ -1,4 +1,4 @@
-"""The excitation of one size of block, as the kernels of the critical search take it."""
+"""Excitation of one block size, in the form used by the kernels of the critical search."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class BlockExcitation(NamedTuple):
 def block_excitation(
     excitation: Excitation, *, p2: float, span_ph: float = SPAN_PH, span_error: float = SPAN_ERROR
 ) -> BlockExcitation:
-    """Bring together what the kernels need.
+    """Return the arrays that the kernels of the search need.
 
     Args:
         excitation: the excitation; 1 + k_v > 0 throughout.

@@ -1,4 +1,4 @@
-"""How kernels are compiled: numba, cached on disk where a disk can be written."""
+"""Compilation of kernels by numba, with a disk cache where a disk is writable."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile like :func:`kernel` what makes no arrays of its own.
+    """Compile a function that allocates no arrays, otherwise like :func:`kernel`.
 
     References to those that it is given are not counted then, which takes half of the time of a
     short excursion. Of a kernel that makes arrays numba says "Require NRT"; it must not return
@@ -50,7 +50,7 @@ def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile like :func:`bare_kernel` what only other kernels call.
+    """Compile a function that only other kernels call, otherwise like :func:`bare_kernel`.
 
     The conversion of arguments from Python is left out, which takes a quarter of the time of
     compilation where they hold the tables of a record. A call from Python is refused; tests take
@@ -70,7 +70,7 @@ class _InnerKernel(CPUDispatcher):
 
 
 def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile like :func:`bare_kernel`, but let a product and a sum be rounded once (FMA).
+    """Compile like :func:`bare_kernel`, with fused rounding of product and sum (FMA).
 
     Faster, and more accurate if anything; the last bits then depend on the processor.
     """
@@ -78,7 +78,7 @@ def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def within(function: Callable[P, R]) -> Callable[P, R]:
-    """Put the operations of a function into every kernel that calls it.
+    """Inline a function into every kernel that calls it.
 
     They are then compiled with that kernel, by its rules and vectorised in its loops.
     """
@@ -86,7 +86,8 @@ def within(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def on_compilation(callback: Callable[[], None]) -> None:
-    """Have a function called once, when a kernel is first compiled and not read from disk.
+    """Register a function to be called once, when a kernel is first compiled rather than read from
+    disk.
 
     Compilation takes seconds in which nothing else is seen: the command line says so.
     """
@@ -108,7 +109,7 @@ class _Once(event.Listener):
             callback()
 
     def on_end(self, event: Any) -> None:
-        """Nothing is to be done when the compiler ends."""
+        """Do nothing when the compiler ends."""
 
 
 def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
@@ -127,7 +128,7 @@ def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
 
 @cache
 def last_resort() -> str | None:
-    """Return a folder for machine code where neither install nor home is writable; None for none.
+    """Return a cache folder for an install and a home that are not writable; None if there is none.
 
     It lies in the temporary folder and is this user's alone: what lies in it is run.
     """
@@ -144,7 +145,7 @@ def last_resort() -> str | None:
 
 
 def where_kept() -> str:
-    """Return in words where machine code is kept, if that is no usual place."""
+    """Return a description of the cache folder if it is not the usual one."""
     if not last_resort.cache_info().currsize:
         return ""
     folder = last_resort()
@@ -165,7 +166,7 @@ class _CacheFile(IndexDataCacheFile):
 
 @cache
 def _stamp_of_sources() -> tuple[tuple[str, int, int], ...]:
-    """Name, time and size of every file of the solver."""
+    """Return name, time and size of every source file of the solver."""
     solver = Path(__file__).parents[1]
     files = sorted(solver.rglob("*.py"))
     return tuple((str(f.relative_to(solver)), *_time_and_size(f)) for f in files)
@@ -177,7 +178,7 @@ def _time_and_size(file: Path) -> tuple[int, int]:
 
 
 def _stamped_with_all_sources(compiled: Any) -> None:
-    """Let machine code on disk be out of date as soon as any file of the solver has changed.
+    """Invalidate cached machine code as soon as any source file of the solver changes.
 
     numba looks at the kernel's own file alone, and would go on running what it had put into it
     from another file that has changed since.
@@ -189,7 +190,7 @@ def _stamped_with_all_sources(compiled: Any) -> None:
 
 
 def _once_for_literals(compiled: Any) -> None:
-    """Let kernels that call this one with literals share one compilation of it.
+    """Make calls with different literals share one compilation of a kernel.
 
     numba compiles a callee anew for each literal that stands in a call (0, 1, True), which
     doubled the time of the first search on a machine.

@@ -1,4 +1,4 @@
-"""Events: peaks, dips below zero and impacts inside a step, and motion past recovery."""
+"""Events within a step: peaks, dips below zero, impacts, and motion past recovery."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEFT_BY_NEWTON = 1e-17
 
 
 class Inside(NamedTuple):
-    """What happens inside one step.
+    """Events within one step.
 
     Args:
         impact: fraction of the step at which theta returns to 0, or -1.
@@ -41,7 +41,7 @@ class Inside(NamedTuple):
 
 @within
 def keeps_direction(u_start: float, v_start: float, u_end: float, v_end: float) -> bool:
-    """Whether U has one sign throughout a step; V = U' is taken as monotone in it.
+    """Return whether U keeps its sign throughout a step; V = U' is assumed monotone within it.
 
     U with the same sign at both ends is zero between them only if it turns there, that is if V
     changes its sign, and if the tangent at the start reaches zero. (`&` instead of `and`: no
@@ -65,7 +65,7 @@ def simple_turn(
     peak: float,
     drift: float,
 ) -> bool:
-    """Whether a step above zero in which U may change its sign holds no event all the same.
+    """Return whether a step above zero in which U may change sign is nevertheless free of events.
 
     Args:
         theta: rotation at the start.
@@ -97,7 +97,7 @@ def eventful(
     peak: float,
     drift: float,
 ) -> bool:
-    """Whether a step may hold an impact or a peak that counts; see :func:`simple_turn`."""
+    """Return whether a step may contain an impact or a relevant peak; see :func:`simple_turn`."""
     return theta_end <= 0.0 or (
         not keeps_direction(u_start, v_start, u_end, v_end)
         and not simple_turn(theta, theta_end, u_start, v_start, u_end, v_end, peak, drift)
@@ -106,7 +106,8 @@ def eventful(
 
 @within
 def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float) -> bool:
-    """Whether a block has toppled whatever comes, though its state errs by `error`.
+    """Return whether a block has toppled whatever follows, given an error bound `error` of its
+    state.
 
     Beyond its balance point (s < 0) and turning on, it falls as long as
     tan(phi) < q; `least_q` is the least q from here on (docs/theory/toppling.md, "Events").
@@ -140,7 +141,7 @@ def left_at_turn(border: float, rate: float) -> float:
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
 ) -> Inside:
-    """Find what happens inside one step.
+    """Find the events within one step.
 
     The step is cut at the turning points of theta into monotone stretches, so a peak and an
     impact in one step, or a dip below zero between two positive ends, are all seen.
@@ -194,7 +195,7 @@ def examine_step(
 
 @fused_kernel
 def landing(theta: float, u: FloatArray, order: int) -> tuple[float, float]:
-    """Return where a concave or a falling arc of a step comes down to theta = 0, and U there.
+    """Return where a concave or falling arc of a step reaches theta = 0, and U there.
 
     Newton's method from the root of the first terms of the series, which at the steps of a record
     are nearly all of it: two evaluations are enough, where a search between bounds takes six.
@@ -242,7 +243,7 @@ def landing(theta: float, u: FloatArray, order: int) -> tuple[float, float]:
 
 
 class Descent(NamedTuple):
-    """What happens inside one step of a block that keeps its speed at an impact.
+    """Events within one step of a block that keeps part of its speed at an impact.
 
     Args:
         impact: fraction of the step at which theta returns to 0, or -1.
@@ -267,7 +268,7 @@ def examine_descent(
     v_end: float,
     highest: float,
 ) -> Descent:
-    """Find what :func:`examine_step` finds, and how fast the block is at the impact.
+    """Find the events of :func:`examine_step`, and the speed at the impact.
 
     The arcs between the impacts of a rocking block are mostly concave over the whole step: they
     have one peak, which seldom is the greatest, and land once.

@@ -1,4 +1,4 @@
-"""One excursion of one block, from a given state to the event that ends it.
+"""One excursion of one block: from a given state to the impact, toppling or stop that ends it.
 
 The search for critical values runs many short excursions with the same kernel; one here has no
 error estimate, no peak and no history, only what happens to the block.
@@ -30,7 +30,7 @@ ORDER_TRUSTED, ORDER_TO_REST, ORDER_TO_BORDER = 0, 1, 2
 
 
 class Rules(NamedTuple):
-    """How an excursion is followed.
+    """Settings of the integration of an excursion.
 
     Args:
         impacts: False carries the motion on below theta = 0, as if there were no base.
@@ -53,7 +53,7 @@ NO_IMPACT = Rules(False, ORDER_TRUSTED, 0.0)
 
 
 class Excursion(NamedTuple):
-    """What ended an excursion.
+    """Result of one excursion.
 
     Args:
         event: IMPACT, TOPPLED, IN_AIR (at the end of the record), STOPPED or ORDER_LOST.
@@ -77,7 +77,7 @@ def order_lost(
     turned: float,
     tangent: float,
 ) -> bool:
-    """Whether D may be negative between the states of one step and tan(phi) = tangent.
+    """Return whether D may be negative between the states of one step and tan(phi) = tangent.
 
     Args:
         shaking: the excitation over the step.
@@ -102,7 +102,9 @@ def order_lost(
 
 @within
 def take_span(excitation: BlockExcitation, i: int, stop: int, state: State) -> tuple[int, State]:
-    """Go on by the longest span from node i that ends by `stop`; its length, 0 where none fits."""
+    """Advance by the longest span from node i that ends by `stop`; return its length, 0 if none
+    fits.
+    """
     spans = excitation.spans
     theta, rate, s, c = state
     for level in range(excitation.span_length.size):
@@ -139,7 +141,7 @@ def impact_in_step(
 
 @inner_kernel
 def end_of_record(excitation: BlockExcitation) -> Place:
-    """Return the last node: a stop there is none."""
+    """Return the last node, for an excursion without a stop."""
     return Place(excitation.q.size - 1, 0.0)
 
 

@@ -17,7 +17,7 @@ from rbfrag.solver.results import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class FreeRuns:
-    """What many runs ended in; arrays of the shape of the blocks, shape (n,).
+    """Results of many runs; every array has shape (n,), one element per block.
 
     Args:
         outcome: codes of `rbfrag.solver.integrator.rocking_kernel`.
@@ -42,7 +42,7 @@ def run_free_blocks(
     theta_n: FloatArray,
     sensitive: IntArray,
 ) -> None:
-    """Run one block after another, each under the motion and under two that are all but equal.
+    """Run one block after another, each under the motion and under two almost identical ones.
 
     Args:
         excitations: the motion, and the same times a little more and a little less.

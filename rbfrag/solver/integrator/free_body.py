@@ -60,7 +60,7 @@ KEEP = 5
 
 
 class Frame(NamedTuple):
-    """What else of the block and its slope enters, and what its impacts do.
+    """Remaining parameters of the block and its slope, and its law of impact.
 
     Args:
         inertia_m2: moment of inertia about the centroid per mass [m²].
@@ -89,7 +89,7 @@ class Frame(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Place and velocity of the block: centroid, rotation counter-clockwise, and their rates."""
+    """Position and velocity of the block: centroid, counter-clockwise rotation, and their rates."""
 
     x: float
     y: float
@@ -128,7 +128,7 @@ ROWS = 8
 def one_step(
     corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: ContactArrays
 ) -> tuple[Motion, int]:
-    """Take one step; return where it leads and what touched, as bits.
+    """Take one step; return the new state and, as bits, the contacts that touched.
 
     Args:
         corners: pairs of corner and plane.
@@ -200,7 +200,7 @@ def one_step(
 
 
 class Loads(NamedTuple):
-    """Values of k_h/(1 + k_v) between which a block stays at rest where it is."""
+    """Range of k_h/(1 + k_v) within which a block at rest stays at rest."""
 
     low: float
     high: float
@@ -221,7 +221,9 @@ def rests(
     loads: Loads,
     work: ContactArrays,
 ) -> tuple[bool, Loads]:
-    """Whether a block at rest stays so under two accelerations [g]; what is known of it then."""
+    """Return whether a block at rest stays at rest under two accelerations [g], and the range of
+    loads so far.
+    """
     q = a / w
     # the loads that contacts with friction bear are a convex cone: one between two that they bear
     if loads.low <= q <= loads.high:
@@ -232,7 +234,7 @@ def rests(
 
 @inner_kernel
 def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
-    """Whether the velocities are nought but for rounding."""
+    """Return whether the velocities are zero to rounding."""
     least = STANDSTILL * STANDARD_GRAVITY_M_S2 * h
     turning = abs(at.spin) * math.sqrt(frame.inertia_m2)
     return abs(at.vx) <= least and abs(at.vy) <= least and turning <= least
@@ -240,7 +242,7 @@ def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
 
 @within
 def append_state(history: FloatArray, filled: int, now: float, at: Motion, touch: int) -> int:
-    """Fill one more column of a history that is not full; how many are filled."""
+    """Append one column to a history that is not full; return the number of filled columns."""
     if filled >= history.shape[1]:
         return filled
     history[0, filled] = now
@@ -252,7 +254,7 @@ def append_state(history: FloatArray, filled: int, now: float, at: Motion, touch
 
 @within
 def stop_of(frame: Frame, at: Motion) -> int:
-    """Return how a run ends after a step, or that it goes on."""
+    """Return the reason why a run ends after a step, or that it goes on."""
     if at.turned >= frame.backward_rad:
         return BACKWARD
     return FORWARD if at.turned <= -frame.forward_rad else GOES_ON
@@ -269,7 +271,7 @@ def run_free(
     work: ContactArrays,
     history: FloatArray,
 ) -> FreeRun:
-    """Run a block from a time of the record until nothing moves it any more.
+    """Run a block from a time of the record until it comes to rest for good.
 
     Args:
         record: the excitation; a time may repeat.

@@ -1,4 +1,4 @@
-"""A block that rocks about both corners while the ground is at rest: in closed form, by energy."""
+"""Rocking about both corners on ground at rest: closed form, by energy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Offset(NamedTuple):
 
 
 class FreeEnd(NamedTuple):
-    """What becomes of the block after the record.
+    """Outcome of the motion after the record.
 
     Args:
         outcome: STABLE or TOPPLED.
@@ -40,7 +40,7 @@ class FreeEnd(NamedTuple):
 
 @within
 def free_peak(corner: Corner, border: float, rate: float, error: float) -> Peak:
-    """Return the rotation at which motion without the energy to overturn turns back.
+    """Return the rotation at which motion turns back that lacks the energy to overturn.
 
     Args:
         border: rate that would just bring the block upright from here; above `rate`.
@@ -55,7 +55,7 @@ def free_peak(corner: Corner, border: float, rate: float, error: float) -> Peak:
 def after_record(
     toe: Corner, heel: Corner, side: int, state: State, off: Offset, slowest: float
 ) -> FreeEnd:
-    """Return outcome and greatest rotations of the free motion, impact by impact.
+    """Return outcome and peak rotations of the free motion, impact by impact.
 
     Args:
         toe: the corner of forward rotation.

@@ -1,4 +1,4 @@
-"""The impulses of corners on planes within one time step.
+"""Contact impulses of corners on planes within one time step.
 
 Each corner that ends a step on its plane pushes, without rebound and with Coulomb friction
 (Moreau 1988; Stewart and Trinkle 1996). Gauss-Seidel sweeps from zero find which of them push,
@@ -41,7 +41,7 @@ _WAYS = 8
 
 
 class Corners(NamedTuple):
-    """The pairs of corner and plane that may touch; all arrays have shape (m,).
+    """Pairs of corner and plane that may touch; all arrays have shape (m,).
 
     Args:
         arm_x: from the centroid to the corner, block not turned, along the base [m].
@@ -63,7 +63,7 @@ class Corners(NamedTuple):
 
 
 class ContactArrays(NamedTuple):
-    """Arrays that a step writes to.
+    """Work arrays of a step.
 
     Args:
         across: impulse of each pair along the normal of its plane, per mass [m/s], shape (m,).
@@ -122,7 +122,7 @@ def after_impulses(
     v_free: Velocity,
     tolerance: float,
 ) -> Velocity:
-    """Return the velocity at the end of a step, and leave the impulses in the work arrays.
+    """Return the velocity at the end of a step; the impulses are left in the work arrays.
 
     Args:
         corners: pairs of corner and plane.
@@ -239,7 +239,8 @@ def _of_two(
     v_free: Velocity,
     tolerance: float,
 ) -> tuple[bool, Velocity]:
-    """Solve for the impulses of two corners that push, trying all that they may do.
+    """Solve for the impulses of two corners in contact by trying all combinations of stick and
+    slip.
 
     Where friction at both is about to stop the block between its planes, sweeps come ever closer to
     what the corners do, ever more slowly, and name it wrongly until then. That both stick is not
@@ -285,7 +286,7 @@ def _solved(
     v_free: Velocity,
     slack: float,
 ) -> tuple[bool, Velocity]:
-    """Solve for the impulses of corners that do what is said of them.
+    """Solve for the impulses of corners whose states of contact are given.
 
     Args:
         slack: slip with its friction that is rounding [m/s].
@@ -338,7 +339,7 @@ def _fill_columns(corners: Corners, work: ContactArrays, active: int, per_inerti
 def _fill_equations(
     corners: Corners, work: ContactArrays, active: int, n: int, v_free: Velocity
 ) -> None:
-    """Fill an equation for each unknown: the speed of its corner at the end of the step."""
+    """Fill one equation for each unknown: the speed of its corner at the end of the step."""
     equations, columns = work.equations, work.columns
     row = 0
     for k in range(active):
@@ -395,7 +396,9 @@ def _substituted(work: ContactArrays, n: int, v_free: Velocity) -> Velocity:
 def _keeps_coulomb(
     corners: Corners, work: ContactArrays, active: int, velocity: Velocity, slack: float
 ) -> bool:
-    """Whether impulses and velocity are such that each corner may do what it is taken to do."""
+    """Return whether impulses and velocity satisfy Coulomb's law at each corner in its assumed
+    state.
+    """
     vx, vy, spin = velocity
     row = 0
     for k in range(active):
@@ -424,7 +427,7 @@ def _keeps_coulomb(
 
 @inner_kernel
 def _put_impulses(work: ContactArrays, active: int) -> None:
-    """Put the solution in the place of the impulses that sweeps have left."""
+    """Replace the impulses of the sweeps by the solution."""
     row = 0
     for k in range(active):
         i = int(work.pair[k])

@@ -1,4 +1,4 @@
-"""Rest, and where it ends.
+"""Rest of a block, and the instant at which it ends.
 
 At rest the two equations, for motion forward and in reverse, give an acceleration each; rest ends
 where one of them has the sense of its equation. Both are proportional to straight lines between
@@ -19,7 +19,7 @@ CALM = 1e-12
 
 
 class Thresholds(NamedTuple):
-    """The factors of k_h and 1 + k_v in both equations, where the block rests.
+    """Factors of k_h and 1 + k_v in both equations for a block at rest.
 
     Args:
         driving: of k_h, forward.
@@ -82,7 +82,7 @@ def depart(nodes: Nodes, level: Thresholds, place: Place, barred: int) -> Depart
 
 
 class Start(NamedTuple):
-    """The first start inside an interval: where, in which sense (0: none), see `Departure`."""
+    """First start within an interval: its position and sense (0: none); see `Departure`."""
 
     tau: float
     sense: int

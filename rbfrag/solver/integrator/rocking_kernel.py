@@ -47,7 +47,7 @@ IMPACT = -2
 
 
 class RockingRules(NamedTuple):
-    """How a run is integrated.
+    """Settings of a run.
 
     Args:
         order: degree of the Taylor step: 4, 5, 6 or 8.
@@ -63,7 +63,7 @@ class RockingRules(NamedTuple):
 
 
 class RockingRun(NamedTuple):
-    """What the kernel returns; times are NaN where nothing happened.
+    """Result of a run; times are NaN for events that did not occur.
 
     Args:
         outcome: STABLE, TOPPLED, UNDETERMINED or JUMP.
@@ -93,7 +93,7 @@ class RockingRun(NamedTuple):
 
 
 class RockingArcEnd(NamedTuple):
-    """What the rest of an interval brought.
+    """Result of the remainder of an interval.
 
     Args:
         state: of the block at its end.
@@ -117,7 +117,7 @@ class RockingArcEnd(NamedTuple):
 
 @within
 def carried(off: Offset, ph: float, stiffness: float, noise: float) -> Offset:
-    """Carry an error through a step and add what the step adds, in the sense that makes it grow.
+    """Return an error after a step, with the step's own error added in the sense that increases it.
 
     The linearised equation is d(theta'/p)/dt = p D d(theta), d(theta)/dt = p d(theta'/p). The
     signs are kept: a sum of sizes would grow by e^(p t) without end, since impacts reset nothing.
@@ -215,7 +215,7 @@ def cross_interval(
 def error_after_impact(
     off: Offset, before: Corner, after: Corner, rate: float, rate_after: float, k_h: float, w: float
 ) -> Offset:
-    """Carry an error through an impact, which it moves in time.
+    """Return an error after an impact, whose time it shifts.
 
     Args:
         off: error before it.
@@ -236,7 +236,7 @@ def error_after_impact(
 
 
 class Landed(NamedTuple):
-    """What follows an impact.
+    """State after an impact.
 
     Args:
         side: the new corner, 1 or -1; 0 for rest.
@@ -261,7 +261,7 @@ def through_impact(
     rules: RockingRules,
     arc: RockingArcEnd,
 ) -> Landed:
-    """Return what follows an impact at a place: rest, or rotation about the other corner.
+    """Return the state after an impact: rest, or rotation about the other corner.
 
     Args:
         nodes: the excitation.
@@ -287,13 +287,13 @@ def through_impact(
 def noted_impact(
     rows: FloatArray, filled: int, time_s: float, rate: float, rate_after: float
 ) -> int:
-    """Put an impact in a history: the rate before it, and the one that it leaves."""
+    """Append an impact to a history: the rates before and after it."""
     filled = noted(rows, filled, time_s, 0.0, rate, EVENT)
     return noted(rows, filled, time_s, 0.0, rate_after, IMPACT)
 
 
 class RockingEnd(NamedTuple):
-    """How a run ended; see :class:`RockingRun`."""
+    """End of a run; see :class:`RockingRun`."""
 
     outcome: int
     side: int
@@ -314,7 +314,7 @@ def end_of_run(
     peaks: tuple[Peak, Peak],
     impacts: int,
 ) -> RockingEnd:
-    """Return how a run ends that nothing decided before its last node; arguments as there."""
+    """Return the end of a run that is undecided at its last node."""
     forward, backward = peaks
     last = nodes.last
     if last < nodes.k_h.size - 1:  # 1 + k_v reaches zero

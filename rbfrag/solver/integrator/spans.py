@@ -1,4 +1,4 @@
-"""Several samples in one step, where a step of one sample would be far more accurate than needed.
+"""Steps over several samples, where steps of one sample would be far more accurate than needed.
 
 Over a span of m intervals of total length T, with tau in [0, 1] and P = (p T)², the driving
 acceleration a(tau) and the effective gravity w(tau) are replaced by their projections on cubic
@@ -48,7 +48,7 @@ _GAUSS5 = (
 
 @inner_kernel
 def _to_powers(moments: FloatArray) -> None:
-    """Put the powers of tau for Legendre moments: of the sum of (2k + 1) m_k P_k(2 tau - 1)."""
+    """Fill the powers of tau for Legendre moments: of the sum of (2k + 1) m_k P_k(2 tau - 1)."""
     m0, m1, m2, m3 = moments[0], 3.0 * moments[1], 5.0 * moments[2], 7.0 * moments[3]
     moments[0] = m0 - m1 + m2 - m3
     moments[1] = 2.0 * m1 - 6.0 * m2 + 12.0 * m3
@@ -82,7 +82,7 @@ def _add_products(
 
 @inner_kernel
 def _take_away_cubics(row: FloatArray) -> None:
-    """Take the same integrals of the cubics away: what is left is what the cubics miss."""
+    """Subtract the same integrals of the cubics, which leaves the contribution of the residual."""
     a_0, a_1, a_2, a_3 = row[2], row[3], row[4], row[5]
     w_0, w_1, w_2, w_3 = row[6], row[7], row[8], row[9]
     # of degree 8 and 9, which five points of Gauss are exact to
@@ -100,7 +100,7 @@ def _take_away_cubics(row: FloatArray) -> None:
 def _left_at_nodes(
     row: FloatArray, interval_s: FloatArray, k_h: FloatArray, w: FloatArray, first: int, length: int
 ) -> float:
-    """Return the greatest difference of a from its cubic at the nodes and that of w, added up."""
+    """Return the maximum residual of a at the nodes plus that of w, after the cubic fit."""
     most_a = most_w = at = 0.0
     for i in range(first, first + length + 1):
         a = row[2] + at * (row[3] + at * (row[4] + at * row[5]))
@@ -116,7 +116,7 @@ def _left_at_nodes(
 def fill_spans(
     interval_s: FloatArray, k_h: FloatArray, w: FloatArray, length: int, rows: FloatArray
 ) -> None:
-    """Fill the row of every whole span of `length` intervals.
+    """Fill the row of every complete span of `length` intervals.
 
     Args:
         interval_s: interval lengths [s], shape (n - 1,).

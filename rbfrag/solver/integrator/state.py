@@ -1,4 +1,4 @@
-"""Where a trajectory is in a record, the state of the block there, and what is kept of it."""
+"""Position of a trajectory in a record, state of the block, and history."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class State(NamedTuple):
 
 
 class Peak(NamedTuple):
-    """The greatest position so far, and the bound on its error."""
+    """Peak position so far, and the bound on its error."""
 
     x: float
     error: float
@@ -158,7 +158,7 @@ def at_rest(kr: float) -> State:
 
 @within
 def higher(peak: Peak, x: float, error: float) -> Peak:
-    """Return the peak, now that the block has been at x."""
+    """Return the peak, updated for a block that has reached x."""
     # the first of equal peaks is kept, whose error is the least
     if x > peak.x:
         return Peak(x, error)
@@ -167,7 +167,7 @@ def higher(peak: Peak, x: float, error: float) -> Peak:
 
 @within
 def noted(history: FloatArray, filled: int, time_s: float, x: float, rate: float, node: int) -> int:
-    """Put one more column in a history that is not full; return how many are filled."""
+    """Append one column to a history that is not full; return the number of filled columns."""
     # a run that keeps no history has one without columns: no second kernel is compiled for it
     if filled >= history.shape[1]:
         return filled

@@ -1,4 +1,4 @@
-"""One step of a rotating block: where it leads, and what it does to the error of the motion."""
+"""One step of a rotating block, and its effect on the error of the motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def step_errors(
     turned: float,
     highest: tuple[float, float, float, float],
 ) -> tuple[float, float, float]:
-    """Estimate what one step does to the error of its start, and adds to it.
+    """Return the growth of the initial error over one step, and the error that the step adds.
 
     At order 8 truncation and rounding together were no less than what the step adds to
     |error of theta| + |error of theta'/p| in all of a million drawn steps; this is measured, not
@@ -68,12 +68,12 @@ def step_errors(
 
 @within
 def drift_of_step(ph: float, error: float, theta_end: float) -> float:
-    """Return what a step adds to the error of theta: theta' errs by `error`, theta by rounding."""
+    """Return the error of theta that a step adds: theta' errs by `error`, theta by rounding."""
     return ph * error + 2.0 * MACHINE_EPSILON * abs(theta_end)
 
 
 class StepRules(NamedTuple):
-    """How an interval is cut into steps.
+    """Subdivision of an interval into steps.
 
     Args:
         order: degree of the Taylor step: 4, 5, 6 or 8.
@@ -85,7 +85,7 @@ class StepRules(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What a step leads to; U = h theta', with the length of the step as unit of time.
+    """Result of a step; U = h theta', with the length of the step as unit of time.
 
     Args:
         theta: rotation at its end [rad].
@@ -112,7 +112,7 @@ class StepResult(NamedTuple):
 def take_step(
     order: int, u: FloatArray, ph: float, state: State, shaking: StepExcitation
 ) -> StepResult:
-    """Take one step, and estimate its errors; `u` is filled as by `taylor_step`."""
+    """Take one step and estimate its errors; `u` is filled as by `taylor_step`."""
     u_start = ph * state.rate
     # exact up to its truncation where k_h and k_v are straight lines: it ends at a kink
     turned, u_end, v_end = taylor_step(order, u, u_start, ph, state.sin, state.cos, shaking)

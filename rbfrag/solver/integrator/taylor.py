@@ -1,4 +1,4 @@
-"""One Taylor step of the rocking block, and the polynomials it leaves behind.
+"""Taylor step of the rocking block, and the polynomials that it leaves for locating events.
 
 On tau in [0, 1] with h the interval, P = p²h², U = h theta', phi = theta_c - theta,
 s = sin(phi), c = cos(phi), a(tau) = a0 + da tau the driving
@@ -57,7 +57,7 @@ def even_parts(ph: float, fraction: float, ph_max: float) -> tuple[int, float, f
 def series(
     order: int, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
-    """The series of a step; arguments as of :func:`taylor_step`.
+    """Fill the series of a step; arguments as of :func:`taylor_step`.
 
     With v_k = k U[k], s_k and c_k the coefficients of the sine and cosine of the angle turned::
 
@@ -138,7 +138,7 @@ def series(
 def taylor_step(
     order: int, u: FloatArray, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float]:
-    """One step of order 4, 5, 6 or 8.
+    """Take one step of order 4, 5, 6 or 8.
 
     Args:
         order: degree of U.
@@ -170,7 +170,7 @@ def taylor_step(
 def lean_step(
     u: FloatArray, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float]:
-    """One step of the lowest order that leaves out less than 6e-14 of theta'/p.
+    """Take one step of the lowest order whose omitted terms are below 6e-14 of theta'/p.
 
     With d = |dk_h| + |dw|, what the excitation changes by in the step, the fifth order leaves out
     up to (p·h)^4 d²/72 + (p·h)^5/240 and the sixth up to 0.015 (p·h)^5 d² + 2 (p·h)^8: squares of
@@ -192,7 +192,7 @@ SMALL_TURN = 0.125
 
 @within
 def small_turn(s: float, c: float, angle: float) -> tuple[float, float]:
-    """As :func:`turn`, for angles up to SMALL_TURN."""
+    """Return the result of :func:`turn` for angles up to SMALL_TURN."""
     # 1 - cos instead of cos: near the start of a rotation nothing is lost in the difference
     x = angle * angle
     sine = angle + (angle * x) * (
@@ -216,7 +216,7 @@ def turn(s: float, c: float, angle: float) -> tuple[float, float]:
 
 @inner_kernel
 def value(x: FloatArray, order: int, tau: float) -> float:
-    """Polynomial sum_k x[k] tau^k, k = 0..order."""
+    """Return the polynomial sum_k x[k] tau^k, k = 0..order."""
     total: float = x[order]
     for k in range(order - 1, -1, -1):
         total = total * tau + x[k]
@@ -225,7 +225,7 @@ def value(x: FloatArray, order: int, tau: float) -> float:
 
 @inner_kernel
 def slope(x: FloatArray, order: int, tau: float) -> float:
-    """Derivative of :func:`value` with respect to tau."""
+    """Return the derivative of :func:`value` with respect to tau."""
     total: float = order * x[order]
     for k in range(order - 1, 0, -1):
         total = total * tau + k * x[k]
@@ -234,7 +234,7 @@ def slope(x: FloatArray, order: int, tau: float) -> float:
 
 @inner_kernel
 def curvature(x: FloatArray, order: int, tau: float) -> float:
-    """Second derivative of :func:`value` with respect to tau."""
+    """Return the second derivative of :func:`value` with respect to tau."""
     total: float = order * (order - 1) * x[order]
     for k in range(order - 1, 1, -1):
         total = total * tau + k * (k - 1) * x[k]
@@ -243,7 +243,7 @@ def curvature(x: FloatArray, order: int, tau: float) -> float:
 
 @inner_kernel
 def rotation(theta: float, u: FloatArray, order: int, tau: float) -> float:
-    """Rotation theta(tau) on the step that starts at `theta`."""
+    """Return the rotation theta(tau) on the step that starts at `theta`."""
     total: float = u[order] / (order + 1)
     for k in range(order - 1, -1, -1):
         total = total * tau + u[k] / (k + 1)
@@ -258,7 +258,7 @@ OF_ROTATION, OF_RATE, OF_ACCELERATION = 0, 1, 2
 def bracketed_root(
     kind: int, theta: float, u: FloatArray, order: int, low: float, high: float
 ) -> float:
-    """Root in [low, high] by Newton's method kept inside the bracket.
+    """Return the root in [low, high] by Newton's method kept inside the bracket.
 
     Args:
         kind: OF_ROTATION, OF_RATE or OF_ACCELERATION.

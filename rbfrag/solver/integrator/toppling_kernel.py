@@ -50,7 +50,7 @@ STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
 
 
 class Run(NamedTuple):
-    """What the kernel returns.
+    """Result of a run.
 
     `peak_rad` is NaN unless the block stays; times are NaN where nothing happened.
     """
@@ -66,7 +66,7 @@ class Run(NamedTuple):
 
 
 class TrajectoryBounds(NamedTuple):
-    """What is known of a trajectory up to a place.
+    """Error bounds and peak of a trajectory up to its present position.
 
     Args:
         error: bound on |error of theta| + |error of theta'/p|.
@@ -80,7 +80,7 @@ class TrajectoryBounds(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a run is: at a node, where it may be left and taken up again, or at its end.
+    """Progress of a run: at a node, where it may be interrupted and resumed, or at its end.
 
     Args:
         node: the node; the last one of the record, or that of the verdict, at the end.
@@ -117,7 +117,7 @@ def standing(corner: Corner) -> State:
 
 @within
 def beginning(corner: Corner) -> Progress:
-    """Return a run at the beginning of its record."""
+    """Return the progress of a run at the beginning of its record."""
     bounds = TrajectoryBounds(0.0, 0.0, Peak(0.0, 0.0))
     return Progress(0, False, standing(corner), bounds, math.nan, False, 0, 0, math.nan, 0.0, 0)
 
@@ -126,7 +126,9 @@ def beginning(corner: Corner) -> Progress:
 def next_lifting_node(
     q: FloatArray, block_max_q: FloatArray, start: int, stop: int, kr: float
 ) -> int:
-    """First node in [start, stop) with q > kr, or `stop`; skips rest by block maxima."""
+    """Return the first node in [start, stop) with q > kr, or `stop`; rest is skipped by block
+    maxima.
+    """
     i = start
     while i < stop:
         # a record is at rest most of the time: most of it is passed sixteen nodes at a time
@@ -140,7 +142,7 @@ def next_lifting_node(
 
 
 class ArcEnd(NamedTuple):
-    """What the rest of an interval brought.
+    """Result of the remainder of an interval.
 
     Args:
         state: of the block at its end.
@@ -252,7 +254,7 @@ def cross_interval(
 def errors_after_impact(
     bounds: TrajectoryBounds, rate: float, threshold: float, corner: Corner
 ) -> tuple[TrajectoryBounds, bool]:
-    """Carry the errors through an impact, which takes away theta' and with it its error.
+    """Carry the errors through an impact, which sets theta' to zero and with it its error.
 
     Args:
         bounds: what is known of the trajectory before it.
@@ -302,7 +304,7 @@ def after_record(
 
 @inner_kernel
 def end_of_run(nodes: Nodes, corner: Corner, progress: Progress) -> Run:
-    """Return what became of a block whose run is at its end."""
+    """Return the result of a run that has reached its end."""
     bounds, decided_s = progress.bounds, progress.decided_s
     outcome, peak, error = TOPPLED, math.nan, progress.decided_error
     if math.isnan(decided_s):
@@ -333,7 +335,7 @@ def advance(
     rows: FloatArray,
     u: FloatArray,
 ) -> Progress:
-    """Carry a run on to its end, or to the next node at which the block moves.
+    """Continue a run to its end, or to the next node at which the block moves.
 
     Args:
         nodes: the excitation.

@@ -97,7 +97,7 @@ def take_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
 
 @inner_kernel
 def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
-    """Carry the error estimates on; go on where the step was a plain one, mark the others."""
+    """Update the error estimates; advance slots whose step had no event, mark the others."""
     for j in range(batch):
         ph = x[PH + j]
         theta = x[THETA + j]
@@ -135,7 +135,7 @@ def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
 
 @within
 def enter(progress: Progress, place: Any, x: FloatArray, slot: int) -> None:
-    """Take a run, at a node, into the steps of its slot."""
+    """Place a run, at a node, into a slot."""
     place.number = 0
     place.length_s = -1.0
     place.node, place.lost = progress.node, progress.lost
@@ -151,7 +151,7 @@ def enter(progress: Progress, place: Any, x: FloatArray, slot: int) -> None:
 
 @within
 def put_down(place: Any, x: FloatArray, slot: int) -> None:
-    """Put down the state of a slot at the beginning of its interval."""
+    """Write the state of a slot at the beginning of its interval."""
     place.theta = x[THETA + slot]
     place.rate = x[RATE + slot]
     place.sin = x[SIN + slot]
@@ -162,7 +162,7 @@ def put_down(place: Any, x: FloatArray, slot: int) -> None:
 
 @within
 def put_down_progress(place: Any) -> Progress:
-    """Return how far a run is whose state has been put down."""
+    """Return the progress of a run whose state has been written out."""
     state = State(place.theta, place.rate, place.sin, place.cos)
     bounds = TrajectoryBounds(place.error, place.drift, Peak(place.peak, place.peak_error))
     return Progress(
@@ -182,7 +182,7 @@ def put_down_progress(place: Any) -> Progress:
 
 @inner_kernel
 def move_slot(x: FloatArray, y: FloatArray, slots: np.ndarray, source: int, slot: int) -> None:
-    """Let a run change its slot."""
+    """Move a run to another slot."""
     for row in range(INPUT_ROWS):
         x[row * BATCH + slot] = x[row * BATCH + source]
     y[ALONE + slot] = y[ALONE + source]

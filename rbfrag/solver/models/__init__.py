@@ -1,4 +1,4 @@
-"""The physics of each kind, one file a kind: `model_of_kind` reads the file of its name."""
+"""Physics of each kind, one file per kind; `model_of_kind` loads the file of its name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rbfrag.solver.stability.modes import ModeName
 
 @cache
 def model_of_kind(kind: str) -> Kind:
-    """Return the model of the kind of that name, which is loaded with all that it needs.
+    """Return the model of a kind, loaded with all that it needs.
 
     Raises:
         InputError: there is no such kind.

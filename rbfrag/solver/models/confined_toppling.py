@@ -1,4 +1,5 @@
-"""A block that topples under an overhanging back plane: its toe slides out, its heel up that plane.
+"""Confined toppling under an overhanging back plane: the toe slides out, the heel slides up that
+plane.
 
 The equation of two sliding contacts (`rbfrag.solver.integrator.one_freedom.two_contacts`) holds up
 to the first standstill, or until the base edge stands at right angles to the back plane, where the
@@ -162,7 +163,9 @@ def toe_slip(block: Block) -> Harmonics:
 
 
 def free_from(block: Block) -> float:
-    """Return the rotation at which the toe stops and the heel is free (γ - 90° by a whole heel)."""
+    """Return the rotation at which the toe stops and the heel loses contact (γ - 90° for an uncut
+    heel).
+    """
     # the slip of the toe is greatest where the derivative of a cos θ + b sin θ vanishes
     _, along, across, *_ = _base_off_plane(block).coefficients
     return math.atan2(-across, -along)

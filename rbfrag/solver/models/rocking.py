@@ -1,4 +1,4 @@
-"""A free-standing block that rocks about both corners of its base.
+"""Free-standing block that rocks about both corners of its base.
 
     θ'' = p² [s k_h cos(θc - θ) - (1 + k_v) sin(θc - θ)],    s = 1 about the toe, -1 about the heel
 
@@ -87,7 +87,7 @@ def free_block(supported_block: SupportedBlock) -> FreeBlock:
 
 
 def rectangle(p2: float, kr: float, restitution: float | None) -> FreeBlock:
-    """Return the rectangle on level ground that has these numbers.
+    """Return the rectangle on level ground with these parameters.
 
     Args:
         p2: frequency parameter p² [1/s²].
@@ -151,7 +151,7 @@ class Rocking(Kind):
     """The model of free-standing blocks."""
 
     def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
-        """Return what the block does.
+        """Return the response of the block.
 
         Raises:
             InputError: a block that does not stand of itself, cohesion, a restitution outside
@@ -196,7 +196,7 @@ class Rocking(Kind):
         )
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
-        """Return a function that says how the block ends under an excitation."""
+        """Return a function that gives the end of the block's run under an excitation."""
         block = self._block(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
@@ -223,14 +223,16 @@ class Rocking(Kind):
 
 
 def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:
-    """Return the greatest rotation forward and backward [rad]; None where it has none."""
+    """Return the peak rotation forward and backward [rad]; None where there is none."""
     if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
         return None, None
     return (None if run.side > 0 else run.forward.x, None if run.side < 0 else run.backward.x)
 
 
 def error_of(run: RockingRun, outcome: Outcome) -> float:
-    """Return the estimated error of the greater peak [rad]; of a run without, where it ended."""
+    """Return the estimated error of the larger peak [rad], or of the final rotation if there is no
+    peak.
+    """
     if outcome is not Outcome.STABLE:
         return run.error
     return max(run.forward, run.backward).error
@@ -319,7 +321,7 @@ def _warnings(
 
 
 def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
-    """Return the history with the place of the block, clockwise about its toe or back again."""
+    """Return the history with the position of the block, rotated about its toe or heel."""
     theta = traced.motion.theta_rad
     # about the toe forward, about the heel backward, both at rest on the base
     pivot = np.where(theta >= 0.0, block.toe_m, 0.0)

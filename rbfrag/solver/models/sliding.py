@@ -131,7 +131,7 @@ MAY_SLIDE_UP = (
 def _neglected_below(
     supported_block: SupportedBlock, *, two_way: bool, tips: bool, may_tip: bool
 ) -> float:
-    """Return the k_h/(1 + k_v) below which the block does what its model neglects."""
+    """Return the k_h/(1 + k_v) below which an effect neglected by the model occurs."""
     if supported_block.block is None or tips:
         return -math.inf
     if may_tip:
@@ -141,7 +141,7 @@ def _neglected_below(
 
 
 def _may_tip(supported_block: SupportedBlock) -> bool:
-    """Whether a pulse into the slope can tip the block about its heel.
+    """Return whether a pulse into the slope can tip the block about its heel.
 
     With α1 <= -φ it slides up its base first; with α1 - β <= -90° the heel is not below the
     centroid, and no pulse into the slope turns the block about it.
@@ -209,7 +209,7 @@ def sliding_displacements(
     vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
 ) -> FloatArray:
-    """Return how far blocks slide down a level plane, downslope only [m].
+    """Return the displacements of blocks that slide down a level plane, downslope only [m].
 
     On a base of dip beta the displacement is cos(phi - beta)/cos(phi) times this, k_y being
     tan(phi - beta).
@@ -249,7 +249,7 @@ def level_plane(ky: float) -> SupportedBlock:
 
 
 class Sliding(MechanismKind):
-    """The sliding model; its critical strength slides a stated distance."""
+    """The sliding model; its critical strength corresponds to a given displacement."""
 
     yield_name = "ky"
 
@@ -266,7 +266,7 @@ class Sliding(MechanismKind):
         search_limit: float = SEARCH_LIMIT,
         **options: Any,
     ) -> CriticalResult:
-        """Return the greatest k_y/PGA with which a block slides `displacement_m` on a level plane.
+        """Return the maximum k_y/PGA with which a block slides `displacement_m` on a level plane.
 
         It is that of any shape and any dip: on a base that dips, divide a displacement by
         cos(phi - beta)/cos(phi).

@@ -1,5 +1,5 @@
-"""A block that slumps: it turns backward while its heel slides down the base and its back edge
-down the back plane.
+"""Slumping: the block rotates backward while its heel slides down the base and its back edge down
+the back plane.
 
 Friction is fully mobilised at both contacts, against the motion: forward (sense 1) or, when
 the ground drives the block back up, in reverse (sense -1). The equation of two sliding contacts is
@@ -117,7 +117,7 @@ def equation(supported_block: SupportedBlock, sense: float) -> Equation:
 
 
 def heel_slip(block: Block) -> Harmonics:
-    """Return how far the heel has slid down the base [m], so that contact 2 stays on its plane."""
+    """Return the slip of the heel down the base [m] for which contact 2 stays on its plane."""
     gamma = math.radians(block.gamma_deg)
     # distance of contact 2 from the back plane, if the heel stayed where it is
     edge = turning(block.back) - turning(block.heel)

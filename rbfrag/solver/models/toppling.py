@@ -1,4 +1,4 @@
-"""A block that rocks about its toe (eqs. 4.1 to 4.19).
+"""Block that rocks about its toe (eqs. 4.1 to 4.19).
 
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
@@ -38,7 +38,7 @@ class Toppling(Kind):
     """The toppling model."""
 
     def respond(self, supported_block: SupportedBlock, shaking: Shaking) -> Response:
-        """Return what the block does."""
+        """Return the response of the block."""
         answer = respond(
             shaking.motion,
             p2=_size(supported_block),
@@ -70,7 +70,7 @@ class Toppling(Kind):
         )
 
     def runner(self, supported_block: SupportedBlock) -> Runner:
-        """Return a function that says how the block ends under an excitation."""
+        """Return a function that gives the end of the block's run under an excitation."""
         p2, kr = _size(supported_block), _strength(supported_block)
 
         def run(excited: Excitation) -> RunEnd:
@@ -93,7 +93,7 @@ class Toppling(Kind):
         return run
 
     def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
-        """Return the largest k_r/PGA that topples; p² [1/s²] is given, or that of a block."""
+        """Return the maximum k_r/PGA that topples, for a p² [1/s²] or that of a block."""
         from rbfrag.solver.search.critical import critical
 
         self.refuse_foreign(options, (*self.search_options, *SHAKING))
@@ -110,7 +110,9 @@ class Toppling(Kind):
 def _toe_needs(
     supported_block: SupportedBlock, history: ResponseHistory
 ) -> tuple[float, float] | None:
-    """Return the greatest friction angle that a rotation needs at the toe [deg], and when [s]."""
+    """Return the maximum friction angle required at the toe during a rotation [deg], and its time
+    [s].
+    """
     assert supported_block.block is not None
     return toe_needs_in_time(
         supported_block.block, math.degrees(supported_block.beta_rad), history, supported_block.push
@@ -120,7 +122,7 @@ def _toe_needs(
 def _is_followed_with_toe(
     supported_block: SupportedBlock, needs: tuple[float, float] | None
 ) -> bool:
-    """Return whether the toe slips of a block whose mode is to topple.
+    """Return whether the toe of a block in toppling mode slips.
 
     A block of another mode, asked about as a topple, is not followed: it would slide or slump.
     """
@@ -138,7 +140,7 @@ def _with_toe(
 
 
 def _mechanism(supported_block: SupportedBlock) -> Mechanism:
-    """Return a block that turns about its toe, to be followed step by step from the beginning."""
+    """Return a block that rotates about its toe, for integration step by step from the start."""
     block = supported_block.block
     assert block is not None
     toe = block.toe

@@ -40,7 +40,7 @@ class Border(NamedTuple):
 
 @inner_kernel
 def narrowed(b: Border, k: float, distance: float) -> Border:
-    """Put a block in the place of the end that does as it does (Illinois).
+    """Replace the end of a bracket that has the same outcome as a new block (Illinois method).
 
     The distance of an end that stays for the second time is halved, so that the next root is drawn
     to it and the bracket closes from both sides.
@@ -87,7 +87,7 @@ def border(
     table: ExcursionTable,
     work: np.void,
 ) -> tuple[float, float]:
-    """Close in on a border between two k_r of which one topples and the other does not.
+    """Find a border between two k_r of which one topples and the other does not.
 
     Args:
         low: the smaller k_r.

@@ -1,4 +1,4 @@
-"""The certified search: verdicts for whole intervals of k_r, from K_up downwards."""
+"""Certified search: verdicts for whole intervals of k_r, from K_up downwards."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ BRACKET_WIDTH = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class CertifiedMap:
-    """Intervals with verdicts, in k_r, by falling k_r; what the search could prove.
+    """Intervals of k_r with verdicts, by decreasing k_r, and the extent of the proof.
 
     Args:
         k_up: nothing at or above it topples.
@@ -91,17 +91,17 @@ class CertifiedMap:
 
     @property
     def order_lost(self) -> bool:
-        """Whether D < 0 was met."""
+        """True if D < 0 occurred."""
         return bool((self.verdict == ORDERLESS).any())
 
     @property
     def undecided(self) -> NDArray[np.bool_]:
-        """Which intervals have no verdict."""
+        """Mask of the intervals without a verdict."""
         without: NDArray[np.bool_] = (self.verdict != SAFE) & (self.verdict != TOPPLES)
         return without
 
     def open_above(self, bottom: float) -> tuple[FloatArray, FloatArray]:
-        """Return the ends of what has no verdict above a k_r, shapes (m,), by falling k_r."""
+        """Return the ends of undecided intervals above a k_r, shapes (m,), by decreasing k_r."""
         chosen = self.undecided & (self.high > bottom)
         low, high = self.low[chosen], self.high[chosen]
         if self.reached > bottom:  # the search was given up there
@@ -109,13 +109,13 @@ class CertifiedMap:
         return np.maximum(low, bottom), high
 
     def undecided_above(self, bottom: float) -> float:
-        """Return the length of k_r down to `bottom` that has no verdict."""
+        """Return the total length of undecided k_r down to `bottom`."""
         low, high = self.open_above(bottom)
         return float((high - low).sum())
 
 
 def keeps_order(excitation: Excitation) -> bool:
-    """Return whether D >= 0 in every state short of the verdict, by the record alone.
+    """Return whether D >= 0 in every state short of the verdict, judged by the record alone.
 
     D = k_h sin(phi) + (1 + k_v) cos(phi) can only be negative where q = k_h/(1 + k_v) and
     tan(phi) have opposite signs and a product below -1. A block with tan(phi) > 0 has a k_r
@@ -131,7 +131,7 @@ def keeps_order(excitation: Excitation) -> bool:
 def surely_topples_below(
     block: BlockExcitation, excitation: Excitation, bottom: float, top: float
 ) -> float:
-    """Return a k_r below which every block topples, `bottom` where none is known."""
+    """Return a k_r below which every block topples, `bottom` if none is found."""
     # the bounds of its trajectories rest on the order, which is not checked on the way there
     if not keeps_order(excitation):
         return bottom
@@ -159,7 +159,7 @@ def certified_map(
     count = 0
 
     def give_verdicts(settings: Settings) -> float:
-        """March on; return the k_r that was reached."""
+        """March on; return the k_r reached."""
         nonlocal count
         # its own count: the budget is that of one march
         work = no_work()

@@ -1,4 +1,4 @@
-"""The critical block: the strongest one that a ground motion topples, with a proof.
+"""Critical block of a ground motion: the strongest one that it topples, with a proof.
 
 The set of k_r that topple is often not one interval: an earlier pulse may leave the block
 rocking so that the decisive one misses. No search by single blocks can promise that it has
@@ -144,7 +144,7 @@ def critical(
 
 
 class Ends(NamedTuple):
-    """What is known of the critical value.
+    """Bounds of the critical value.
 
     Args:
         lower: k_r/PGA of a block that topples; None where none was seen to.
@@ -168,7 +168,9 @@ class Ends(NamedTuple):
 def _ends(
     blocks: SingleBlocks, excitation: Excitation, p2: float, of_map: CertifiedMap, bottom: float
 ) -> Ends:
-    """Return the ends of the critical value: proven, or what was seen to topple and K_up."""
+    """Return the bounds of the critical value: proven, or the strongest toppling block found and
+    K_up.
+    """
     pga = excitation.pga_g
     bracket = bracket_of(of_map)
     undecided = bracket.undecided if bracket else of_map.undecided_above(bottom)
@@ -195,7 +197,7 @@ def _ends(
 def _lower_end(
     blocks: SingleBlocks, excitation: Excitation, p2: float, bracket: Bracket, bottom: float
 ) -> tuple[float | None, int]:
-    """Return the k_r/PGA of a block below a border that surely topples, and a number of blocks.
+    """Return the k_r/PGA of a block below a border that certainly topples, and a number of blocks.
 
     The border is known to the width it was closed in to, by runs without an error estimate: the
     block there may stay. A distance of 2e-11 is beyond that and means nothing to anybody. Its own
@@ -219,7 +221,7 @@ def _lower_end(
 
 
 def _doubts(of_map: CertifiedMap, pga: float, ends: Ends, full_map: bool) -> Iterator[str]:
-    """Yield what is not proven."""
+    """Yield the parts of the answer that are not proven."""
     if not ends.certified:
         yield Diagnostic(
             f"not certified: {_reason(of_map, pga)}; {ends.undecided / pga:.3g} of k_r/PGA above "
@@ -248,7 +250,7 @@ def _doubts(of_map: CertifiedMap, pga: float, ends: Ends, full_map: bool) -> Ite
 
 
 def _reason(of_map: CertifiedMap, pga_g: float) -> str:
-    """Why a search is not certified."""
+    """Return the reason why a search is not certified."""
     # the first that applies: where the order is lost the budget is spent on it, too
     if of_map.order_lost:
         return (
@@ -263,7 +265,9 @@ def _reason(of_map: CertifiedMap, pga_g: float) -> str:
 def _islands(
     excitation: Excitation, p2: float, of_map: CertifiedMap, lower: float, bottom: float
 ) -> tuple[Islands, int]:
-    """What lies below the critical k_r: from the map, or from single blocks; and their number."""
+    """Return the islands below the critical k_r, from the map or from single blocks, and their
+    number.
+    """
     resolution = RESOLUTION * excitation.pga_g
     if of_map.complete:
         block = block_excitation(excitation, p2=p2)
@@ -275,7 +279,7 @@ def _islands(
 
 
 class SingleBlocks:
-    """Single blocks of one p² under one excitation, each run once; k_r is k_r itself.
+    """Single blocks of one p² under one excitation, each run once; k_r is not scaled by PGA.
 
     Args:
         p2: frequency parameter p² [1/s²].

@@ -1,4 +1,5 @@
-"""How far blocks of any strength slide in one record, and which one slides a stated distance.
+"""Displacement of sliding blocks of any strength in one record, and the strength for a given
+displacement.
 
 With k_y the yield acceleration and 1 + k_v = w, a block on a level plane has the velocity
 
@@ -50,7 +51,7 @@ class SlidingBlocks:
 
     @cached_property
     def slides_m(self) -> dict[float, float]:
-        """Displacements that were simulated, by k_y/PGA."""
+        """Displacements simulated so far [m], by k_y/PGA."""
         return {}
 
     def displacement_m(self, ky_over_pga: float) -> float:
@@ -82,7 +83,7 @@ def critical_of(
     tolerance: float = TOLERANCE,
     warnings: tuple[str, ...] = (),
 ) -> CriticalSlide:
-    """Return the greatest k_y/PGA with which a block slides further than a distance.
+    """Return the maximum k_y/PGA with which a block slides further than a distance.
 
     Args:
         kind: name of the model, for the answer.

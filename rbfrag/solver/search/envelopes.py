@@ -1,4 +1,4 @@
-"""One verdict for all blocks of an interval of k_r: two trajectories that enclose theirs.
+"""Verdict on all blocks of an interval of k_r, by two trajectories that enclose theirs.
 
 With q = k_h/(1 + k_v) and D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0, the acceleration of the
 block grows with theta and falls with k_r. Hence a trajectory with the greater theta and theta' of
@@ -79,7 +79,7 @@ class Trajectory(NamedTuple):
 
 
 class Impacts(NamedTuple):
-    """Between which instants every block of the interval closes its contact.
+    """Instants between which every block of the interval closes its contact.
 
     Args:
         first: impact of the lower trajectory.
@@ -135,7 +135,7 @@ def decide(
     rest: int,
     work: np.void,
 ) -> Decision:
-    """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
+    """Decide whether all blocks with k_r in [k1, k2] topple, or none, where this can be proven.
 
     Args:
         k1: smallest k_r.
@@ -209,7 +209,7 @@ def blocks_between(k1: float, k2: float, margin: float, check: bool) -> BlockInt
 
 @within
 def all_at_rest(blocks: BlockInterval, node: int) -> Impacts:
-    """All blocks are at rest at a node: both trajectories may start anew from there."""
+    """Return the pair for all blocks at rest at a node, where both trajectories may restart."""
     place = Place(node, 0.0)
     lower = Trajectory(place, at_rest(blocks.k_lower))
     return Impacts(place, place, False, False, lower, Trajectory(place, at_rest(blocks.k_upper)))
@@ -217,7 +217,9 @@ def all_at_rest(blocks: BlockInterval, node: int) -> Impacts:
 
 @within
 def node_of_rest(impacts: Impacts, n: int) -> int:
-    """Node by which the upper trajectory has closed its contact; beyond all where it never has."""
+    """Return the node by which the upper trajectory has closed its contact; beyond the record if
+    never.
+    """
     if impacts.in_air:
         return 2 * n
     return impacts.last.interval + (1 if impacts.last.fraction > 0.0 else 0)
@@ -227,7 +229,7 @@ def node_of_rest(impacts: Impacts, n: int) -> int:
 def mixed_pair(
     excitation: BlockExcitation, blocks: BlockInterval, impacts: Impacts, work: np.void
 ) -> Pair:
-    """Rule E: one pair for blocks that start anew at their impact and for those still in motion.
+    """Rule E: one pair for blocks that restart at their impact and for those still in motion.
 
     The lower trajectory is carried on below zero, virtually, until it turns, with q > k2 all the
     while. Lifted from then on, rest bounds every block from below. From above it is the further
@@ -323,7 +325,7 @@ def border_of_lift(blocks: BlockInterval, peak: float) -> float:
 def carried_on(
     excitation: BlockExcitation, blocks: BlockInterval, impacts: Impacts, pair: Pair, work: np.void
 ) -> tuple[Decision, Impacts]:
-    """Carry a pair of trajectories to the verdict, or to the impacts of both.
+    """Integrate a pair of trajectories to the verdict, or to the impacts of both.
 
     All topple if the lower one does, and none does in this excursion if the upper one does not.
     """
@@ -385,13 +387,13 @@ def carried_on(
 
 @within
 def not_before(place: Place, node: int) -> Place:
-    """Return a place, or the node if it comes later."""
+    """Return a position in the record, or the node if it comes later."""
     return Place(node, 0.0) if place.interval < node else place
 
 
 @within
 def later(first: Place, second: Place) -> Place:
-    """Return the later of two places."""
+    """Return the later of two positions."""
     if second.interval > first.interval:
         return second
     return (

@@ -1,4 +1,4 @@
-"""A block followed from an instant of rest: whether it topples, and how nearly it does not."""
+"""Excursion of a block from rest: whether it topples, and its distance from the border."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from rbfrag.solver.search.rises import next_start
 
 @inner_kernel
 def linear_distance(excitation: BlockExcitation, start: Place, excursion: Excursion) -> float:
-    """How far in k_r an excursion was from the border, by the linear model: > 0 if it toppled.
+    """Return the distance in k_r of an excursion from the border, by the linear model: > 0 if it
+    toppled.
 
     The linear model says what becomes of the state at the end of the excursion under the remaining
     excitation; referred back to its start, that is a distance in k_r. Good for a secant;
@@ -95,7 +96,8 @@ def first_change(
     table: ExcursionTable,
     work: np.void,
 ) -> int:
-    """Return the number of the first block from `first` on that does not do as the others.
+    """Return the index of the first block from `first` on whose outcome differs from that of the
+    others.
 
     Args:
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).

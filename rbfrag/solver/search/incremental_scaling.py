@@ -1,4 +1,5 @@
-"""The weakest shaking that brings a block down: a search over the scale of the record.
+"""Incremental scaling of a record to the weakest shaking at which a block fails (compare
+incremental dynamic analysis, Vamvatsikos and Cornell 2002).
 
 The strength and the frequency parameter of a slumping block do not fix its motion, as those of a
 toppling block do. What is searched is therefore the factor on the record, for one block. The
@@ -84,7 +85,7 @@ class ScaledRun:
 
 @dataclass(frozen=True, eq=False)
 class ScaleSearch:
-    """What the search found of one record and block, before it is put in terms of k/PGA.
+    """Result of the search for one record and block, in terms of the scale.
 
     Args:
         rotation_deg: rotation that counts as failure [deg]; None for failure past recovery.
@@ -132,7 +133,7 @@ class ScaleSearch:
         )
 
     def intervals(self) -> OutcomeIntervals:
-        """Return what was seen, by rising k/PGA: neighbours of one verdict, the gaps left out.
+        """Return the outcomes by rising k/PGA, merged where neighbours agree; gaps are omitted.
 
         Blocks that do not move, and those between them and the first that was looked at, are safe.
         Where the model ended before the block failed, nothing is said of stronger records, even if
@@ -162,7 +163,7 @@ class ScaleSearch:
 
 
 class ScaledKind(MechanismKind):
-    """A kind whose critical value is the smallest factor on the record that brings a block down."""
+    """A kind whose critical value is the smallest factor on the record at which a block fails."""
 
     def critical(
         self,
@@ -174,7 +175,7 @@ class ScaledKind(MechanismKind):
         rotation_deg: float | None = None,
         **options: Any,
     ) -> CriticalScale:
-        """Return the smallest factor on a record that brings a block down.
+        """Return the smallest factor on a record at which a block fails.
 
         Options: `block` with `beta_deg`, `phi_deg`, `phi_back_deg`; `rotation_deg`, the peak
         rotation that counts as failure [deg], None for failure past recovery; `scan_ratio`;
@@ -199,7 +200,7 @@ class ScaledKind(MechanismKind):
 
 
 class ScanRules(NamedTuple):
-    """How far and how finely the scales are looked at.
+    """Range and resolution of the scan over scales.
 
     Args:
         search_limit: least k/PGA that is looked at: the greatest scale.
@@ -229,7 +230,7 @@ def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRu
 def critical_scale(
     shaking: Shaking, shaken: ShakenMechanism, rotation_deg: float | None, rules: ScanRules
 ) -> CriticalScale:
-    """Return the smallest factor on a record that turns a block so far.
+    """Return the smallest factor on a record at which a block reaches a given rotation.
 
     Args:
         shaking: the motion; its vertical component is scaled with the horizontal one.
@@ -256,7 +257,7 @@ def critical_scale(
 
 
 def first_motion(excited: Excitation, yield_g: float) -> float | None:
-    """Return the least factor on an excitation at which a block of that yield moves.
+    """Return the smallest factor on an excitation at which a block of that yield moves.
 
     The block moves where s k_h > (1 + s k_v) k, that is s > k/(k_h - k k_v); between two nodes the
     denominator is linear, so that its greatest value is at a node.
@@ -347,7 +348,7 @@ def _scan(
     ratio: float,
     passed: tuple[Verdict, ...],
 ) -> tuple[list[ScaledRun], float]:
-    """Go up until a verdict is another one; return the runs and the last scale before that."""
+    """Increase the scale until the verdict changes; return the runs and the scale before it."""
     runs: list[ScaledRun] = []
     while scale < limit:
         runs.append(run(min(scale * ratio, limit)))
@@ -364,7 +365,8 @@ def _close_in(
     width: float,
     passed: tuple[Verdict, ...],
 ) -> tuple[list[ScaledRun], float]:
-    """Halve a bracket whose lower end has one of some verdicts and whose upper end has none.
+    """Bisect a bracket whose lower end has one of some verdicts and whose upper end has none of
+    them.
 
     Returns:
         The runs, and the lower end.
@@ -390,7 +392,7 @@ def _first_decided(
     limit: float,
     rules: ScanRules,
 ) -> ScaledRun:
-    """Go on to the first scale that fails, past those that are too close to it; add the runs.
+    """Find the first scale that fails, past those too close to it to decide; add the runs.
 
     Returns:
         The run there, or that which was undecided where none fails.
@@ -412,7 +414,7 @@ def _first_decided(
 def _look_beyond(
     run: Callable[[float], ScaledRun], scale: float, limit: float, ratio: float
 ) -> list[ScaledRun]:
-    """Look at stronger records, in steps twice as wide: does one spare the block?"""
+    """Examine stronger records, in steps twice as wide, for scales that spare the block."""
     runs: list[ScaledRun] = []
     while scale < limit:
         scale = min(scale * ratio * ratio, limit)

@@ -24,7 +24,7 @@ OUTCOMES = {SAFE: "safe", TOPPLES: "topples"}
 
 
 class Islands(NamedTuple):
-    """What lies below the critical value; lengths and values in k_r.
+    """Islands below the critical value; lengths and values in k_r.
 
     `resolved` is None where no toppling interval is as wide as the resolution.
     """
@@ -37,7 +37,7 @@ class Islands(NamedTuple):
 def outcome_intervals(
     certified: CertifiedMap, pga_g: float, max_q: float, bottom: float | None = None
 ) -> OutcomeIntervals:
-    """Return the map over k_r/PGA, rising, up to the k_r that no q exceeds.
+    """Return the map over k_r/PGA, rising, up to the k_r that q never exceeds.
 
     Args:
         certified: verdicts in k_r, falling.
@@ -80,7 +80,7 @@ def outcome_intervals(
 def islands_of_map(
     certified: CertifiedMap, block: BlockExcitation, lower: float, resolution: float
 ) -> tuple[Islands, int]:
-    """Read the islands off a full map.
+    """Return the islands of a full map.
 
     Undecided slivers count to the interval above them; the lower end of the deciding island,
     which lies in one, is closed in on by single blocks. A safe gap narrower than the resolution
@@ -135,7 +135,7 @@ def islands_of_map(
 def islands_by_blocks(
     block: BlockExcitation, lower: float, floor: float, bottom: float, resolution: float
 ) -> tuple[Islands, int]:
-    """Look for islands below the critical value by single blocks: a finding, not a proof.
+    """Search for islands below the critical value by single blocks: evidence, not a proof.
 
     Args:
         block: the excitation of the blocks.

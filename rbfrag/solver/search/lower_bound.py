@@ -1,4 +1,4 @@
-"""K_low: every block with a smaller k_r topples, whatever it was doing before.
+"""K_low: every block with a smaller k_r topples, whatever its earlier motion.
 
 With x = theta'/p + 2 sin(phi/2), the motion obeys ::
 
@@ -62,7 +62,7 @@ def least_rate(excitation: BlockExcitation, top: float, bound: FloatArray) -> No
 def topples_from_any_state(
     excitation: BlockExcitation, kr: float, margin: float, node: int, bound: FloatArray
 ) -> bool:
-    """Return whether all blocks with k_r <= kr topple by what follows a node."""
+    """Return whether all blocks with k_r <= kr topple by the shaking after a node."""
     last = excitation.q.size - 1
     k_lower = kr * (1.0 + margin)
     if excitation.q[node] <= k_lower:
@@ -92,7 +92,7 @@ def topples_from_any_state(
 def all_topple_below(
     excitation: BlockExcitation, bottom: float, top: float, margin: float, bound: FloatArray
 ) -> float:
-    """Return K_low between two k_r; `bottom` where none is found.
+    """Return K_low between two k_r; `bottom` if none is found.
 
     Args:
         excitation: the excitation of a block; D >= 0 throughout.

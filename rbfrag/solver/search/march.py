@@ -1,4 +1,4 @@
-"""Marching down through k_r: verdict after verdict, each for all blocks of an interval."""
+"""March down through k_r: one verdict after another, each for all blocks of an interval."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ STATE = np.dtype(
 
 
 class Settings(NamedTuple):
-    """What a march is to do.
+    """Settings of a march.
 
     Args:
         top: k_r to start from.
@@ -94,7 +94,7 @@ class Settings(NamedTuple):
 
 
 class March(NamedTuple):
-    """A march under way.
+    """State of a march.
 
     Args:
         coarse: excursions from rest over the whole record, at one k_r.
@@ -167,7 +167,7 @@ def march(excitation: BlockExcitation, m: March, work: np.void) -> None:
 
 @within
 def at_goal(m: March) -> bool:
-    """Whether the march has come as far as it is to go."""
+    """Return whether the march has reached its goal."""
     settings = m.settings
     return m.state["found"] and (
         settings.goal == TO_BRACKET
@@ -177,7 +177,7 @@ def at_goal(m: March) -> bool:
 
 @within
 def begin_march(excitation: BlockExcitation, m: March, work: np.void) -> None:
-    """Take up a march at its top; where that is K_up, look whether it is a border itself."""
+    """Start a march at its top; where that is K_up, test whether it is itself a border."""
     state, settings = m.state, m.settings
     top = settings.top
     state["high"] = top
@@ -207,7 +207,7 @@ def begin_march(excitation: BlockExcitation, m: March, work: np.void) -> None:
 
 @within
 def pass_border(m: March) -> None:
-    """Leave the little interval of a border undecided, and go on below it."""
+    """Leave the narrow interval around a border undecided, and go on below it."""
     state = m.state
     # blocks within the margins of a border have no verdict; they are fewer than the depth allows
     row = m.intervals[state["count"]]
@@ -242,7 +242,7 @@ def next_low(m: March) -> float:
 
 @within
 def renew_coarse(excitation: BlockExcitation, m: March, low: float, work: np.void) -> None:
-    """Begin the coarse table anew where its k_r, or what D was checked for, is passed."""
+    """Restart the coarse table where its k_r, or the range checked for D, has been passed."""
     settings = m.settings
     high = m.state["high"]
     about = m.coarse.about
@@ -260,7 +260,7 @@ def renew_coarse(excitation: BlockExcitation, m: March, low: float, work: np.voi
 
 @within
 def decision_on(excitation: BlockExcitation, m: March, low: float, work: np.void) -> Decision:
-    """Ask the rules about the next interval, by the table whose k_r is nearest below."""
+    """Apply the rules to the next interval, with the table whose k_r is nearest below."""
     settings = m.settings
     fine = low >= m.fine.about["kr"]
     return decide(
@@ -271,7 +271,7 @@ def decision_on(excitation: BlockExcitation, m: March, low: float, work: np.void
 
 @within
 def refined(excitation: BlockExcitation, m: March, low: float, work: np.void) -> bool:
-    """Make the fine table anew, nearer to an interval that got no verdict, if that may help."""
+    """Rebuild the fine table closer to an undecided interval, if that may help."""
     state, settings = m.state, m.settings
     width = state["high"] - low
     coarse_kr = m.coarse.about["kr"]
@@ -296,7 +296,7 @@ def refined(excitation: BlockExcitation, m: March, low: float, work: np.void) ->
 
 @within
 def border_between(excitation: BlockExcitation, m: March, low: float, work: np.void) -> bool:
-    """Look whether a border is why there is no verdict; verdicts can go as far as that."""
+    """Test whether a border is the reason for a missing verdict; verdicts can extend up to it."""
     state, settings = m.state, m.settings
     high = state["high"]
     if low <= state["border_high"] < high:
@@ -337,7 +337,7 @@ def widen(m: March, low: float) -> None:
 def leave_open(
     excitation: BlockExcitation, m: March, low: float, verdict: int, work: np.void
 ) -> None:
-    """Leave an interval undecided that is as narrow as one may be."""
+    """Leave an interval undecided whose width has reached the minimum."""
     state = m.state
     state["width"] = state["high"] - low
     point = math.nan
@@ -349,7 +349,7 @@ def leave_open(
 
 @within
 def record(m: March, low: float, verdict: int, point: float) -> None:
-    """Write down what is known of the next interval, and pass it."""
+    """Store the verdict of the next interval, and pass it."""
     state = m.state
     count = state["count"]
     high = state["high"]

@@ -1,4 +1,4 @@
-"""Rule D: instants at which every block of a range is known to be at rest."""
+"""Rule D: instants at which every block of a range of k_r is certain to be at rest."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ ABOUT = np.dtype(
 
 
 class ExcursionTable(NamedTuple):
-    """Excursions from rest of one k_r, each integrated when it is needed, and not before.
+    """Excursions from rest of one k_r, each integrated only when it is needed.
 
     Every excursion of a block with a larger k_r starts in a stretch of q above this one and is
     bounded from above by the one from rest: it is over when that is, and topples only if that does.
@@ -109,7 +109,7 @@ def begin(
     first: int,
     stop: int,
 ) -> None:
-    """Begin anew at another k_r.
+    """Restart a table at another k_r.
 
     Args:
         kr: the stretches are those of q > kr.
@@ -180,7 +180,7 @@ def one_more(excitation: BlockExcitation, table: ExcursionTable) -> bool:
 
 @within
 def all_known(excitation: BlockExcitation, table: ExcursionTable) -> int:
-    """Integrate all excursions that are left; return the number of those that fail."""
+    """Integrate all remaining excursions; return the number of those that topple."""
     while one_more(excitation, table):
         pass
     failing: int = table.about["failing"]
@@ -189,7 +189,7 @@ def all_known(excitation: BlockExcitation, table: ExcursionTable) -> int:
 
 @within
 def add_work(table: ExcursionTable, work: np.void) -> None:
-    """Add what the excursions of a table have cost."""
+    """Add the work spent on the excursions of a table."""
     work["trajectories"] += table.about["known"]
     work["steps"] += table.about["steps"]
 

@@ -1,4 +1,4 @@
-"""Where blocks start: crossings of k_r by q = k_h/(1 + k_v), for one k_r or for all between two."""
+"""Starts of motion: upcrossings of k_r by q = k_h/(1 + k_v), for one k_r or a range."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LIFTED, TURNED_BACK, APART = 0, 1, 2
 
 
 class CommonStart(NamedTuple):
-    """Whether one pair of trajectories encloses all blocks of an interval from their starts on.
+    """Start of one pair of trajectories that encloses all blocks of an interval, if there is one.
 
     Args:
         kind: LIFTED where it does; TURNED_BACK where all blocks are lifted but q turns before the
@@ -31,7 +31,7 @@ class CommonStart(NamedTuple):
 
 @inner_kernel
 def crossing(excitation: BlockExcitation, i: int, kr: float) -> float:
-    """Fraction of interval i at which k_h - (1 + k_v) k_r rises through zero."""
+    """Return the fraction of interval i at which k_h - (1 + k_v) k_r rises through zero."""
     # k_h - (1 + k_v) k_r is linear in the interval as q itself is not
     g0 = excitation.k_h[i] - excitation.w[i] * kr
     g1 = excitation.k_h[i + 1] - excitation.w[i + 1] * kr
@@ -43,7 +43,7 @@ def crossing(excitation: BlockExcitation, i: int, kr: float) -> float:
 
 @inner_kernel
 def next_start(excitation: BlockExcitation, kr: float, place: Place) -> Place:
-    """First place from one on with q > kr; interval n where there is none.
+    """Return the first position from one on with q > kr; interval n if there is none.
 
     A start at the last node counts as none: the ground is at rest from there on.
     """
@@ -130,7 +130,7 @@ def common_start(
 
 @inner_kernel
 def restart_floor(q: FloatArray, k1: float, k2: float, i: int) -> int:
-    """Rule C: the first node at which a block lifted in interval i may start anew.
+    """Rule C: the first node at which a block lifted in interval i may restart.
 
     If q stays >= k2 after the common start and then falls without a rise to <= k1, no block
     with k_r in [k1, k2] impacts before q has fallen below its k_r (by lift), nor starts before

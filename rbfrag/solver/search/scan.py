@@ -1,4 +1,4 @@
-"""The strongest block seen to topple where nothing is proven: many single blocks."""
+"""Strongest block found to topple by many single runs, where nothing is proven."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ BORDER = 1e-9
 
 
 class Seen(NamedTuple):
-    """What single blocks have shown.
+    """Findings from single blocks.
 
     Args:
         kr: greatest k_r seen to topple; None where none was.
@@ -53,7 +53,7 @@ class Seen(NamedTuple):
 def strongest_seen(
     excitation: Excitation, p2: float, low: FloatArray, high: FloatArray, toppling_kr: float | None
 ) -> Seen:
-    """Return the strongest block seen to topple among those without a verdict.
+    """Return the strongest block found to topple among those without a verdict.
 
     An island between two blocks is betrayed by the rotation of the blocks beside it. Gaps towards
     which theta_n rises ever more steeply from both sides, and jumps, are divided until they are
@@ -110,7 +110,7 @@ def strongest_seen(
 
 
 def _gaps(kr: FloatArray, theta_n: FloatArray) -> IntArray:
-    """Return the gaps above blocks i that may hide an island, by rising k_r.
+    """Return the gaps above blocks i that may contain an island, by rising k_r.
 
     Towards a block that topples the peak rotation falls short of balance by the square root of the
     distance in k_r, so that it rises ever more steeply: a cusp, where a peak without an island is

@@ -23,7 +23,8 @@ NOTHING_FAILS, BORDER, AT_THE_TOP = 0, 1, 2
 def distance_of_stretches(
     excitation: BlockExcitation, kr: float, margin: float, first: int, stop: int, work: np.void
 ) -> float:
-    """How far the excursions from rest that begin in [first, stop) are from toppling.
+    """Return the distance in k_r from toppling of the excursions from rest that begin in [first,
+    stop).
 
     Positive if one topples. The size is the linear model's estimate of the distance in k_r:
     good for a secant, and nothing is concluded from it.

@@ -1,4 +1,4 @@
-"""The failure modes and yield accelerations of many blocks at once: `stability_arrays`."""
+"""Failure modes and yield accelerations of arrays of blocks: `stability_arrays`."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class StabilityArray(Tabular):
 
     @property
     def reason(self) -> NDArray[np.str_]:
-        """Why there is no answer, as text; empty where there is one."""
+        """Reason why there is no answer, as text; empty where there is one."""
         return np.array(REASONS)[self.reason_code]
 
     @property
@@ -251,7 +251,9 @@ def stability_arrays(
 def water_held_m(
     water_m: ArrayLike, *, s1_m: ArrayLike, gamma_deg: ArrayLike, beta_deg: ArrayLike
 ) -> FloatArray:
-    """Return heights of water [m] as back fractures hold them: what is above their top runs off."""
+    """Return the heights of water [m] that back fractures can hold: the excess above their top runs
+    off.
+    """
     gamma, beta = np.radians(gamma_deg), np.radians(beta_deg)
     with np.errstate(invalid="ignore", divide="ignore"):
         top_m = s1_m * np.sin(beta + gamma) / np.sin(gamma)
@@ -276,7 +278,7 @@ def _tangent(angle_deg: Any) -> Any:
 def _yields(
     t1: FloatArray, t3: FloatArray, planes: Planes[Any], back_fracture: bool
 ) -> tuple[NDArray[Any], FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return modes, their yields, those of sliding, where a toe lifts and where blocks float."""
+    """Return modes, their yields, those of sliding, and the blocks with a lifting toe or afloat."""
     cot, ky = cot_gamma(t1, t3), planes.ky
     k, lifts = np.array(np.broadcast_to(ky, t1.shape)), np.zeros(t1.shape, dtype=np.bool_)
     floats = np.array(np.broadcast_to(planes.floats(k, SLIDE, cot), t1.shape))
@@ -297,7 +299,7 @@ def _yields(
 
 
 def _at(planes: Planes[Any], rows: NDArray[np.intp]) -> Planes[Any]:
-    """Return the planes of some of the blocks; single numbers hold for all."""
+    """Return the planes of a selection of the blocks; single numbers hold for all."""
     names = ("tan_beta", "mu1", "mu2", "weight", "bond")
     values = {name: getattr(planes, name) for name in names}
     parts: dict[str, Any] = {

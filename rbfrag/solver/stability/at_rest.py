@@ -1,4 +1,5 @@
-"""What predictions read of blocks on two sliding contacts, and of free ones, as they rest.
+"""Parameters at rest for predictions: p_s² of blocks on two sliding contacts, p², k_r and
+restitution of free-standing ones.
 
 Formulas for single numbers and for arrays; no numpy is loaded for a single number.
 """
@@ -92,7 +93,8 @@ def rocking_at_rest(
     tan_beta: N,
     functions: Elementwise[N],
 ) -> tuple[N, N, N, N, N]:
-    """Return k_r of both senses, forward and backward; p² and restitution; 90° less what is left.
+    """Return k_r of both senses, forward and backward, p², restitution, and 90° less the balance
+    angles.
 
     Predictions are about symmetric blocks on level ground: of another block, about the one that is
     as weak as its weaker sense, whose p² [1/s²] is returned, and loses as much speed in two

@@ -1,4 +1,4 @@
-"""Water in the back fracture and the roughness of the base, as yields read them.
+"""Water in the back fracture and roughness of the base, as they enter yield accelerations.
 
 Formulas for single numbers and for arrays; no numpy is loaded for a single number. Water presses
 on the wetted part of the back plane, V = γw z l/2 at l/3 from the heel with l = z/sin(β + γ), and
@@ -30,7 +30,7 @@ V = TypeVar("V")
 
 
 class OnJoint(TypedDict, Generic[V], total=False):
-    """Water and roughness; numbers, or arrays of one a block.
+    """Water and roughness; numbers, or arrays with one element per block.
 
     Args:
         water_m: height of the water in the back fracture above the heel [m].
@@ -209,7 +209,7 @@ def roughened(planes: Planes[N], rough: Roughness[N], phi_deg: N) -> tuple[Plane
 
 @dataclass(frozen=True)
 class JointStrength:
-    """What roughness makes of the friction of a base, at the normal stress of its yield.
+    """Friction of a rough base at the normal stress of its yield (Barton and Bandis).
 
     Args:
         jrc: joint roughness coefficient at the length of the joint.
@@ -265,7 +265,7 @@ AFLOAT = (
 
 
 def refuse_half(jrc: object, jcs_mpa: object, joint_length_m: object) -> None:
-    """Refuse a roughness of which a part is missing.
+    """Reject an incomplete roughness.
 
     Raises:
         InputError: JRC without JCS, JCS without JRC, or a length without both.

@@ -1,4 +1,4 @@
-"""How far a block is from its next mode, and what people should know about the answer."""
+"""Margins of a block to its next failure mode, and warnings about the answer."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def degrees_of(tangent: float) -> float:
 
 @dataclass(frozen=True)
 class MarginFacts:
-    """What the warnings are about; the fields are those of the answer.
+    """Inputs of the warnings; the fields are those of the answer.
 
     Args:
         mode: failure mode.
@@ -229,7 +229,7 @@ def idealisations(
     backed: Any,
     functions: Elementwise[Any],
 ) -> Iterator[tuple[Any, Diagnostic, dict[str, Any]]]:
-    """Yield where a warning about the planes holds, its text with values in braces, and these.
+    """Yield the idealisations of the planes that apply, each text with its values.
 
     Args:
         block: a block, or several of one mode.

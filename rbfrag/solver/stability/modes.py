@@ -88,7 +88,7 @@ def yield_coefficient(
     functions: Elementwise[N],
     bond: N | float = 0.0,
 ) -> N:
-    """Return k = (1 + k_v) tan(δ* - β), with a cohesive bond's share if there is one.
+    """Return k = (1 + k_v) tan(δ* - β), with the contribution of a cohesive bond if there is one.
 
     Args:
         sine: sin δ* up to a positive factor.
@@ -119,7 +119,7 @@ def wedges(cot: N, mu1: N, mu2: N) -> Any:
 
 
 def back_is_rougher(cot: N, mu1: N, mu2: N) -> Any:
-    """Return whether the back plane of a slump holds better than its base: φ2 > φ1 + γ."""
+    """Return whether the back plane of a slump is stronger than its base: φ2 > φ1 + γ."""
     # sin(γ + φ1 - φ2) over the same
     return (cot + mu2) * mu1 - cot * mu2 + 1.0 < 0.0
 
@@ -170,7 +170,7 @@ def mode_code(
 def mode_code_without_back(
     tan_alpha1: N, tan_alpha3: N, limit: N, tan_beta: N, functions: Elementwise[N]
 ) -> N:
-    """Return the code of the mode of a block that nothing supports from behind.
+    """Return the code of the mode of a block without a back plane.
 
     Beyond the friction angle (α1 > φ1) such a block does not stand: it turns back about its
     heel (coded as a slump) if β < α1, and slides otherwise.
@@ -259,7 +259,7 @@ Arms = tuple[tuple[N, Any], tuple[N, Any], tuple[N, Any], tuple[N, Any]]
 
 @dataclass(frozen=True)
 class Planes(Generic[N]):
-    """What the yield of a mechanism depends on besides its contacts.
+    """Plane and load parameters of a mechanism's yield, apart from its contacts.
 
     Args:
         tan_beta: tangent of the dip of the base.
@@ -316,7 +316,7 @@ class Planes(Generic[N]):
         return self.coefficient(self.mu1, 1.0, bond_y=0.0)
 
     def pressed_by(self, k: N) -> N:
-        """Return the normal force on both planes' block across its base at k, over the weight."""
+        """Return the normal force on the base at k, over the weight."""
         normal = (self.weight - k * self.tan_beta) / self._slope
         return normal if self.water is None else normal - self.water.normal
 
@@ -344,7 +344,7 @@ class Planes(Generic[N]):
         return result
 
     def floats(self, k: N, code: int, cot: N) -> Any:
-        """Return whether water leaves the base nothing to carry at the yield of a mode.
+        """Return whether water relieves the base of all load at the yield of a mode.
 
         Args:
             k: the yield; infinite ones do not float.
@@ -430,5 +430,5 @@ class Planes(Generic[N]):
 
 
 def words_of_mode(mode: str) -> str:
-    """Return the name of a mode as it stands in a sentence."""
+    """Return the name of a mode for use in a sentence."""
     return mode.replace("_", " ")

@@ -1,4 +1,6 @@
-"""What ends with the first slip of a block, and what is left of it then."""
+"""Residual strength: the contributions that end with the first slip of a block, and those that
+remain.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,7 @@ def slips_on_base(facts: KindSpec) -> bool:
 def after_first_slip(
     block: Block, planes: Mapping[str, Any]
 ) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
-    """Return planes as what follows the first slip sees them, and what is to be said of them.
+    """Return the planes after the first slip, and the warnings about them.
 
     Args:
         planes: keywords of `stability`, and perhaps ``phi_residual_deg``, else left as they are.
@@ -77,7 +79,7 @@ def after_first_slip(
 
 
 def refuse_before_slip(block: Block, planes: Mapping[str, Any], kind: str | None) -> None:
-    """Refuse to follow in time what ends with the first slip.
+    """Reject a simulation in time with contributions that end at the first slip.
 
     Args:
         planes: keywords of `stability`.

@@ -1,4 +1,4 @@
-"""Yield accelerations of a block that has already turned by an angle θ.
+"""Yield accelerations of a block that has already rotated by an angle θ.
 
 Lengths and γ keep their values at rest; only the arms turn. In terms of the block angles: a
 slump has α + θ, a topple α - θ, but γ must not be computed anew from them.
@@ -24,7 +24,7 @@ from rbfrag.solver.stability.modes import ModeName, Planes, yield_coefficient
 
 
 def kr_after_rotation(block: Block, theta_deg: N, *, beta_deg: float, kv: float = 0.0) -> N:
-    """Return k_r(θ) = (1 + k_v) tan(α3 - θ - β) of a block that has turned about its toe.
+    """Return k_r(θ) = (1 + k_v) tan(α3 - θ - β) of a block that has rotated about its toe.
 
     Args:
         theta_deg: forward rotation, from 0 to 180 - γ, where the front face meets the base
@@ -60,7 +60,7 @@ def ks_after_rotation(
     kv: float = 0.0,
     back_follows: float = 0.0,
 ) -> N:
-    """Return k_s(θ) of a slump that has turned backward (eqs. 3.24, 3.25 with turned arms).
+    """Return k_s(θ) of a slump that has rotated backward (eqs. 3.24, 3.25 with rotated arms).
 
     Args:
         block: the block, with α1 of at least phi_deg.
@@ -107,7 +107,7 @@ def kct_after_rotation(
     kv: float = 0.0,
     back_follows: float = 0.0,
 ) -> N:
-    """Return k_ct(θ) of a confined topple that has turned forward (eqs. 3.28, 3.29 corrected).
+    """Return k_ct(θ) of a confined topple that has rotated forward (eqs. 3.28, 3.29 corrected).
 
     Args:
         block: the block, with γ above 90° and α3 of at most phi_deg.
@@ -148,7 +148,7 @@ def kct_after_rotation(
 
 
 class RotatedYield(NamedTuple):
-    """How the yield of a mode changes as the block turns against its back plane.
+    """Yield of a mode as a function of the rotation against the back plane.
 
     Args:
         yield_g: function of the block and θ [deg] like :func:`ks_after_rotation`.

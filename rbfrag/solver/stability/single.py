@@ -1,4 +1,4 @@
-"""The failure mode and yield acceleration of a block: `stability`."""
+"""Failure mode and yield acceleration of a block: `stability`."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Cohesion:
-    """What a cohesive base adds to the sliding yield, exactly and by an equivalent friction.
+    """Contribution of a cohesive base to the sliding yield, exact and by an equivalent friction.
 
     Args:
         ratio: strength of the bond over the weight, c/(ρ g S1).
@@ -99,7 +99,7 @@ class Cohesion:
 
 @dataclass(frozen=True, repr=False)
 class Stability(Result):
-    """How a block fails and at which horizontal acceleration.
+    """Failure mode of a block and its horizontal yield acceleration.
 
     Yield acceleration coefficients are in g. The yield of the governing mode and that of sliding
     are given; the others are None.
@@ -308,7 +308,7 @@ def judged(
     density_kg_m3: float | None = None,
     **joint: Unpack[OnJoint[float]],
 ) -> tuple[MarginFacts, Planes[float], JointStrength | None]:
-    """Return the mode and yield of a block, its planes and what roughness makes of its friction.
+    """Return the mode and yield of a block, its planes and the effect of roughness on its friction.
 
     Arguments as for :func:`stability`.
     """
@@ -357,7 +357,7 @@ def push_of(block: Block, planes: Planes[float]) -> Push | None:
 
 
 def _density(density_kg_m3: object) -> float:
-    """Return the density of the rock [kg/m³], that of most rocks where none is given."""
+    """Return the density of the rock [kg/m³], by default that of most rocks."""
     return positive(
         ROCK_KG_M3 if density_kg_m3 is None else density_kg_m3, "density_kg_m3", "kg/m³"
     )
@@ -448,7 +448,7 @@ def rectangle_r3_m(p2: float) -> float:
 
 
 def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
-    """Return a rectangle that stands free on level ground, rough enough to topple.
+    """Return a free-standing rectangle on level ground, rough enough to topple.
 
     Args:
         p2: its frequency parameter p² [1/s²], above 0.
@@ -461,7 +461,7 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
 
 
 def refuse_undecided(judged: Stability) -> None:
-    """Refuse a block whose fate at rest leaves nothing to a ground motion.
+    """Reject a block that fails or is locked at rest, whatever the ground motion.
 
     Raises:
         InputError: it fails at rest, or it does not move under any horizontal acceleration.

@@ -1,4 +1,4 @@
-"""Whether the toe of a block that turns about it holds (Gibson's dissertation, 4.3.1).
+"""Stability of the toe of a block that rotates about it (Gibson's dissertation, 4.3.1).
 
 At the start of the rotation the toe bears R/m = r3 θ'' t - g G, with θ'' = p² q/F_s, so that, with
 q = F_s (k cos θc - sin θc + m0), θc = α3 - β and friction alone,
@@ -74,7 +74,7 @@ def _balance(block: Block | BlockArray, beta_deg: Any, push: Push | None) -> tup
 
 
 def toe_needs_deg(block: Block, beta_deg: float, k: float, push: Push | None = None) -> float:
-    """Return the friction angle that the start of a rotation needs at the toe [deg].
+    """Return the friction angle required at the toe at the start of a rotation [deg].
 
     Args:
         block: the block.
@@ -89,7 +89,7 @@ def toe_needs_deg(block: Block, beta_deg: float, k: float, push: Push | None = N
 def toe_slips_g(
     block: Block | BlockArray, beta_deg: Any, phi_deg: Any, push: Push | None = None
 ) -> Any:
-    """Return the acceleration at which the toe gives way as a rotation starts [g].
+    """Return the acceleration at which the toe slips at the start of a rotation [g].
 
     +inf where it holds at any.
 
@@ -134,7 +134,7 @@ def heel_tips_g(
 
 
 def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float) -> Diagnostic:
-    """Return that a toe gives way, as a sentence: what it needs and where, and from when on."""
+    """Return the sentence on a slipping toe: the friction required, and from what time on."""
     at = "" if slips_g == math.inf else f" at {slips_g:.2f} g"
     consequence = f"phi = {phi_deg:g} gives way{at}: the slip of the toe is followed step by step"
     text = f"{NEEDS.format(need=need_deg, where=where)}; {consequence}"
@@ -144,7 +144,8 @@ def slides_at_toe(need_deg: float, where: str, phi_deg: float, slips_g: float) -
 def toe_needs_in_time(
     block: Block, beta_deg: float, history: ResponseHistory, push: Push | None = None
 ) -> tuple[float, float] | None:
-    """Return the greatest friction angle that a rotation needs at the toe [deg], and when [s].
+    """Return the maximum friction angle required at the toe during a rotation [deg], and its time
+    [s].
 
     max atan(|Rx|/Ry) of R/m = r3 (θ'' t - θ'² e) - g G, e from the toe to the centroid, t along its
     path, θ'' of eq. (4.13). None for a block that does not turn.

@@ -1,4 +1,4 @@
-"""Whole sample intervals of a motion whose equation is the same everywhere.
+"""Whole sample intervals of a motion whose equation does not depend on position.
 
 The acceleration is then a straight line between samples, the rate a parabola and x a cubic: an
 interval takes a few operations. What may stop the block, bring it to a limit or break a contact
@@ -42,7 +42,7 @@ def fill_uniform_conditions(rules: PhaseRules, work: PhaseWork) -> None:
 
 @inner_kernel
 def fill_conditions(table: FloatArray, conditions: FloatArray) -> None:
-    """Fill them for one equation, shape (conditions, 3)."""
+    """Fill these factors for one equation, shape (conditions, 3)."""
     for n in range(conditions.shape[0]):
         for part in range(3):
             row = CONDITIONS + 3 * n + part
@@ -52,7 +52,7 @@ def fill_conditions(table: FloatArray, conditions: FloatArray) -> None:
 
 
 class Coast(NamedTuple):
-    """Where the block is after whole intervals of motion; see :func:`coast`."""
+    """State of the block after whole intervals of motion; see :func:`coast`."""
 
     node: int
     state: PhaseState
@@ -74,7 +74,7 @@ def coast(
     history: FloatArray,
     filled: int,
 ) -> Coast:
-    """Follow a moving block over whole intervals, up to one in which something may happen.
+    """Follow a moving block over whole intervals, up to one in which an event is possible.
 
     Args:
         record: the excitation.

@@ -1,4 +1,4 @@
-"""One interval of motion: steps of even length, and the first event in one of them."""
+"""One interval of motion: steps of equal length, up to the first event."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def arrive(
     state: PhaseState,
     step: Step,
 ) -> Arrival:
-    """Return the end of a step whose series is known: its first event, or its whole length.
+    """Return the end of a step whose series is filled: its first event, or its full length.
 
     Args:
         table: coefficients of the equation of the present sense.

@@ -1,4 +1,4 @@
-"""What a model tells the engine: an equation of motion, and where it holds.
+"""Equation of motion of a model with one degree of freedom, and the conditions of its validity.
 
 With x the coordinate (a rotation [rad], or a displacement [m] on which nothing depends):
 
@@ -77,20 +77,22 @@ class Equation:
 
     @cached_property
     def uniform(self) -> bool:
-        """Whether the equation is the same everywhere: x is then a cubic in each interval."""
+        """True if the coefficients do not depend on x, which is then a cubic in each interval."""
         everywhere = (self.inertia, self.driving, self.resistance, self.braking)
         # braking by x'^2 would make U a series without end, even with constant factors
         return all(row.constant for row in everywhere) and not self.braking.coefficients[0]
 
     @cached_property
     def frequency_at_rest(self) -> float:
-        """Rate of the block's own time at x = 0 [1/s], as steps are measured by."""
+        """Frequency parameter at x = 0 [1/s], which sets the length of steps."""
         # (N + M)/D as in step.local_frequency; D = 0 must not divide by zero
         frequency2 = abs(self.driving(0.0)) + abs(self.resistance(0.0))
         return math.sqrt(frequency2 / max(abs(self.inertia(0.0)), 1e-300))
 
     def first_without_strength(self, limit: float) -> float:
-        """Return the least x at which a block at rest moves of itself, or `limit`."""
+        """Return the smallest x at which a block at rest starts to move under gravity alone, or
+        `limit`.
+        """
         # a strength of three harmonics has few zeros: a scan of the range does not miss the first
         points = limit * np.arange(_LOOKS + 1) / _LOOKS
         weak = np.flatnonzero(self.resistance.at(points[1:]) <= 0.0)

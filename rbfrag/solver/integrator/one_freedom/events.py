@@ -1,4 +1,4 @@
-"""What happens within a step: a standstill, a limit of x, a contact that fails."""
+"""Events within a step: a standstill, a limit of x, a contact that fails."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def find_event(
 
 @inner_kernel
 def first_standstill(series: FloatArray, degree: int) -> float:
-    """First tau in (0, 1] at which the rate vanishes, or 2.
+    """Return the first tau in (0, 1] at which the rate vanishes, or 2.
 
     A rate that dips below zero between two ends of one sign is seen where its derivative
     changes sign once, which short steps ensure.
@@ -105,7 +105,7 @@ def first_standstill(series: FloatArray, degree: int) -> float:
 def root_between(
     u: FloatArray, order: int, quantity: int, target: float, low: float, high: float
 ) -> float:
-    """Root in [low, high], to rounding, by Newton's method kept inside a bracket.
+    """Return the root in [low, high], to rounding, by Newton's method kept inside a bracket.
 
     It differs from `rbfrag.solver.integrator.taylor.bracketed_root` in its target, in taking an
     end at which the function vanishes by construction (a limit that the step begins at) for the
@@ -152,7 +152,7 @@ def root_between(
 
 @within
 def value_of(u: FloatArray, order: int, quantity: int, target: float, tau: float) -> float:
-    """Return the function whose root is looked for."""
+    """Return the function whose root is sought."""
     if quantity == TRAVEL:
         return rotation(0.0, u, order, tau) - target
     if quantity == RATE:
@@ -164,7 +164,9 @@ def value_of(u: FloatArray, order: int, quantity: int, target: float, tau: float
 def least_condition(
     table: FloatArray, c: float, s: float, rate: float, a: float, w: float
 ) -> tuple[float, int]:
-    """Least of the inertia and the conditions at a state, and which it is (0: the inertia)."""
+    """Return the minimum of the inertia and the conditions at a state, and its index (0: the
+    inertia).
+    """
     # double and triple angles without a further cosine
     c2 = c * c - s * s
     s2 = 2.0 * c * s
@@ -192,7 +194,7 @@ def least_condition(
 
 @within
 def broken_condition(table: FloatArray, state: PhaseState, a: float, w: float) -> tuple[bool, int]:
-    """Whether a condition fails at a state under two accelerations, and which."""
+    """Return whether a condition fails at a state under two accelerations, and its index."""
     least, condition = least_condition(table, state.cos, state.sin, state.rate, a, w)
     return least <= 0.0, condition
 
@@ -201,7 +203,9 @@ def broken_condition(table: FloatArray, state: PhaseState, a: float, w: float) -
 def first_violation(
     table: FloatArray, u: FloatArray, order: int, start: float, step: Step, end: float
 ) -> tuple[float, int]:
-    """First tau in (0, end] of a step from `start` whose end breaks a condition, and which."""
+    """Return the first tau in (0, end] of a step from `start` whose end breaks a condition, and its
+    index.
+    """
     # bisection: the least of several conditions has no derivative where they change places
     low = 0.0
     high = end

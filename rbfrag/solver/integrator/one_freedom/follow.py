@@ -1,4 +1,4 @@
-"""A mechanism under one excitation: its phases, one after another."""
+"""Run of a mechanism under one excitation: its phases, one after another."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class MotionHistory:
 
 @dataclass(frozen=True, eq=False)
 class MechanismRun:
-    """What became of a mechanism under one excitation.
+    """Result of a mechanism's run under one excitation.
 
     Args:
         outcome: how it ended.
@@ -140,7 +140,7 @@ def follow(
     order: int = ORDER,
     start: tuple[float, float] = (0.0, 0.0),
 ) -> MechanismRun:
-    """Run a mechanism from rest under one excitation until nothing moves any more.
+    """Run a mechanism from rest under one excitation until motion has ended.
 
     Args:
         excitation: accelerations at nodes.
@@ -260,7 +260,7 @@ def _work(rules: PhaseRules) -> PhaseWork:
 
 
 def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:
-    """Return the ending, or that it is open, where the limit is nearer than the error."""
+    """Return the ending, or that it is undetermined where the limit is closer than the error."""
     # a peak that would have reached the limit, had its error been added
     falls_short = run.stop == AT_REST and phase.highest - run.peak.x <= run.peak.error
     just_arrives = False
@@ -275,7 +275,7 @@ def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:
 
 
 def _ending(phase: Phase, run: PhaseRun, last: int) -> Ending:
-    """Return how a run ends that leaves no phase behind it.
+    """Return the ending of a run that no other phase follows.
 
     Args:
         last: last node of the record.
@@ -313,7 +313,7 @@ def _empty_rows(excitation: Excitation) -> FloatArray:
 
 
 def _history(phase: Phase, rows: FloatArray, run: PhaseRun) -> MotionHistory:
-    """Return what the kernel kept of one phase, and the state in which it was left."""
+    """Return the recorded history of one phase, and the state at its end."""
     time_s = np.append(rows[0], run.time_s)
     x = np.append(rows[1], run.end.x)
     rate = np.append(rows[2], run.end.rate)

@@ -120,7 +120,7 @@ class Harmonics:
 
     @property
     def constant(self) -> bool:
-        """Whether the function does not depend on θ."""
+        """True if the function does not depend on θ."""
         return self.degree == 0
 
 
@@ -135,7 +135,7 @@ def sine(phase_rad: float = 0.0, sense: int = 1) -> Harmonics:
 
 
 def constant(value: float) -> Harmonics:
-    """Return the function that has one value everywhere."""
+    """Return the function of constant value."""
     return Harmonics((complex(value), 0j, 0j, 0j))
 
 
@@ -171,7 +171,7 @@ def constant_vector(components: tuple[float, float]) -> Vector:
 
 
 def turning(arm: tuple[float, float], sense: int = 1) -> Vector:
-    """Return an arm of the block that has turned by θ, counter-clockwise where sense is 1."""
+    """Return an arm of the block rotated by θ, counter-clockwise where sense is 1."""
     # (x cos θ - y sin θ, y cos θ + x sin θ), with θ reversed where sense is -1
     x, y = arm
     return Vector(_wave(x, -sense * y), _wave(y, sense * x))

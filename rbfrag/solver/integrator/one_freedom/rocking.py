@@ -1,4 +1,4 @@
-"""The equation of a block that rocks about its toe (4.13), with the forces at the toe."""
+"""Equation of a block that rocks about its toe (4.13), with the forces at the toe."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ FREE_STEP_S = 0.1
 def run_phase(
     record: Nodes, rules: PhaseRules, entry: Entry, work: PhaseWork, history: FloatArray
 ) -> PhaseRun:
-    """Run one phase from where it is entered to where it ends.
+    """Run one phase from its entry to its end.
 
     Args:
         record: the excitation.
@@ -194,7 +194,7 @@ def run_phase(
 def ended(
     record: Nodes, stop: int, line: Line, place: Place, free_s: float, state: PhaseState
 ) -> tuple[float, Entry]:
-    """Return when a phase ended, and how: what another one may be entered with."""
+    """Return the end of a phase, in the form in which another one is entered."""
     stop_s = line.start_s + place.fraction * line.h
     if stop == JUMPED:
         stop_s = time_of_jump(record.time_s, record.interval_s, record.w, record.last)
@@ -235,13 +235,13 @@ def state_on_entry(rules: PhaseRules, entry: Entry) -> PhaseState:
 
 @within
 def jumps_after(record: Nodes, node: int) -> bool:
-    """Whether the ground falls away under the block before the next node (1 + k_v <= 0)."""
+    """Return whether 1 + k_v falls to zero or below before the next node."""
     return node >= record.last and record.last < record.k_h.size - 1
 
 
 @within
 def thresholds(rules: PhaseRules, state: PhaseState) -> Thresholds:
-    """Return the factors of both equations where the block rests."""
+    """Return the factors of both equations for a block at rest."""
     c, s = state.cos, state.sin
     # factors of zero: the acceleration in reverse is then zero, which starts nothing
     reverse_driving = 0.0
@@ -262,7 +262,9 @@ def thresholds(rules: PhaseRules, state: PhaseState) -> Thresholds:
 def stop_at_rest(
     record: Nodes, rules: PhaseRules, state: PhaseState, line: Line, place: Place
 ) -> tuple[int, int]:
-    """Return why a phase ends where its rest does, or that it goes on, and what fails."""
+    """Return the reason why a phase ends at the end of a rest, or that it goes on, and the failed
+    condition.
+    """
     if state.sense == 0:
         return (JUMPED if jumps_after(record, place.interval) else AT_REST), 0
     # confined toppling: the heel leaves its plane, and another phase begins
@@ -278,7 +280,7 @@ def stop_at_rest(
 
 @within
 def stop_of(kind: int) -> int:
-    """Return why a phase ends with an event, or that it goes on."""
+    """Return the reason why a phase ends with an event, or that it goes on."""
     if kind == BROKEN:
         return VIOLATED
     if kind == AT_HIGHEST:

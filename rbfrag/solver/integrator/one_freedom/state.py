@@ -1,4 +1,4 @@
-"""What the kernels of a motion with one degree of freedom take and give back.
+"""Inputs and results of the kernels for motion with one degree of freedom.
 
 The kernels are functions of a few of these tuples: the record, the rules of a phase, where in the
 record the motion is, in what state the block is there, and what has been seen of it so far.
@@ -25,7 +25,7 @@ LEAVES, COMES_TO_REST = range(2)
 
 
 class PhaseRules(NamedTuple):
-    """What governs a phase of motion.
+    """Settings of a phase of motion.
 
     Args:
         forward: table of the equation of forward motion, or of all motion if not `sticks`.
@@ -97,7 +97,7 @@ class Entry(NamedTuple):
 
 
 class PhaseWork(NamedTuple):
-    """Room for the kernels, which make no arrays: what they write is not read afterwards.
+    """Work arrays of the kernels, which allocate none.
 
     Args:
         series: Taylor coefficients of a step, shape (8, order + 1).
@@ -112,7 +112,7 @@ class PhaseWork(NamedTuple):
 
 
 class PhaseRun(NamedTuple):
-    """What became of a phase; times are NaN where nothing happened.
+    """Result of a phase; times are NaN for events that did not occur.
 
     Args:
         stop: why it ended.
@@ -153,7 +153,7 @@ def resting(state: PhaseState, error_x: float, sense: int, smooth: bool) -> Phas
 def certain_since(
     since_s: float, now_s: float, rate: float, driving: float, resistance: float, least_q: float
 ) -> float:
-    """Return the time from which nothing turns the motion back; NaN while something may.
+    """Return the time from which the motion can no longer turn back; NaN while it may.
 
     It is (4.19) for an equation of this form: the block moves forward, and the least excitation
     of all that is to come exceeds the resistance where it is.

@@ -65,13 +65,15 @@ class Errors(NamedTuple):
 
 @inner_kernel
 def harmonic_sum(table: FloatArray, row: int, c: float, s: float) -> float:
-    """Value of one row of coefficients (up to the second harmonic) where cos x = c, sin x = s."""
+    """Return the value of one row of coefficients (up to the second harmonic) at cos x = c, sin x =
+    s.
+    """
     return with_double(table, row, c, s, c * c - s * s, 2.0 * c * s)
 
 
 @inner_kernel
 def with_double(table: FloatArray, row: int, c: float, s: float, c2: float, s2: float) -> float:
-    """The same where c2 = cos 2x and s2 = sin 2x are known."""
+    """Return the same value where c2 = cos 2x and s2 = sin 2x are given."""
     value: float = table[row, 0] + table[row, 1] * c + table[row, 2] * s
     value += table[row, 3] * c2 + table[row, 4] * s2
     return value
@@ -79,7 +81,7 @@ def with_double(table: FloatArray, row: int, c: float, s: float, c2: float, s2: 
 
 @inner_kernel
 def harmonic_slope(table: FloatArray, row: int, c: float, s: float) -> float:
-    """Derivative of one row of coefficients (up to the second harmonic)."""
+    """Return the derivative of one row of coefficients (up to the second harmonic)."""
     c2 = c * c - s * s
     s2 = 2.0 * c * s
     slope: float = table[row, 2] * c - table[row, 1] * s
@@ -98,7 +100,9 @@ def uniform_terms(
     w0: float,
     dw: float,
 ) -> tuple[float, float]:
-    """First and second Taylor coefficient of U where the equation is the same everywhere."""
+    """Return the first and second Taylor coefficients of U of an equation that does not depend on
+    x.
+    """
     # U' = h² [N a - M w]/D is linear in tau: two terms are exact
     scale = h * h / inertia
     first = scale * (driving * a0 - resistance * w0)
@@ -183,7 +187,7 @@ def fill_step(
 
 @within
 def local_frequency(table: FloatArray, c: float, s: float) -> float:
-    """Return the rate of the block's own time [1/s]: sqrt((N + M)/D), p of a toppling block."""
+    """Return the local frequency parameter [1/s], sqrt((N + M)/D): p for a toppling block."""
     driving = abs(harmonic_sum(table, DRIVING, c, s))
     resistance = abs(harmonic_sum(table, RESISTANCE, c, s))
     inertia = harmonic_sum(table, INERTIA, c, s)
@@ -193,7 +197,7 @@ def local_frequency(table: FloatArray, c: float, s: float) -> float:
 
 @within
 def converges_slowly(u: FloatArray, order: int) -> bool:
-    """Whether the last two terms of a series are not small beside its first three."""
+    """Return whether the last two terms of a series are not small compared with its first three."""
     last_terms: float = abs(u[order]) + abs(u[order - 1])
     first_terms: float = abs(u[0]) + abs(u[1]) + abs(u[2])
     return last_terms > SLOW * first_terms
@@ -201,7 +205,7 @@ def converges_slowly(u: FloatArray, order: int) -> bool:
 
 @within
 def truncation(u: FloatArray, order: int, frequency: float, rate: float, h: float) -> float:
-    """Return a bound on what the terms left out add to x at the end of a step.
+    """Return a bound on the contribution of the omitted terms to x at the end of a step.
 
     The first two of them follow from the last two of the series as those did from earlier ones.
     One would not do: from rest under a constant acceleration every other term vanishes.
@@ -223,7 +227,7 @@ def truncation(u: FloatArray, order: int, frequency: float, rate: float, h: floa
 def sensitivity(
     table: FloatArray, state: PhaseState, step: Step, acceleration: float
 ) -> tuple[float, float]:
-    """Return bounds of the derivatives of x'' by x [1/s²] and by x' [1/s] at a step's start."""
+    """Return bounds on the derivatives of x'' by x [1/s²] and x' [1/s] at a step's start."""
     c, s, rate = state.cos, state.sin, state.rate
     inertia = harmonic_sum(table, INERTIA, c, s)
     # the derivative of D x'' = N a - M w - Q x'² by x, with x'' as the series has it
@@ -248,7 +252,7 @@ def error_growth(
     tau: float,
     x: float,
 ) -> Errors:
-    """Return the errors after a step: the earlier ones carried on, and what the step adds.
+    """Return the errors after a step: the earlier ones carried through it, and those that it adds.
 
     Args:
         table: coefficients of the equation of the present sense.

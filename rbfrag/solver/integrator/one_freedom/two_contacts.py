@@ -1,4 +1,4 @@
-"""The equation of motion of a block that slides on two planes at once.
+"""Equation of motion of a block that slides on two planes at once.
 
 The contact forces have fixed directions u_a and u_b, because friction is fully mobilised at both
 contacts. With M_a and M_b their moments about the centroid, C(θ) the path of the centroid (dashes
