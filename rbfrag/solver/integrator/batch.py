@@ -71,6 +71,8 @@ def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Ru
     flat_kr = np.ascontiguousarray(strengths).reshape(-1)
     counts = np.empty((3, flat_kr.size), dtype=np.int64)
     real = np.empty((4, flat_kr.size))
+    # theta'' = p² [k_h cos(theta_c - theta) - (1 + k_v) sin(theta_c - theta)], tan(theta_c) = k_r:
+    # a block enters by p and k_r alone
     p = np.sqrt(sizes).reshape(-1)
     run_batch(excitation.nodes, flat_kr, p, PH_MAX, counts, real)
     return Runs(

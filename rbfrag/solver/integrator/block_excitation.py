@@ -116,6 +116,7 @@ def block_excitation(
         span_ph: greatest p·T of a span.
         span_error: greatest error bound of a span, as of `spans.SPAN_ERROR`.
     """
+    # everything that depends on p and the record but not on k_r is computed once per search
     p = math.sqrt(p2)
     remaining = np.empty(excitation.q.size)
     greatest, node = remaining_excitation(excitation.interval_s, excitation.k_h, p, remaining)

@@ -106,13 +106,22 @@ def eventful(
 
 @within
 def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float) -> bool:
-    """Return whether a block has toppled whatever follows, given an error bound `error` of its
-    state.
+    """Return whether a block has toppled whatever follows, for a state known to `error`.
 
-    Beyond its balance point (s < 0) and turning on, it falls as long as
-    tan(phi) < q; `least_q` is the least q from here on (docs/theory/toppling.md, "Events").
+    Let psi = theta_c - theta be the angle to the balance point. Beyond it (psi < 0) and with
+    theta' > 0, theta''/p² = (1 + k_v) (q cos(psi) - sin(psi)) stays positive as long as
+    q > tan(psi), and psi only falls: the block falls if the minimum of q from here on exceeds
+    tan(psi) (docs/theory/toppling.md, "Events").
+
+    Args:
+        rate: theta'/p.
+        s: sin(psi).
+        c: cos(psi).
+        least_q: minimum of q = k_h/(1 + k_v) from here on, at most 0 (rest after the record).
+        error: bound on |error of theta| + |error of theta'/p|.
     """
-    # at a quarter turn (c = 0) the test of q needs no tangent in this form
+    # q > tan(psi) multiplied by c, which also holds at a quarter turn (c = 0). An error of psi
+    # changes c q - s by at most error (|q| + 1), hence the bound on the right
     return (rate > error) & (s < 0.0) & (c * least_q - s > error * (1.0 - least_q))
 
 
@@ -120,8 +129,10 @@ def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float)
 def upright_rate(s: float, c: float) -> float:
     """Return theta'/p of the motion that comes to rest upright, the ground at rest.
 
-    By energy, 1 - cos(phi) = (theta'/p)²/2: a block that is faster falls over.
+    With psi the angle to the balance point, s = sin(psi) and c = cos(psi), energy gives
+    1 - cos(psi) = (theta'/p)²/2: a block that is faster falls over.
     """
+    # theta'/p = 2 sin(psi/2), signed: negative beyond the balance point
     return 2.0 * math.sin(0.5 * math.atan2(s, c))
 
 
@@ -146,6 +157,8 @@ def examine_step(
     The step is cut at the turning points of theta into monotone stretches, so a peak and an
     impact in one step, or a dip below zero between two positive ends, are all seen.
     """
+    # invariant: between two zeros of U theta is monotone, so that each stretch holds at most one
+    # passage through theta = 0, which a sign change at its ends reveals and brackets
     v_start = u[1]
     # a start from rest has U = 0: its direction is that of the acceleration
     u_start = u[0] if u[0] != 0.0 else v_start
@@ -283,6 +296,8 @@ def examine_descent(
         highest: a maximum of theta counts above this one only; below zero to have all.
     """
     u_start, v_start = u[0], u[1]
+    # V < 0 at both ends, and V is monotone: theta is concave and has one zero on the way down. A
+    # block that falls throughout has one as well; all else is cut into stretches
     rounds = (u_start > 0.0) & (v_start < 0.0) & (v_end < 0.0)
     falls = (theta > 0.0) & (u_start < 0.0) & keeps_direction(u_start, v_start, u_end, v_end)
     if theta_end <= 0.0 and (rounds or falls):

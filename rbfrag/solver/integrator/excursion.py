@@ -34,7 +34,7 @@ class Rules(NamedTuple):
 
     Args:
         impacts: False carries the motion on below theta = 0, as if there were no base.
-        order: ORDER_TRUSTED takes D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0 for granted;
+        order: ORDER_TRUSTED takes D = k_h sin(psi) + (1 + k_v) cos(psi) >= 0 for granted;
             ORDER_TO_REST checks it on the way between this motion and a block with `kr_other` at
             rest; ORDER_TO_BORDER between this motion and the border of the irrecoverable states.
         kr_other: see `order`.
@@ -77,16 +77,16 @@ def order_lost(
     turned: float,
     tangent: float,
 ) -> bool:
-    """Return whether D may be negative between the states of one step and tan(phi) = tangent.
+    """Return whether D may be negative between the states of one step and tan(psi) = tangent.
 
     Args:
         shaking: the excitation over the step.
-        s0: sin(phi) at its start.
-        c0: cos(phi) there.
-        s1: sin(phi) at its end.
-        c1: cos(phi) there.
-        turned: bound of the angle that phi can turn in the step [rad].
-        tangent: tan(phi) of the other motion.
+        s0: sin(psi) at its start.
+        c0: cos(psi) there.
+        s1: sin(psi) at its end.
+        c1: cos(psi) there.
+        turned: bound of the angle that psi can turn in the step [rad].
+        tangent: tan(psi) of the other motion.
     """
     a0, da, w0, dw = shaking
     a1 = a0 + da
@@ -95,7 +95,7 @@ def order_lost(
     least = min(
         min(a0 * s0 + w0 * c0, a1 * s0 + w1 * c0), min(a0 * s1 + w0 * c1, a1 * s1 + w1 * c1)
     )
-    # phi leaves the range of its ends by less than it can turn in the step
+    # psi leaves the range of its ends by less than it can turn in the step
     slack = (abs(a0) + abs(da) + abs(w0) + abs(dw)) * turned
     return least < slack or min(a0 * tangent + w0, a1 * tangent + w1) < 0.0 or min(c0, c1) <= 0.0
 
@@ -186,6 +186,11 @@ def integrate_excursion(
     steps = 0
     ph_now = -1.0
     per_ph = u_now = 0.0
+    # Invariant of the loop: (theta, rate, s, c) is the state at the place (i, tau), with
+    # s = sin(psi) and c = cos(psi) carried by rotation, psi = theta_c - theta. An excursion starts
+    # from a given state and ends at its first event, so that it depends on the past by that
+    # state alone; this is what the rules of the search compose
+
     # a span says nothing of what happens inside it: neither impacts below 0 nor the sign of D
     use_spans = rules.impacts and rules.order == ORDER_TRUSTED and lengths.size > 0
     while i < last and (i < stop.interval or (i == stop.interval and tau < stop.fraction)):

@@ -91,6 +91,8 @@ def simulate_free(
         most_impacts: impacts beyond which a run is given up.
         change: relative change of the motion that sensitive outcomes are told by.
     """
+    # Rocking about two corners is chaotic for slender blocks (docs/theory/rocking.md): an outcome
+    # that changes under a motion scaled by 1 + change or 1 - change is reported as sensitive
     more, less = excited.scaled(1.0 + change), excited.scaled(1.0 - change)
     excitations = (excited.nodes, more.nodes, less.nodes)
     tails = (excited.tail_max_q, more.tail_max_q, less.tail_max_q)

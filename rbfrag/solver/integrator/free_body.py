@@ -141,6 +141,12 @@ def one_step(
             planes that could hold the block by friction alone do so only where something presses
             it on them.
     """
+    # Time stepping of Moreau (1988) in impulses P = h R per mass, for the velocity v = (x', y',
+    # spin) of the centroid:
+    #     v_free = v + h (G g + water),    v_end = v_free + sum over corners of J^T P,
+    #     P_n >= 0,  n·v_end - least >= 0,  P_n (n·v_end - least) = 0,  |P_t| <= mu P_n
+    # with n·v the speed of a corner away from its plane and mu its coefficient of friction. The
+    # position follows as x + h v_end: rigid contact without a stiffness
     g = STANDARD_GRAVITY_M_S2
     c, s = math.cos(at.turned), math.sin(at.turned)
     # the velocity without contacts, under the resultant of weight, water and inertia
@@ -286,6 +292,11 @@ def run_free(
     node = 0
     while node < last and time_s[node + 1] <= start_s:
         node += 1
+    # Invariant of the loop: `at` is the motion at time `now`, inside the interval after `node`.
+    # Steps end at the nodes, so that none crosses a kink of the record. At rest a step
+    # is taken only for a load outside the range seen so far: the loads that the contacts can
+    # carry form a convex cone, hence an interval of q = k_h/(1 + k_v), and q is monotone between
+    # nodes
     now, steps, filled = start_s, 0, 0
     stopped_s, moved_s, landed_s = start_s, math.nan, math.nan
     resting = at_standstill(at, frame, h)

@@ -132,6 +132,11 @@ def after_impulses(
         v_free: velocity without impulses.
         tolerance: change of velocity in a sweep at which the impulses have converged [m/s].
     """
+    # Per mass, impulses P_n and P_t at a corner change v by P_n n + P_t t and the spin by
+    # (P_n M_n + P_t M_t)/(I_C/m), M_n and M_t their moments about the centroid. Conditions:
+    #     P_n >= 0,  n·v - least >= 0,  P_n (n·v - least) = 0       (it pushes or it is open)
+    #     |P_t| <= friction P_n,  with equality and opposed to the slip where it slips
+    # Gauss-Seidel meets these conditions at one corner after the other, with v kept up to date
     if active == 1:
         decided, velocity = _of_one(corners, work, per_inertia, v_free)
         if decided:
@@ -250,6 +255,8 @@ def _of_two(
     Returns:
         Whether Coulomb's law holds for one of the ways; and the velocity.
     """
+    # each combination of states turns Coulomb's law into equalities, that is linear equations;
+    # its inequalities then tell whether the combination was the right one
     first = second = -1
     for k in range(active):
         if work.does[k] == OPEN:

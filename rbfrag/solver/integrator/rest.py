@@ -123,7 +123,10 @@ def calm_until(nodes: Nodes, level: Thresholds, node: int) -> int:
 
     Rest costs one comparison a sample, or one a block of samples.
     """
-    # bounds of k_h/(1 + k_v) between which a block certainly stays at rest
+    # A block at rest moves forward where driving k_h > resistance (1 + k_v), in reverse where
+    # k_h is below the corresponding bound: with 1 + k_v > 0 these are bounds of q = k_h/(1 + k_v),
+    # whose extremes over blocks of nodes are tabulated. The margin CALM covers the rounding of the
+    # quotient
     above = -math.inf
     below = -math.inf
     # a block without strength left, or one that k_h does not drive, is looked at node by node

@@ -125,7 +125,7 @@ def carried(off: Offset, ph: float, stiffness: float, noise: float) -> Offset:
     Args:
         off: error at the start of the step.
         ph: p times the step length.
-        stiffness: D = k_h sin(phi) + (1 + k_v) cos(phi).
+        stiffness: D = k_h sin(psi) + (1 + k_v) cos(psi).
         noise: truncation and rounding of the step.
     """
     # to second order in the step, which is enough for an estimate
@@ -171,6 +171,8 @@ def cross_interval(
     impact_at = -1.0
     steps = 0
     fallen = False
+    # theta'' = p² [side k_h cos(psi) - (1 + k_v) sin(psi)], psi = theta_c - theta: the equation of
+    # the toppling block about either corner, with k_h mirrored about the heel
     total = corner.p * (nodes.interval_s[i] * (1.0 - tau))
     parts, part, ph = even_parts(total, 1.0 - tau, rules.ph_max)
     for number in range(parts):
@@ -180,6 +182,7 @@ def cross_interval(
         shaking = StepExcitation(side * forward.k_h, side * forward.dk_h, forward.w, forward.dw)
         step = take_step(order, u, ph, state, shaking)
         steps += 1
+        # D = -d(theta''/p²)/d(psi), which drives the error of theta'
         stiffness = shaking.k_h * state.sin + shaking.w * state.cos
         off = carried(off, ph, stiffness, step.truncation + step.rounding)
         least = -1.0 if keeps else peak.x  # a history has all peaks
@@ -355,6 +358,11 @@ def run_rocking(
         u: work, shape (9,).
     """
     time_s, interval_s, last = nodes.time_s, nodes.interval_s, nodes.last
+    # Invariant of the loop: `state` is the rotation theta >= 0 about the corner `side` (0: rest) at
+    # the position (i, tau). An impact changes the corner and keeps the fraction e of theta'
+    # (conservation of angular momentum or a given restitution, docs/theory/rocking.md); one that
+    # leaves less than `rules.slowest` ends in rest
+
     # theta'' at rest is that of k_h - w tan(theta_c) forward, of -(k_h + w tan(theta_c)) backward
     level = Thresholds(1.0, toe.kr, 1.0, -heel.kr, True)
     keeps = rows.shape[1] > 0

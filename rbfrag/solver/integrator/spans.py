@@ -7,7 +7,7 @@ no effect of first order: its double integral vanishes at the end of the span. I
 through the rotation that it causes inside the span, is the quadratic form ::
 
     U(1) += P² int d g2 dtau,     theta(1) += P² int (1 - tau) d g2 dtau,
-    d = a sin(phi) + w cos(phi),  g2 = double integral of a cos(phi) - w sin(phi)
+    d = a sin(psi) + w cos(psi),  g2 = double integral of a cos(psi) - w sin(psi)
 
 of which the part that the cubics miss is a number per span, known beforehand. The next terms are
 smaller by p T theta'/p.
@@ -124,6 +124,11 @@ def fill_spans(
         w: 1 + k_v at the nodes, shape (n,).
         rows: to be filled, shape (number of whole spans, COLUMNS).
     """
+    # A row holds the length, a bound of |a| + w, the cubics of a and w, and the integrals of X Y2
+    # and (1 - tau) X Y2 less those of the cubics, for X, Y = a, w and Y2 the double integral of Y
+    # from the start of the span: with them d and g2 of the module's equation need no sum over
+    # samples in a step. Last comes the maximum residual of the cubics at the nodes
+
     for number in range(rows.shape[0]):
         row = rows[number]
         # a first pass for the length, which the moments are taken over, and the bound of theta''
@@ -181,7 +186,10 @@ def span_step(
     spans: FloatArray, row: int, u0: float, ph: float, s0: float, c0: float
 ) -> tuple[float, float]:
     """Return theta(1) - theta(0) and U(1) of one span; arguments as of a single step."""
-    # A and D as in `taylor.series`, here of degree 3 in time
+    # theta''/p² = A cos(delta) + D sin(delta), delta the angle turned, as in `taylor.series`, but
+    # A = a c - w s and D = a s + w c are cubics in tau here: pa, pa1, pa2, pa3 are the coefficients
+    # of P A and pd, pd1, pd2, pd3 those of P D. With v_k = k U[k],
+    #     v[k+1] = sum over i = 0..3 of (pa_i c[k-i] + pd_i s[k-i])
     big_p = ph * ph
     a, w = spans[row, 2], spans[row, 6]
     pa, pd = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)

@@ -63,8 +63,8 @@ class State(NamedTuple):
     Args:
         theta: rotation about the toe [rad].
         rate: theta'/p.
-        sin: sin(phi), phi = theta_c - theta the angle that is left to the balance point.
-        cos: cos(phi).
+        sin: sin(psi), psi = theta_c - theta the angle that is left to the balance point.
+        cos: cos(psi).
     """
 
     theta: float
@@ -150,7 +150,7 @@ def time_of_jump(time_s: FloatArray, interval_s: FloatArray, w: FloatArray, last
 
 @bare_kernel
 def at_rest(kr: float) -> State:
-    """Return the state of rest, where tan(phi) = tan(theta_c) = k_r."""
+    """Return the state of rest, where tan(psi) = tan(theta_c) = k_r."""
     # from k_r itself: by way of the angle both would be rounded twice
     cos = 1.0 / math.sqrt(1.0 + kr * kr)
     return State(0.0, 0.0, kr * cos, cos)

@@ -58,7 +58,7 @@ def step_errors(
     size = ph * (abs(state.rate) + ph * (a_size * abs(state.cos) + w_size * abs(state.sin)))
     truncation += (0.0625 * abs(highest[3]) + 0.25 * abs(highest[0]) * (size * size)) / ph
     # theta, theta'/p and the sine are rounded where they are stored, theta'' where k_h drives it;
-    # what gravity takes back, w sin(phi), is less than the rounding of the sine itself
+    # what gravity takes back, w sin(psi), is less than the rounding of the sine itself
     rounding = MACHINE_EPSILON * (
         2.0 * (abs(state.theta + turned) + abs(state.rate) + abs(state.sin))
         + 4.0 * ph * a_size * abs(state.cos)

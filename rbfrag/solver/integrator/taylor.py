@@ -1,7 +1,7 @@
 """Taylor step of the rocking block, and the polynomials that it leaves for locating events.
 
-On tau in [0, 1] with h the interval, P = p²h², U = h theta', phi = theta_c - theta,
-s = sin(phi), c = cos(phi), a(tau) = a0 + da tau the driving
+On tau in [0, 1] with h the interval, P = p²h², U = h theta', psi = theta_c - theta,
+s = sin(psi), c = cos(psi), a(tau) = a0 + da tau the driving
 acceleration and w(tau) = w0 + dw tau the effective gravity, both in g::
 
     U[k+1] = P/(k+1) (a0 c[k] + da c[k-1] - w0 s[k] - dw s[k-1])
@@ -72,7 +72,7 @@ def series(
     """
     a0, da, w0, dw = shaking
     big_p = ph * ph
-    # in delta the start is always 0: no value of phi enters the recurrence but here.
+    # in delta the start is always 0: no value of psi enters the recurrence but here.
     # A and D, P in them, and their changes over the step; U[1] is A itself
     pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
     pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
@@ -146,8 +146,8 @@ def taylor_step(
             inside the step, shape (9,).
         u0: U at the start, p times the step length times theta'/p.
         ph: p times the step length.
-        s0: sin(phi) at the start.
-        c0: cos(phi) at the start.
+        s0: sin(psi) at the start.
+        c0: cos(psi) at the start.
         shaking: the excitation over the step.
 
     Returns:
@@ -204,7 +204,7 @@ def small_turn(s: float, c: float, angle: float) -> tuple[float, float]:
 
 @fused_kernel
 def turn(s: float, c: float, angle: float) -> tuple[float, float]:
-    """Return s = sin(phi) and c = cos(phi) after phi has fallen by `angle`."""
+    """Return s = sin(psi) and c = cos(psi) after psi has fallen by `angle`."""
     if abs(angle) <= SMALL_TURN:
         return small_turn(s, c, angle)
     # 1 - cos as 2 sin²(half) keeps its digits where the angle is small
@@ -273,6 +273,7 @@ def bracketed_root(
     mistaken for a root. Convergence being quadratic, three steps in a row tell the next one, and
     the search ends when that is below rounding.
     """
+    # invariant: the function has the sign of `at_low` at `low` and not at `high`
     at_low = _at(kind, theta, u, order, low)
     at_high = _at(kind, theta, u, order, high)
     tau = 0.5 * (low + high)

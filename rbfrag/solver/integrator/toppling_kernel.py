@@ -111,7 +111,7 @@ class Progress(NamedTuple):
 
 @within
 def standing(corner: Corner) -> State:
-    """Return the state of rest, where phi is the critical angle."""
+    """Return the state of rest, where psi is the critical angle."""
     return State(0.0, 0.0, corner.sin, corner.cos)
 
 
@@ -197,6 +197,9 @@ def cross_interval(
     verdict_at = -1.0
     verdict_error = 0.0
     steps = 0
+    # Invariant of the loop: |error of theta| + |error of theta'/p| <= error, |error of theta|
+    # <= drift. The first bounds the outcome, the second, which is closer, the time of an impact
+
     # a step holds the truncation at rounding only up to ph_max (see `taylor.PH_MAX`)
     total = corner.p * (nodes.interval_s[i] * (1.0 - tau))
     parts, part, ph = even_parts(total, 1.0 - tau, rules.ph_max)
@@ -346,6 +349,9 @@ def advance(
         rows: history, as in :func:`run_toppling`.
         u: work, shape (9,).
     """
+    # Invariant of the loop: `state` is the state at the position (i, tau) if `moving`; otherwise
+    # the block rests there. Rest ends where k_h rises above (1 + k_v) k_r; an impact, where theta
+    # returns to 0, takes all of theta', so that the block rests again from that instant on
     time_s, interval_s, last = nodes.time_s, nodes.interval_s, nodes.last
     level = Thresholds(1.0, corner.kr, 0.0, 0.0, False)
     keeps = rows.shape[1] > 0
@@ -446,6 +452,7 @@ def run_toppling(
             lies beyond 90 degrees.
         u: work, shape (9,).
     """
+    # restitution 0: the block is backed, and an impact leaves no speed
     corner = kernel_corner(kr, p, 0.0)
     rules = StepRules(order, ph_max)
     progress = advance(nodes, corner, rules, beginning(corner), False, rows, u)

@@ -98,6 +98,9 @@ def take_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
 @inner_kernel
 def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
     """Update the error estimates; advance slots whose step had no event, mark the others."""
+    # A step is plain if theta stays above 0 without a peak that counts (`keeps_direction`,
+    # `simple_turn`) and the series of exp and sin hold: exactly the steps that the kernel of a
+    # single run takes without examining them, hence the same bits
     for j in range(batch):
         ph = x[PH + j]
         theta = x[THETA + j]
@@ -204,6 +207,10 @@ def run_batch(
         counts: filled with outcome, steps and samples moved, shape (3, m).
         real: filled with peak, start, verdict and error, shape (4, m).
     """
+    # Invariant: slots 0..running - 1 hold unfinished runs, each at the start of a step; jobs below
+    # `job` have been started. A slot that finishes takes the next job, or else the last slot
+    # moves into its place
+
     # The loops over slots stand here: in functions of their own, numba would count the references
     # to all these arrays at every step.
     time_s, interval_s, k_h, w = nodes.time_s, nodes.interval_s, nodes.k_h, nodes.w

@@ -101,6 +101,9 @@ def border(
     Returns:
         A k_r that does as `low` and a greater one that does as `high`.
     """
+    # Invariant: one of b.low and b.high topples and the other does not. False position on the
+    # distance by the linear model needs few runs; where it stalls, `next_trial` bisects
+
     # only the outcome of `high` is known: the first block is the middle one
     topples = at_low > 0.0
     at_high = -math.inf if topples else math.inf

@@ -117,10 +117,10 @@ class CertifiedMap:
 def keeps_order(excitation: Excitation) -> bool:
     """Return whether D >= 0 in every state short of the verdict, judged by the record alone.
 
-    D = k_h sin(phi) + (1 + k_v) cos(phi) can only be negative where q = k_h/(1 + k_v) and
-    tan(phi) have opposite signs and a product below -1. A block with tan(phi) > 0 has a k_r
-    that q exceeded before; one beyond its balance point with tan(phi) < 0 has not toppled only
-    if q is yet to fall below tan(phi). Either way a value of q is followed by one of the
+    D = k_h sin(psi) + (1 + k_v) cos(psi) can only be negative where q = k_h/(1 + k_v) and
+    tan(psi) have opposite signs and a product below -1. A block with tan(psi) > 0 has a k_r
+    that q exceeded before; one beyond its balance point with tan(psi) < 0 has not toppled only
+    if q is yet to fall below tan(psi). Either way a value of q is followed by one of the
     opposite sign, positive first.
     """
     # the greatest q so far against each q: only what follows a push can pull
@@ -151,6 +151,10 @@ def certified_map(
         map_depth: width of k_r/PGA that may be left undecided below the first toppling interval
             as wide as RESOLUTION.
     """
+    # Invariant: `intervals[:count]` are adjacent, by falling k_r, from K_up down to `reached`. No
+    # block above K_up topples; the verdict of an interval holds for every block in it. The
+    # critical value is the upper end of the first interval that topples, or in what is undecided
+    # above it
     n = excitation.q.size
     check = not keeps_order(excitation)
     block = block_excitation(excitation, p2=p2)

@@ -110,6 +110,8 @@ def critical(
     if pga == 0.0 or excitation.max_q <= bottom:
         return replace(answer, status="no_motion", certified=True)
     of_map = certified_map(excitation, p2=p2, bottom=bottom, full=full_map, map_depth=map_depth)
+    # certified: the lower end topples, and no block above the upper one does, but for undecided
+    # slivers. Else the lower end is the strongest block found to topple, and the upper one K_up
     ends = _ends(blocks, excitation, p2, of_map, bottom)
     answer = replace(
         answer,

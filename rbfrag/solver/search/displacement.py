@@ -93,6 +93,8 @@ def critical_of(
         tolerance: width of the bracket, k_y/PGA.
         warnings: sentences about the motion.
     """
+    # the displacement falls with k_y and vanishes at k_y = max q: there is one root of
+    # displacement(k_y) = distance between the limit and max q, and bisection brackets it
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")
     width = positive(tolerance, "tolerance", "k_y/PGA")

@@ -1,6 +1,6 @@
 """Verdict on all blocks of an interval of k_r, by two trajectories that enclose theirs.
 
-With q = k_h/(1 + k_v) and D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0, the acceleration of the
+With q = k_h/(1 + k_v) and D = k_h sin(psi) + (1 + k_v) cos(psi) >= 0, the acceleration of the
 block grows with theta and falls with k_r. Hence a trajectory with the greater theta and theta' of
 two keeps them until the other impacts, and a smaller k_r only adds to its lead (order). An *upper*
 trajectory, with the smallest k_r and the earliest start, and a *lower* one, with the greatest k_r

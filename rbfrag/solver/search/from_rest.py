@@ -32,7 +32,7 @@ def linear_distance(excitation: BlockExcitation, start: Place, excursion: Excurs
     """
     time_s, interval_s, remaining = excitation.time_s, excitation.interval_s, excitation.remaining
     i, tau = excursion.place
-    phi = math.atan2(excursion.state.sin, excursion.state.cos)
+    psi = math.atan2(excursion.state.sin, excursion.state.cos)
     end_s = time_s[i]
     to_come = remaining[i]
     if tau > 0.0:
@@ -44,7 +44,7 @@ def linear_distance(excitation: BlockExcitation, start: Place, excursion: Excurs
     # a difference of states grows as exp(p t) in the linear model: seen from the start it is that
     # much smaller
     faded = math.exp(-excitation.p * (end_s - start_s))
-    distance: float = (excursion.state.rate + to_come - phi) * faded
+    distance: float = (excursion.state.rate + to_come - psi) * faded
     # the sign is that of the outcome, even where the estimate rounds to the other side
     if excursion.event == TOPPLED:
         return max(distance, 1e-300)
@@ -62,6 +62,7 @@ def follow(
         table: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
         work: counts what it costs.
     """
+    # invariant: the block rests at `place`; what it did before has no influence on what follows
     n = excitation.q.size
     # a block that is never lifted is as far from toppling as it is strong
     best = -kr

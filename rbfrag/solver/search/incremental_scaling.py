@@ -185,6 +185,8 @@ class ScaledKind(MechanismKind):
             InputError: a value outside its range, a block of another mode, or one that no
                 earthquake decides about.
         """
+        # k_s and p_s² do not fix the motion of these blocks, as k_r and p² do for toppling: the
+        # search is over the factor on the record for one block, not over the strength
         self.refuse_foreign(options, self.search_options)
         for name in ("block", "beta_deg", "phi_deg"):
             if options.get(name) is None:
@@ -432,6 +434,8 @@ def _result(
     limit: float,
     ended: str = "",
 ) -> ScaleSearch:
+    # `bracket` is (last safe scale, first scale that fails): the outcome need not be monotone in
+    # the scale, and a safe run above the second makes the set of failing scales reentrant
     runs = sorted(runs, key=lambda item: item.scale)
     warnings = list(start.warnings)
     if ended:
@@ -467,6 +471,8 @@ def _result(
 
 
 def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> CriticalScale:
+    # yield acceleration over the PGA of the scaled record falls as the scale rises: the scale that
+    # fails is the lower end of the bracket in k/PGA, the safe one its upper end
     k = None if search.scale is None else search.k_over_pga(search.scale)
     kr = None if k is None else k * search.pga_g
     critical = critical_rad(shaken)

@@ -46,6 +46,8 @@ def outcome_intervals(
         bottom: k_r down to which the map reaches, undecided where the search was given up
             above it; None for where the search ended.
     """
+    # a partition: `edges` has one element more than `outcomes`, and outcome i holds between edges
+    # i and i + 1. Above max q no block uplifts, and above K_up none topples: both are safe
     low = certified.low[::-1]
     high = certified.high[::-1]
     outcomes = [OUTCOMES.get(int(v), "undecided") for v in certified.verdict[::-1]]
@@ -95,6 +97,8 @@ def islands_of_map(
     Returns:
         What was read, and the number of blocks.
     """
+    # down through the map; island_top is the top of the toppling island being passed, gap_top that
+    # of the safe gap (None inside an island). Gaps up to the resolution are bridged for `resolved`
     work = no_work()
     width: float | None = None
     resolved: float | None = None

@@ -1,12 +1,12 @@
 """K_low: every block with a smaller k_r topples, whatever its earlier motion.
 
-With x = theta'/p + 2 sin(phi/2), the motion obeys ::
+With x = theta'/p + 2 sin(psi/2), the motion obeys ::
 
-    x' = -p cos(phi/2) x + p k_h cos(phi) - p k_v sin(phi)
+    x' = -p cos(psi/2) x + p k_h cos(psi) - p k_v sin(psi)
 
 so that x is bounded from below by the excitation alone, without regard to when a block began to
-rock. A block that leaves |phi| <= phi_m, tan(phi_m) the greatest of k_r and of what is to pull it
-back, has toppled; within, cos(phi), cos(phi/2) and sin(phi) have bounds. Since theta >= 0, no block
+rock. A block that leaves |psi| <= psi_m, tan(psi_m) the greatest of k_r and of what is to pull it
+back, has toppled; within, cos(psi), cos(psi/2) and sin(psi) have bounds. Since theta >= 0, no block
 that has not toppled falls back faster than theta'/p = x - 2 sin(theta_c/2). In a stretch of q > K a
 motion that starts from theta = 0 with that rate, and is carried on below 0 until it turns, bounds
 every block with k_r <= K from below from there on: those that impact meanwhile start again at once.
@@ -43,12 +43,12 @@ def least_rate(excitation: BlockExcitation, top: float, bound: FloatArray) -> No
     c_m = 1.0 / math.sqrt(1.0 + pull * pull)
     s_m = pull * c_m
     c_half = math.sqrt(0.5 * (1.0 + c_m))
-    # a block at rest has x > 0; at the slowest decay, cos(phi/2) = c_half, a bound below zero holds
+    # a block at rest has x > 0; at the slowest decay, cos(psi/2) = c_half, a bound below zero holds
     x = 0.0
     bound[0] = 0.0
     for i in range(excitation.interval_s.size):
         ph = excitation.p * excitation.interval_s[i]
-        # k_h cos(phi) at its least is concave in k_h: the trapezoid is below its integral
+        # k_h cos(psi) at its least is concave in k_h: the trapezoid is below its integral
         f0 = k_h[i] * (c_m if k_h[i] > 0.0 else 1.0) - abs(1.0 - w[i]) * s_m
         f1 = k_h[i + 1] * (c_m if k_h[i + 1] > 0.0 else 1.0) - abs(1.0 - w[i + 1]) * s_m
         gain = ph * (0.5 * (f0 + f1) - ph * max(abs(f0), abs(f1)))

@@ -124,6 +124,9 @@ def march(excitation: BlockExcitation, m: March, work: np.void) -> None:
         m: the march; its state and its intervals are filled.
         work: counts what it costs.
     """
+    # Invariant: every k_r from settings.top down to state["high"] has a verdict or is stored as
+    # undecided. The next interval is up to twice as wide after a verdict and half as wide without
+    # one: how wide an interval can be decided depends on the distance of its blocks from a border
     state, settings = m.state, m.settings
     begin_march(excitation, m, work)
     while (

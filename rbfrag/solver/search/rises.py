@@ -82,6 +82,8 @@ def common_start(
         earliest: start e of the weakest block.
         last_impact: by when all have closed their contact.
     """
+    # q is scanned at the nodes from e on: a quotient of straight lines, it is monotone between them
+
     # A holds if min(q, k2) does not decrease from the first start to the last. When a block k
     # starts in between, q >= k1 since e: the upper trajectory has been lifted, and bounds it.
     # And q >= k from there until the lower one starts: by then the block has been lifted itself

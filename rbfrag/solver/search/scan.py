@@ -65,6 +65,8 @@ def strongest_seen(
         high: their upper ends, shape (n,).
         toppling_kr: a k_r that topples; None for none.
     """
+    # invariant: kr is sorted, theta_n holds the normalised peaks of these blocks, and `best` is the
+    # strongest block seen to topple; only what lies above it is of interest from then on
     runs, gaps = 0, np.empty(0, dtype=np.int64)
     kr, theta_n = np.empty(0), np.empty(0)
     best = toppling_kr

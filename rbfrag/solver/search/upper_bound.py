@@ -70,6 +70,9 @@ def border_of_stretches(
     Returns:
         The least k_r known not to fail (`top` where all do), and whether any fails.
     """
+    # By the lemma "order" a block of larger k_r starts later in a stretch and accelerates less: its
+    # fresh excursion topples only if those of smaller k_r do, and there is one border
+
     # neither end has been looked at: the guess is near the root, its sides are found from there
     b = Border(bottom, top, True, math.inf, -math.inf, 0, 0, top - bottom)
     reach = 0.004
@@ -118,6 +121,10 @@ def upper_bound(
     """
     q = excitation.q
     n = q.size
+    # K_up is the largest k_r for which the fresh excursion of some stretch of q > k_r topples. By
+    # the lemma "lift" every start lies behind the fresh one of its stretch, so that no block above
+    # K_up topples. In the linear model K_up is the maximum of the remaining excitation
+
     # an excursion that topples at the top itself leaves no bound below it
     begin(table, top, margin, top, check, 0, n)
     failing = all_known(excitation, table)

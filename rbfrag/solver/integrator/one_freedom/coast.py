@@ -88,6 +88,8 @@ def coast(
         history: as for the phase.
         filled: columns of it that are filled.
     """
+    # D x'' = N k_h - M (1 + k_v) with constant D, N, M and k_h, k_v linear in time: over an
+    # interval U = h x' = u0 + u1 tau + u2 tau² and x = x0 + u0 tau + u1 tau²/2 + u2 tau³/3, exactly
     time_s, interval_s, k_h, w = record.time_s, record.interval_s, record.k_h, record.w
     tail_min_q, last = record.tail_min_q, record.last
     lowest, highest = rules.lowest, rules.highest

@@ -106,6 +106,9 @@ def cross_interval(
         history: as for the phase.
         filled: columns of it that are filled.
     """
+    # The Taylor series converges as fast as for a linear system of the local frequency parameter
+    # sqrt((N + M)/D): steps are even, and p·h with that p is at most `rules.turn_max`
+
     # an equation that is the same everywhere is solved exactly by one step, whatever its length
     order, parts = rules.order, 1
     if not rules.uniform:

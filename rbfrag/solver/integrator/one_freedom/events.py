@@ -50,6 +50,8 @@ def find_event(
         state: state at the start.
         x_end: position at the end of the whole step.
     """
+    # up to the first standstill x is monotone, so that x at its end shows whether a limit is met:
+    # the first event is that limit, if there is one, or else the standstill
     standstill = 0.0
     # a start that rounding turns into the other sense is none
     if u[leading] * state.sense > 0.0 or not rules.sticks:
@@ -119,6 +121,8 @@ def root_between(
         low: end where the sign is that of the function just after the start.
         high: end where the sign is the other, or the value zero.
     """
+    # invariant: the function has the sign `sign_low` just above `low`, and not at `high`
+
     # the sign at the low end is taken from the high one: at the low end the function may vanish
     sign_low = 1.0
     at_high = value_of(u, order, quantity, target, high)

@@ -153,6 +153,9 @@ def follow(
         InputError: a block so small that the run would not end in reasonable time.
     """
     _refuse_endless(mechanism, excitation, turn_max)
+    # A run is a chain of phases. Each is one initial value problem of one coordinate x, from
+    # `entry` (position, rate and their error bounds at a time of the record) to the event that ends
+    # it; its end is the entry of the next phase, error bounds included
     record = excitation.nodes
     phase, entry = mechanism.first, FROM_REST._replace(x=start[0], error_x=start[1])
     changes: list[Change] = []

@@ -75,6 +75,10 @@ def run_phase(
         work: work arrays of the kernels.
         history: shape (4, m), for time, x, x' and node (-1 between nodes); (4, 0) for none.
     """
+    # Invariant of the loop: `state` holds at the fraction tau of interval `node`, or free_s seconds
+    # after the record. A block at rest departs where the acceleration of one of the two equations
+    # has that equation's sense; friction opposes the motion, so that each sense has its own
+    # coefficients D, N, M and Q
     fill_uniform_conditions(rules, work)
     node, tau, free_s = entry.place.interval, entry.place.fraction, entry.free_s
     state = state_on_entry(rules, entry)

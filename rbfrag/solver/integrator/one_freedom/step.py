@@ -123,6 +123,10 @@ def fill_step(
         state: state of the block at the start.
         step: length and accelerations.
     """
+    # Coefficients of tau^k of D U' = h² (N a - M w) - Q U², with a = a0 + da tau, w = w0 + dw tau:
+    #     sum_j D_j (k-j+1) U_(k-j+1) = h² (a0 N_k + da N_(k-1) - w0 M_k - dw M_(k-1))
+    #                                   - sum_j Q_j (U²)_(k-j)
+    # which is solved for U_(k+1), the only unknown in it
     h, a0, da, w0, dw = step
     u = series[0]
     u[0] = h * state.rate
@@ -168,7 +172,7 @@ def fill_step(
             turn_c2 += uj * s2[k - j]
             turn_s2 += uj * c2[k - j]
         squared[k] = square
-        # what is known of (D U')_k: the driving terms less Q U² less the D_j U'_(k-j) with j > 0
+        # explicit part of (D U')_k: the driving terms less Q U² and the D_j U'_(k-j) with j > 0
         explicit = hh * (a0 * n + da * n_before - w0 * m - dw * m_before)
         n_before = n
         m_before = m
@@ -264,6 +268,8 @@ def error_growth(
         tau: fraction of the step that is taken.
         x: position that it leads to.
     """
+    # with e = (error of x, error of x'): e' = (e_2, by_x e_1 + by_rate e_2), by_x = d(x'')/dx and
+    # by_rate = d(x'')/d(x') in absolute value at the start of the step
     by_x, by_rate, left_out = 0.0, 0.0, 0.0
     if not rules.uniform:
         left_out = truncation(u, order, frequency, state.rate, step.h)

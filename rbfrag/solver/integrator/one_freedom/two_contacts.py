@@ -68,6 +68,8 @@ def two_contact_equation(
     """
     g = STANDARD_GRAVITY_M_S2
     sense = -1.0 if clockwise else 1.0
+    # A = -s M_b, B = s M_a, F = A u_a + B u_b, and the equation D θ'' of the module's docstring:
+    # inertia is D, driving and resistance are its terms in k_h and -(1 + k_v), braking that in -θ'²
     # friction is mobilised in full: the directions of the contact forces do not change
     u_a, u_b = constant_vector(base.direction), constant_vector(back.direction)
     a = back.arm.cross(u_b) * -sense
