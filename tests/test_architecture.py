@@ -309,9 +309,12 @@ def test_no_folder_holds_more_than_a_page_of_files() -> None:
 def test_functions_of_the_solver_can_be_read_at_a_glance() -> None:
     large = set()
     for path in (PACKAGE / "solver").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        # a comment makes a function no longer: kernels state their equations and invariants
+        comments = {n for n, line in enumerate(text.split("\n"), 1) if re.match(r" *#", line)}
+        for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef):
-                lines = (node.end_lineno or 0) - node.lineno + 1
+                lines = len(set(range(node.lineno, (node.end_lineno or 0) + 1)) - comments)
                 given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 if lines > MOST_LINES or len(given) > MOST_PARAMETERS:
                     large.add(node.name)
