@@ -306,7 +306,7 @@ def _at(planes: Planes[Any], rows: NDArray[np.intp]) -> Planes[Any]:
         name: value[rows] for name, value in values.items() if isinstance(value, np.ndarray)
     }
     if planes.water is not None:
-        parts["water"] = Water(*(values[rows] for values in vars(planes.water).values()))
+        parts["water"] = Water(*(part[rows] for part in vars(planes.water).values()))
     return replace(planes, **parts)
 
 
