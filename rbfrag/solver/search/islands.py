@@ -73,9 +73,7 @@ def outcome_intervals(
     return OutcomeIntervals(
         k_lo=ratio[:-1][wide],
         k_hi=ratio[1:][wide],
-        outcome=tuple(
-            outcome for outcome, is_wide in zip(kept_outcomes, wide, strict=True) if is_wide
-        ),  # type: ignore[misc]
+        outcome=tuple(name for name, is_wide in zip(kept_outcomes, wide, strict=True) if is_wide),  # type: ignore[misc]
     )
 
 
