@@ -9,7 +9,7 @@ import { afterPause, latest } from "./latest.js";
 import { addressOf, fromAddress, showAddress } from "./link.js";
 import { offerModelsOf } from "./models.js";
 import { forField, fromField } from "./numbers.js";
-import { byId } from "./page.js";
+import { byId, labelled } from "./page.js";
 import { USUAL_PHI } from "./question.js";
 import { recordPanel } from "./record_panel.js";
 import * as service from "./service.js";
