@@ -177,7 +177,7 @@ def draw_curve(
         outside = "outside the fitted range"
         axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
     fitted = np.where(known, answer.probability, np.nan)
-    axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: share over all earthquakes and sites")
+    axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: fraction over all earthquakes and sites")
     for i, (name, other) in enumerate((compared or {}).items()):
         colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
         axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, _LETTERS))

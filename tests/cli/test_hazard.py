@@ -278,7 +278,7 @@ def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
 
 def test_plot(shell: Shell, curve: Path) -> None:
     shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--plot", "rate.svg")
-    assert "share of the rate" in Path("rate.svg").read_text()
+    assert "fraction of the rate" in Path("rate.svg").read_text()
 
 
 @pytest.mark.parametrize(
