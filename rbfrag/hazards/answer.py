@@ -216,8 +216,12 @@ def hazard_at_sites(
     branch_weight[0] = 1.0
     if weight is not None:
         branch_weight = np.nan_to_num(weight)
+    # Rate density of the intensity measure on a grid in ln im, per site and branch: -dν, smoothed
+    # by the scatter between the curve's definition and the model's.
     mass = curve_mass(list(zip(*sites, strict=True)), branch_weight, reading)
 
+    # λ = Σ P(u_i) (-dν(u_i)), for all blocks of one model at once; uncertain blocks are averaged
+    # over the quadrature points of their own parameters.
     blocks: list[tuple[Indices, KernelBlocks]] = []
     for part in parts:
         places = where[part.places]
@@ -229,6 +233,8 @@ def hazard_at_sites(
     if one_class:
         result, where = _of_class(result, total), np.zeros(1, dtype=np.intp)
         number = np.ones(1)
+    # Rates of single blocks do not add up to the rate of any failure: blocks of a site share the
+    # earthquake.
     joints: tuple[JointRate | None, ...] = (None,) * len(sites)
     of_joints: tuple[str, ...] = ()
     if (joint or at_least is not None) and not one_class:

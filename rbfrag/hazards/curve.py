@@ -187,6 +187,8 @@ def hazard_curve(
         )
     _refuse_disorder(x, rate, measure, source)
     warnings: list[Diagnostic] = []
+    # A rate of exceedance never rises with the level. Levels of infinite rate carry no information,
+    # and from the first zero on the curve has ended: its end enters the interval of the rate.
     endless = np.isinf(rate)
     if endless.any():
         warnings.append(

@@ -280,6 +280,8 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     Raises:
         InputError: a header or a row that does not say what it should, with its line.
     """
+    # The engine gives probabilities of exceedance in the investigation time; for a Poisson process
+    # λ = -ln(1 - poe)/time.
     rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
     if len(rows) > 1:
@@ -415,6 +417,7 @@ def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardC
     ]
     if not rows:
         raise InputError(f"{source}: there is no curve: {HEADER_HELP}")
+    # Semicolons separate cells where commas are decimal signs.
     if ";" in rows[0][1][0]:
         rows = [
             (number, [cell.strip().replace(",", ".") for cell in ",".join(row).split(";")])
@@ -451,6 +454,7 @@ def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardC
                     "above zero"
                 )
             values[-1] = 1.0 / values[-1]
+    # A table by rising return period has falling rates, one by rising rate is reversed.
     if len(levels) > 1 and all(high > low for high, low in pairwise(levels)):
         levels, values = levels[::-1], values[::-1]
     rates = np.array(values)

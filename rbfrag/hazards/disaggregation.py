@@ -89,6 +89,8 @@ class Disaggregation:
             of = sums.setdefault(level, {})
             of[magnitude] = of.get(magnitude, 0.0) - math.log1p(-poe)
             whole[level] = whole.get(level, 0.0) + poe
+        # Contributions of magnitude bins are independent: their exceedance rates -ln(1 - poe) add
+        # up, the probabilities do not. Only fractions of the level's rate are kept.
         levels = sorted(x for x, own in sums.items() if x > 0.0 and any(own.values()))
         if not levels:
             raise InputError(f"{path}: it has no disaggregation of PGA")
@@ -142,6 +144,8 @@ class Disaggregation:
         name = meaning.get("component")
         component = component_of(curve, name) or component_named(SINGLE_COMPONENT)
         shaking = LevelShaking.about("pgv_m_s", component_of_velocity(component))
+        # The rate of PGA above u from magnitude M is λ(u) s_M(u). What it loses between two nodes
+        # is mass at that PGA and M, moved to the PGV that both predict.
         end = curve.levels[-1] if curve.end_level is None else curve.end_level
         grid = Grid.over(STEP, float(np.log(curve.levels[0])), float(np.log(end)))
         above = np.append(under([curve], grid)[0][::-1].cumsum()[::-1], 0.0)

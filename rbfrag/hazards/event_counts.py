@@ -183,6 +183,8 @@ def count_years(common: EventYears, some: SomeYears) -> PartCounts:
 
 def count_part(part: EventYears) -> PartCounts:
     """Return what fails in the events of a part."""
+    # Expected failures and losses are sums of P and need no sampling. Counts of one event need the
+    # joint distribution: they are sampled with the dependence model of each site.
     events, portfolio = part.events, part.portfolio
     n, laws = events.event_id.size, len(laws_of(portfolio))
     cost, number = portfolio.mean_loss, portfolio.count
@@ -209,6 +211,7 @@ def count_part(part: EventYears) -> PartCounts:
                     kept.clear()
                 kept[key] = _sampler(portfolio, own)
             drawn[:, event], with_any[:, event] = _sampled(part, event, shaken, kept[key])
+    # Variance of the loss within an event, over its samples.
     variance = np.full((laws, n), np.nan)
     if part.samples > 1:
         variance = drawn[:laws, :, 1].var(axis=-1, ddof=1)
@@ -235,6 +238,8 @@ def _bounds(p: FloatArray, count: IntArray) -> tuple[float, float]:
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     """Yield each event that may fail a block, with those blocks."""
+    # P of each pair of event and block, averaged over the component's scatter; pairs below NOTHING
+    # are dropped.
     events, portfolio = part.events, part.portfolio
     z, weight = portfolio.scatter_points()
     parts: list[tuple[NDArray[np.generic], ...]] = []
@@ -279,6 +284,8 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     block, row, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((block, events.event[row]))
     block, row, p, outside, square, *more = (each[order] for each in (block, row, *columns))
+    # Parameter errors enter as shifts of the score Φ⁻¹(P), which keep the order of blocks in a
+    # sample: all shifted portfolios use the same draws.
     p = np.minimum(p, 1.0)
     shift = np.stack([np.zeros(p.size), *more])
     if not one_measure:
@@ -409,6 +416,7 @@ def _failing(
         sides: Z on the sides that blocks may face, each as likely, sides x draws x m.
         alone: each of like blocks has a Z of its own.
     """
+    # A block fails where its latent normal Z lies below its bound Φ⁻¹(P) plus the shift.
     own, (number, draws, _) = shaken.block, sides.shape
     count, weight, shift = portfolio.count[own], portfolio.weight[own], shaken.shift
     most = shift.max(axis=0)
@@ -435,6 +443,8 @@ def _failing(
     row, at_once = np.nonzero(excess <= shift[:, block])
     failing, cost = weight[block] * many, _costs(portfolio, own[block], many, seed)
     of_rows = [(row, *(each[at_once] for each in (sample, failing, cost)))]
+    # Identical blocks of a row are not followed one by one: given Z of a side, their number of
+    # failures is binomial.
     scattered = like[chance]
     for i, by in enumerate(shift if scattered.size else ()):
         z = sides[..., scattered]

@@ -58,6 +58,8 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     Args:
         level: confidence level of the intervals.
     """
+    # With one intensity measure P of a block is a function of u = ln im alone. Its table over u is
+    # made once per site, and each earthquake only interpolates sums over the blocks.
     (name,) = portfolio.measures
     shaking = LevelShaking.about(name, portfolio.component)
     sites, site = np.unique(portfolio.site, return_inverse=True)
@@ -95,6 +97,8 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
             ):  # fmt: skip
                 np.add.at(tables[part], here, values * factor[places, None])
             np.maximum.at(tables[3], here, p * counted[places, None])
+        # Rates of any failure have two bounds: full dependence, max P, and independence, 1 - Π(1 -
+        # P).
         with np.errstate(divide="ignore"):
             logs = np.log(tables)
         rows = order[starts[first] : starts[last]]

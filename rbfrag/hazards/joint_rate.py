@@ -190,6 +190,8 @@ def joint_at_sites(
     Raises:
         InputError: a number of failures that the blocks of no site reach.
     """
+    # At least k failures in one earthquake: λ_k = Σ P(N >= k | u) (-dν(u)), N by the dependence
+    # model that is stored with the fragility model.
     sites = mass.mass.shape[0]
     number = np.zeros(sites, dtype=np.intp)
     for places, blocks, _ in each:
@@ -253,6 +255,8 @@ def _of_site(
     known: bool,
 ) -> JointRate:
     model, blocks = here[0][0].model, [some for some, _ in here]
+    # The interval is that of the direction in parameter space along which the sum of the rates
+    # changes most: one step down and one up, applied to all blocks together.
     steps: list[FloatArray | float] = [0.0]
     law = model.dependence if known else None
     if law is not None:

@@ -81,6 +81,8 @@ class KernelBlocks:
         own = block.filled(medians)
         # what a block has of itself goes with what it may be, unless that has a scatter of its own
         medians |= {name: own[name] for name in sigmas if name in own}
+        # Uncertain blocks are averaged over a product grid of normal steps, one axis for each
+        # parameter with a standard deviation; certain blocks need one point.
         uncertain = np.zeros(site.size, dtype=np.bool_)
         for sigma in sigmas.values():
             uncertain |= sigma > 0.0

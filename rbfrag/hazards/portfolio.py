@@ -91,6 +91,8 @@ class Portfolio:
         def numbers(name: str, missing: float) -> FloatArray:
             return np.asarray(np.nan_to_num(columns.get(name, np.full(n, missing)), nan=missing))
 
+        # Rows are sorted by site, since everything downstream works site by site; `row` restores
+        # the order of the table.
         sites = _site_indices(columns, site_ids)
         kinds = columns["kind"].tolist()
         chosen = {one: models[one] for one in dict.fromkeys(kinds)}

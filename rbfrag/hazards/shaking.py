@@ -111,6 +111,8 @@ def _measure(
     curve: HazardCurve, convert: str | None, sigma: float | None, warnings: list[str]
 ) -> tuple[str, float, float]:
     """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
+    # A curve of SA can serve models of PGV by a published conversion PGV = factor · SA(T), whose
+    # scatter is integrated like that of the component.
     if convert is None:
         if sigma is not None:
             both = ("convert_sigma", "convert")

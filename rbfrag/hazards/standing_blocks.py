@@ -156,6 +156,8 @@ class ModelBlocks:
                 raise InputError(f"{sigma} requires {of}: give its mean")
         if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
+        # All blocks that survive together must be of one model: their parameters are shared by all
+        # earthquakes of their age.
         parts, remarks, reason = parts_by_model(stated, shaking, answering)
         refuse_elements(reason, ALL_STAND, BLOCK)
         if len(parts) > 1:
@@ -174,6 +176,8 @@ class ModelBlocks:
         numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
         medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
         scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}
+        # A block's own parameters are the same in all earthquakes, so survival is averaged over
+        # them after the Poisson term: E[exp(-λ T)], not exp(-E[λ] T).
         z, weight = _standard_draws(
             [values.get(sigma, np.zeros(size)) for sigma in scatters.values()], draws, seed
         )

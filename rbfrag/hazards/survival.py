@@ -311,6 +311,7 @@ def survival(
         numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
     each, weight = branch_curves(curves, weights, meaning)
+    # ln S is computed, since S itself underflows for hazards that blocks clearly contradict.
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     blocks: StandingBlocks

@@ -209,6 +209,8 @@ def map_failures(
     Raises:
         InputError: a number of draws, a seed or a share that makes no sense.
     """
+    # Joint failures on a map: residuals of the shaking are drawn as a spatially correlated field
+    # plus a between-event term, then blocks by the dependence model at their site.
     columns = answer.shaking.model.method.block.filled(numbers)
     weights = np.ones(next(iter(columns.values())).size) if weight is None else weight
     each = answer.each * weights[answer.block]

@@ -113,6 +113,8 @@ def site_probability(
         """Return block and shaking of pairs of site and block."""
         return {**{name: values[block] for name, values in columns.items()}, **shaking.given(site)}
 
+    # P = E[P(block | im)] over ln im ~ N(median, σ). Most pairs are clear: where even the median
+    # fails with certainty or a strong deviation with no probability, fewer points suffice.
     in_domain = np.empty(n, dtype=bool)
     pairs: dict[float, list[Indices]] = {}
     for sites in _chunks(np.arange(n), _CHUNK // blocks):
