@@ -27,7 +27,7 @@ from rbfrag.motions.polarity import FloatArray, Polarity, driving_acceleration_g
 from rbfrag.motions.quality import motion_warnings
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.results.numbers import rounded
+from rbfrag.results.numbers import exact_percent, rounded
 from rbfrag.results.result import Result, TextLine, TextTable
 
 SERIES_BELOW = 0.5
@@ -42,6 +42,9 @@ _SERIES = np.array(
 )
 
 _LARGEST = 1e300
+
+PRECISION = 0.02
+"""No block whose toppling velocity is above X(p) by more than this fraction topples."""
 
 
 @overload
@@ -228,6 +231,7 @@ class TopplingSpectrum(Result):
         p2: frequency parameters [1/s²].
         x_m_s: toppling velocities X(p) [m/s].
         warnings: notes on the motion.
+        kr: k_r of a block that is compared with the spectrum at the only p²; None for no block.
     """
 
     motion: str
@@ -237,15 +241,32 @@ class TopplingSpectrum(Result):
     p2: list[float]
     x_m_s: list[float]
     warnings: list[str]
+    kr: float | None = None
 
     @classmethod
     def of(
-        cls, motion: str, ground: GroundMotion, p2: Sequence[float], polarity: Polarity
+        cls,
+        motion: str,
+        ground: GroundMotion,
+        p2: Sequence[float],
+        polarity: Polarity,
+        kr: float | None = None,
     ) -> TopplingSpectrum:
-        """Return the spectrum of a motion that the caller names `motion`."""
+        """Return the spectrum of a motion that the caller names `motion`.
+
+        Raises:
+            InputError: a block with several p².
+        """
+        if kr is not None and len(p2) > 1:
+            raise InputError("kr requires a single p2", fields=("kr", "p2"))
         x_m_s = toppling_spectrum(ground, p2, polarity).tolist()
         warnings: list[str] = [*motion_warnings(ground)]
-        return cls(motion, ground.label, polarity, ground.pgv_m_s, list(p2), x_m_s, warnings)
+        return cls(motion, ground.label, polarity, ground.pgv_m_s, list(p2), x_m_s, warnings, kr)
+
+    @property
+    def may_topple(self) -> bool | None:
+        """False where the spectrum excludes that the block topples; None without a block."""
+        return None if self.kr is None else self.kr <= (1.0 + PRECISION) * self.critical_kr[0]
 
     @property
     def critical_kr(self) -> list[float]:
@@ -254,11 +275,19 @@ class TopplingSpectrum(Result):
         return [x * p2**0.5 / STANDARD_GRAVITY_M_S2 for p2, x in pairs]
 
     def sentences(self) -> Iterator[str]:
-        """Yield the k_r that topples, from the first size to the last."""
+        """Yield whether the block topples, or the k_r that topples from first to last size."""
+        if self.kr is not None:
+            verb = "may topple" if self.may_topple else "does not topple"
+            yield (
+                f"The block (k_r = {rounded(self.kr)}) {verb}: the critical value at p² = "
+                f"{self.p2[0]:.3g} s⁻² is k_r = {rounded(self.critical_kr[0])}, to "
+                f"{exact_percent(PRECISION)}"
+            )
+            return
         pairs = zip(self.critical_kr, self.p2, strict=True)
         sizes = [f"{rounded(kr)} at p² = {p2:g} s⁻²" for kr, p2 in pairs]
         ends = sizes[0] if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
-        yield f"Critical k_r, to 2 %: {ends}"
+        yield f"Critical k_r, to {exact_percent(PRECISION)}: {ends}"
 
     def lines(self) -> Iterator[TextLine]:
         """Yield the motion."""
@@ -284,4 +313,4 @@ class TopplingSpectrum(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
-        return dict(vars(self))
+        return {**vars(self), "may_topple": self.may_topple}

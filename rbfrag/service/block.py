@@ -55,11 +55,12 @@ def add_routes(routes: APIRouter) -> None:
         from rbfrag.plots.blocks.block import block_lines
         from rbfrag.solver.stability.single import rectangle_r3_m
 
-        body, result, kind, numbers = _drawn(query.given())
+        body, result, kind, numbers, reason = _drawn(query.given())
         lines = block_lines(body, result)
         return {
             "kind": kind,
             "numbers": numbers,
+            "reason": reason,
             "block": result.document(text=True),
             "rectangle_r3_m": rectangle_r3_m(body.p2),
             "outline_m": lines.outline,
@@ -72,8 +73,8 @@ def add_routes(routes: APIRouter) -> None:
 
 def _drawn(
     given: Mapping[str, Any],
-) -> tuple[Block, Stability, str, Mapping[str, float] | None]:
-    """Return a block, how it stands, the kind of its failure and what a prediction reads of it."""
+) -> tuple[Block, Stability, str, Mapping[str, float] | None, str]:
+    """Return a block, its stability, kind and model inputs, or why no model answers."""
     from rbfrag.question.blocks import one_block, shape_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
     from rbfrag.solver.stability.single import level_rectangle, stability
@@ -93,16 +94,16 @@ def _drawn(
                 fields=(others[0],),
             )
         body, result = level_rectangle(**numbers)
-        return body, result, kind_of(result), numbers
+        return body, result, kind_of(result), numbers, ""
     result = stability(shape.block, **shape.rough())
     kind = kind_of(result)
     slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
     try:
         (group,) = one_block({**given, **slides}, kind).groups
-    except InputError:  # no earthquake decides about it, or no model answers
-        return shape.block, result, kind, None
+    except InputError as error:  # no earthquake decides about it, or no model answers
+        return shape.block, result, kind, None, "" if result.state == "unstable" else str(error)
     read = {name: value for name, value in group.numbers.items() if name not in slides}
-    return shape.block, result, kind, read
+    return shape.block, result, kind, read, ""
 
 
 def require(numbers: Collection[str], *names: str) -> None:

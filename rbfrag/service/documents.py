@@ -211,12 +211,13 @@ class DrawingAnswer(_Document):
     """A block to scale; points are (out of the slope, up) from the centroid [m].
 
     `kind` is how it fails, `numbers` what predictions of that kind read of it, null where no
-    earthquake decides about it or no model answers. A rectangle whose friction is not known is
-    taken to be rough: its `ky` means nothing.
+    earthquake decides about it or no model answers; `reason` says which. A rectangle whose
+    friction is unknown is assumed to be rough: its `ky` means nothing.
     """
 
     kind: str
     numbers: dict[str, float] | None
+    reason: str
     block: BlockAnswer
     rectangle_r3_m: float
     outline_m: list[Pair]
@@ -256,6 +257,8 @@ class Health(_Document):
 @keys_of(TopplingSpectrum)
 class SpectrumAnswer(_Answer):
     """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum` prints as JSON."""
+
+    may_topple: bool | None
 
 
 class MapRow(_Document):

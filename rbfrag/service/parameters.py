@@ -159,7 +159,7 @@ class PredictQuery(Answered):
 
 
 @asking(*SHAKING, *REQUEST, "kind")
-class TableQuery(Parameters):
+class TableQuery(Answered):
     """Parameters of `/v1/table`: kind of rows that name none, and shaking if no column has any."""
 
     form: Literal["csv", "xlsx"] = "csv"
@@ -180,8 +180,12 @@ class PredictRows(Answered):
 
 
 class Reading(Parameters):
-    """How an accelerogram is read that does not say it itself."""
+    """How an accelerogram is read that does not say it itself, and how it is shown."""
 
+    name: Text = "upload"
+    """Name of the record in the answer."""
+    text: bool = False
+    """With the sentences and the labelled lines of the answer under ``text``."""
     trace: Annotated[int, Field(ge=0)] | None = None
     """Number of the trace in the file, from 0; where there are several."""
     units: Literal["g", "m/s2", "cm/s2", "mm/s2"] | None = None
@@ -205,6 +209,8 @@ class SpectrumQuery(Reading):
     """Frequency parameters p² [1/s²], separated by commas."""
     polarity: Literal["forward", "reverse", "both"] = "forward"
     """forward: positive samples drive forward; reverse: negative ones; both."""
+    kr: Positive | None = None
+    """Uplift acceleration coefficient k_r of a block to compare, with one p2."""
 
     def sizes(self) -> list[float]:
         """Return the values of p² [1/s²]."""
@@ -214,7 +220,7 @@ class SpectrumQuery(Reading):
         return sizes
 
 
-@asking("p2", *_SHAPE, examples={"p2": 3.0})
+@asking("p2", "kr", *_SHAPE, examples={"p2": 3.0})
 class CriticalQuery(Reading):
     """Parameters of `/v1/critical`."""
 

@@ -118,7 +118,7 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
             )
         answers = target.read_text(encoding="utf-8-sig")
         answers += notes_below(answer.warnings, dialect_of(target).delimiter)
-    return json_text({**answer.as_dict(), "table": answers})
+    return json_text({**answer.document(text=query.text), "table": answers})
 
 
 def notes_below(warnings: Sequence[str], delimiter: str) -> str:

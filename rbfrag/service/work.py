@@ -38,6 +38,7 @@ from rbfrag.service.request_records import log_as_json
 if TYPE_CHECKING:
     from rbfrag.hazards.curve import CurveKeywords
     from rbfrag.motions.ground_motion import GroundMotion
+    from rbfrag.motions.polarity import Polarity
     from rbfrag.question.fields import AnsweringFields
 
 FILE = "the file"
@@ -96,7 +97,9 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 
     ground = _motion(body, query)
     answers = [
-        TopplingSpectrum.of(ground.label, ground, query.sizes(), polarity).as_dict()
+        TopplingSpectrum.of(ground.label, ground, query.sizes(), polarity, query.kr).document(
+            text=query.text
+        )
         for polarity in POLARITIES
         if query.polarity in (polarity, "both")
     ]
@@ -107,6 +110,7 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical` prints as JSON."""
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.question.blocks import has_shape, one_block
+    from rbfrag.solver.respond import respond
     from rbfrag.solver.search.critical import critical as search
 
     numbers = query.given()
@@ -114,13 +118,13 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
         (group,) = one_block(numbers, TOPPLING_BLOCK.kind).groups
         numbers = {**group.numbers}
     require(numbers, "p2")
-    result = search(
-        _motion(body, query),
-        p2=numbers["p2"],
-        polarity="reverse" if query.reverse else "forward",
-        full_map=query.map,
-    )
-    return json_text(replace(result, with_map=query.map).as_dict())
+    ground, kr = _motion(body, query), numbers.get("kr")
+    polarity: Polarity = "reverse" if query.reverse else "forward"
+    result = search(ground, p2=numbers["p2"], polarity=polarity, full_map=query.map)
+    if kr is not None:
+        response = respond(ground, p2=numbers["p2"], kr=kr, polarity=polarity)
+        result = replace(result, block_kr=kr, block_outcome=response.outcome)
+    return json_text(replace(result, with_map=query.map).document(text=query.text))
 
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
@@ -162,7 +166,7 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
 
     trace = query.trace
     try:
-        traces = motions_in(body, "upload", units=query.units, dt_s=query.dt, gain=query.gain)
+        traces = motions_in(body, query.name, units=query.units, dt_s=query.dt, gain=query.gain)
     except MotionFileError as error:
         where = FILE if error.line is None else f"{FILE}, line {error.line}"
         raise InputError(f"{where}: {error.reason}") from None

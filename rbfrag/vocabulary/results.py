@@ -160,6 +160,7 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("k_lo", "Lower end of an interval of k_r/PGA"),
         ("k_hi", "Upper end of an interval of k_r/PGA"),
         ("x_m_s", "Toppling spectrum", "m/s", "X(p)"),
+        ("may_topple", "False if the spectrum excludes that the block topples; null without one"),
     ),
     "Records": (
         ("id", "Row number in the database"),

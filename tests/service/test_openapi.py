@@ -52,7 +52,7 @@ def test_every_operation_documents_its_errors(client):
                 assert schema["schema"]["required"] == ["type", "title", "status", "detail"]
 
 
-NO_UNIT = {"form", "sheet", "ignore_columns", "drainage",
+NO_UNIT = {"form", "sheet", "ignore_columns", "drainage", "name",
     "amplification", "amplification_sigma", "back", "base", "face", "mechanism", "pga_sigma",
     "pgv_sigma", "pgv_tau",
     "sa03_sigma", "sa10_sigma", "sa30_sigma",

@@ -25,6 +25,7 @@ def spectrum(
     motions: options.Motions,
     reading: options.ReadingOptions,
     p2: str = option("Frequency parameters p² [1/s²], separated by commas", "30,10,3,1,0.3,0.1"),
+    kr: float | None = option("Block to compare: uplift acceleration coefficient k_r, with one p²"),
     polarity: options.Polarity = "forward",
     csv: str | None = option("Output table of the spectra (.csv, .xlsx, .parquet)"),
     excel_text: bool = option(options.EXCEL_TEXT, False),
@@ -43,7 +44,7 @@ def spectrum(
     check_files(table=csv, plot=plot, excel_text=excel_text)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
     spectra = [
-        TopplingSpectrum.of(text, ground, sizes, way)
+        TopplingSpectrum.of(text, ground, sizes, way, kr)
         for text, ground in zip(motions, records, strict=True)
         for way in polarities
     ]

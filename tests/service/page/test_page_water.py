@@ -37,7 +37,7 @@ def test_a_pasted_table_has_both_bounds(open_page):
     rows += "R8\t2.2\t0.55\t5\t36\t0.6\t26.5\n"
     page.fill("#table-text", rows)
     page.click("#table-ask")
-    expect(page.locator("#table-said")).to_have_text("1 of 1 blocks are answered.")
+    expect(page.locator("#table-said")).to_have_text("The block is answered.")
     expect(page.locator("#table-notes")).to_contain_text("water pressure keeps acting")
     with page.expect_download() as waited:
         page.click("#table-file")

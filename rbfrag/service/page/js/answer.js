@@ -10,6 +10,8 @@ import { labelOfTerm } from "./vocabulary.js";
 
 const SPOKEN_AFTER_MS = 700;
 
+/** @typedef {[string, string][]} Texts headlines of answers, each with all else that they say */
+
 const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
   byId("live").textContent = text;
 });
@@ -28,7 +30,7 @@ export function showAnswer(answer) {
   writeText(byId("sentence"), unbroken([...texts, ...rest].join(" ")));
   showLines(lines);
   byId("lines").dataset.inside = String(answer.in_domain);
-  byId("about").textContent = "";
+  showSensitivity(0);
   drawMeter(answer);
   const shown = (/** @type {any} */ { text }) => !sentences[0].includes(text);
   showWarnings(byId("warnings"), labelled(answer.diagnostics.filter(shown)));
@@ -63,22 +65,47 @@ function unbroken(text) {
 }
 
 /**
- * Say something more of the model that has answered.
- * @param {string} sentence
+ * Show the fraction of simulated outcomes behind the answer that are sensitive.
+ * @param {number} fraction 0 for none
  */
-export function sayOfModel(sentence) {
-  const about = byId("about");
-  if (!about.textContent?.includes(sentence)) about.append(sentence);
+export function showSensitivity(fraction) {
+  byId("about").hidden = !fraction;
+  byId("sensitive-fraction").textContent = percent(fraction);
 }
 
-/** Put the answer of the reader's own record before that of the measures.
- * @param {{name: string, answer: string, words: string} | null} verdict */
-export function showByRecord(verdict) {
-  byId("by-record").hidden = !verdict;
-  byId("by-record-title").textContent = verdict ? `Does ${verdict.name} topple it?` : "";
-  byId("by-record-answer").textContent = verdict?.answer ?? "";
-  writeText(byId("by-record-words"), verdict?.words ?? "");
-  byId("strip").dataset.record = verdict ? `record: ${verdict.answer.toLowerCase()} · ` : "";
+/**
+ * Headline of an answer, and all else that it says.
+ * @param {any} answer with its text
+ * @returns {[string, string]}
+ */
+export function spoken({ text: { sentences, lines } }) {
+  const [headline, ...others] = sentences;
+  return [headline, [...others, ...lines.map((/** @type {any} */ { text }) => text)].join(". ")];
+}
+
+/**
+ * Show answers as paragraphs.
+ * @param {HTMLElement} place
+ * @param {Texts} texts
+ */
+export function showTexts(place, texts) {
+  place.replaceChildren(
+    ...texts.map(([headline, rest]) => {
+      const [line, strong, other] = ["p", "strong", "span"].map((n) => document.createElement(n));
+      writeText(strong, headline);
+      writeText(other, rest);
+      line.append(strong, ". ", other);
+      return line;
+    }),
+  );
+}
+
+/** Put the answers of the reader's own record before that of the measures.
+ * @type {(name: string, texts: Texts) => void} */
+export function showByRecord(name, texts) {
+  byId("by-record").hidden = !texts.length;
+  byId("by-record-name").textContent = name;
+  showTexts(byId("by-record-texts"), texts);
 }
 
 /**
@@ -89,7 +116,7 @@ export function showByRecord(verdict) {
 export function showNoAnswer(why, warnings = []) {
   byId("probability").textContent = "\u2013";
   byId("sentence").textContent = why;
-  byId("about").textContent = "";
+  showSensitivity(0);
   showLines([]);
   d3.select("#meter").selectAll("*").remove();
   showWarnings(byId("warnings"), warnings);

@@ -6,6 +6,7 @@ import { byId } from "./page.js";
 import { sheetIn } from "./sheet.js";
 import { writeText } from "./subscripts.js";
 
+const NAME = "The block on its planes";
 const MARGINS = { left: 8, right: 8, top: 14, bottom: 30 };
 
 /**
@@ -17,16 +18,6 @@ function inWords(block) {
 }
 
 /**
- * Why a block has no probability; empty where it has one.
- * @param {any} found answer of /v1/drawing
- */
-export function whyNoAnswer({ block, numbers }) {
-  if (numbers || block.state === "unstable") return "";
-  const words = inWords(block);
-  return block.state === "stable" ? `${words}. No fragility model answers for it.` : words;
-}
-
-/**
  * Put the drawing of a block into an element.
  * @param {HTMLElement} place
  */
@@ -35,7 +26,7 @@ export function blockDrawing(place) {
   let lines = null;
   const sheet = sheetIn(
     place,
-    "The block on its planes",
+    NAME,
     MARGINS,
     (w) => Math.min(0.95 * w, 300),
     draw,
@@ -104,9 +95,11 @@ export function blockDrawing(place) {
     show(drawing, { shape }) {
       lines = drawing;
       draw();
-      const words = shape === "numbers" ? rectangle(drawing.block) : inWords(drawing.block);
-      svg.attr("aria-label", `The block on its planes. ${words.replaceAll("_", "")}`);
-      writeText(byId("block-words"), words);
+      const isUnknown = shape === "numbers";
+      byId("rectangle-words").hidden = !isUnknown;
+      byId("rectangle-r3").textContent = quantity(drawing.block.r3_m, "m");
+      writeText(byId("block-words"), isUnknown ? "" : inWords(drawing.block));
+      svg.attr("aria-label", `${NAME}. ${byId("block-words").textContent}`);
       this.upToDate(true);
     },
     /** @param {boolean} is whether what is drawn is the present block */
@@ -114,14 +107,6 @@ export function blockDrawing(place) {
       place.classList.toggle("stale", !is);
     },
   };
-}
-
-/** @param {any} block */
-function rectangle(block) {
-  return (
-    "Its shape is not known. Drawn is the rectangle on level ground with these numbers " +
-    `(r_3 = ${quantity(block.r3_m, "m")}); all blocks that share them have the same probability.`
-  );
 }
 
 /**

@@ -1,6 +1,6 @@
 /** Design chart and fragility curve: what they ask, and whether they answer the present question. */
 
-import { sayOfModel } from "./answer.js";
+import { showSensitivity } from "./answer.js";
 import { Refusal } from "./ask.js";
 import { designChart } from "./chart.js";
 import { fragilityCurve } from "./curve.js";
@@ -9,7 +9,7 @@ import { modelNamed } from "./models.js";
 import { fromField, quantity } from "./numbers.js";
 import { byId } from "./page.js";
 import { percent } from "./percent.js";
-import { labelOf, planeOf } from "./plane.js";
+import { planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
 import { writeText } from "./subscripts.js";
@@ -54,7 +54,7 @@ export function figures(moved, failed) {
         gridShown = key;
         chart.upToDate(present());
       } catch (error) {
-        notDrawn(error, "chart-caption");
+        notDrawn(error, "chart");
       }
     },
   );
@@ -65,18 +65,18 @@ export function figures(moved, failed) {
       curve.showCurve(await askCurve(on, answer.model, failing, question));
       curve.upToDate(present());
     } catch (error) {
-      notDrawn(error, "curve-caption");
+      notDrawn(error, "curve");
     }
   });
 
   /**
    * What a figure lacks does not take the answer away.
    * @param {unknown} error
-   * @param {string} caption
+   * @param {string} figure
    */
-  function notDrawn(error, caption) {
+  function notDrawn(error, figure) {
     if (!(error instanceof Refusal)) return failed(error);
-    byId(caption).textContent = `Not drawn for the present block: ${error.message}`;
+    showCaption(figure, error.message);
   }
 
   return {
@@ -89,7 +89,7 @@ export function figures(moved, failed) {
      */
     async show(question, answer, failing, present) {
       const model = await modelNamed(answer.model);
-      if (model?.sensitive_share) sayOfModel(sensitivity(model.sensitive_share));
+      showSensitivity(model?.sensitive_share ?? 0);
       const { numbers } = failing;
       const domain = model?.domain ?? {};
       plane = planeOf(answer, numbers, question.values, domain, held ? plane : null);
@@ -108,10 +108,14 @@ export function figures(moved, failed) {
       if (hasChart) drawGrid(asked);
       else chart.upToDate(true);
       drawCurve(asked);
-      if (hasChart) writeText(byId("chart-caption"), chartCaption(question, answer, plane));
-      byId("curve-caption").textContent =
-        `Dark band: ${percent(answer.level)} confidence interval.` +
-        (answer.event_low === null ? "" : " Light band: prediction interval at the sites.");
+      if (hasChart) {
+        byId("chart-failure").textContent = answer.failure;
+        writeText(byId("chart-at"), fixedValues(question, plane));
+        showCaption("chart");
+      }
+      byId("curve-level").textContent = percent(answer.level);
+      byId("curve-sites").hidden = answer.event_low === null;
+      showCaption("curve");
     },
     /**
      * Show the point where the reader has moved it, before there is an answer.
@@ -145,27 +149,22 @@ export function figures(moved, failed) {
 }
 
 /**
- * What the sensitive outcomes of free-standing blocks mean for an answer.
- * @param {number} share
+ * Show the caption of a figure, or why it is not drawn.
+ * @param {string} figure
+ * @param {string} [error]
  */
-function sensitivity(share) {
-  return (
-    ` Of the simulated outcomes behind it ${percent(share)} are sensitive: others for a motion ` +
-    "that differs by a millionth."
-  );
+function showCaption(figure, error = "") {
+  byId(`${figure}-meaning`).hidden = Boolean(error);
+  byId(`${figure}-error`).textContent = error;
 }
 
-/** @type {(question: Question, answer: any, plane: Plane) => string} */
-function chartCaption(question, answer, plane) {
-  const held = MEASURES.filter((name) => name !== plane.across && question.values[name] !== "").map(
-    (name) => {
-      const { symbol, unit } = quantityNamed(name);
-      return `${symbol} = ${quantity(fromField(question.values[name]), unit)}`;
-    },
-  );
-  const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
-  return (
-    `Lines of equal probability of ${answer.failure} at ${all}. ` +
-    "Hatched: outside the fitted range, where answers are extrapolations."
-  );
+/** Values for which the chart is drawn.
+ * @type {(question: Question, plane: Plane) => string} */
+function fixedValues(question, plane) {
+  const names = MEASURES.filter((name) => name !== plane.across && question.values[name] !== "");
+  const held = names.map((name) => {
+    const { symbol, unit } = quantityNamed(name);
+    return `${symbol} = ${quantity(fromField(question.values[name]), unit)}`;
+  });
+  return [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
 }

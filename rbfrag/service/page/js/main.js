@@ -2,7 +2,7 @@
 
 import { showAnswer, showNoAnswer } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
-import { blockDrawing, whyNoAnswer } from "./block.js";
+import { blockDrawing } from "./block.js";
 import { formFields, inLabels, nothingWrong, sayWrong } from "./fields.js";
 import { figures } from "./figures.js";
 import { afterPause, latest } from "./latest.js";
@@ -107,13 +107,12 @@ async function answerQuestion(asked) {
     drawing.show(found, asked);
     offerModelsOf(found.kind);
     byId("sliding-part").hidden = found.kind !== "sliding";
-    const noAnswer = whyNoAnswer(found);
-    const answer = noAnswer ? null : await service.askProbability(asked, found.kind);
+    const answer = found.reason ? null : await service.askProbability(asked, found.kind);
     reached();
     nothingWrong(form);
     if (!answer) {
       sheets.hide();
-      return nothingKnown(noAnswer, labelled(found.block.diagnostics));
+      return nothingKnown(found.reason, labelled(found.block.diagnostics));
     }
     showAnswer(answer);
     if (!found.numbers) {
@@ -150,7 +149,7 @@ function failed(error) {
   nothingWrong(form);
   if (error.status === 401) {
     tokenMissing();
-    return nothingKnown("The service asks for its token.");
+    return nothingKnown(document.querySelector("#token-form label")?.textContent ?? "");
   }
   reached();
   sayWrong(error.message, byId("form-error"));

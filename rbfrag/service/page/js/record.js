@@ -1,5 +1,6 @@
 /** The reader's record: dropped on the page or chosen, asked for its spectrum, kept in a link. */
 
+import { spoken } from "./answer.js";
 import { ratios } from "./numbers.js";
 import { labelled } from "./page.js";
 
@@ -7,7 +8,8 @@ import { labelled } from "./page.js";
  * @typedef {import("./spectrum.js").Spectrum} Spectrum
  */
 
-const SIZES = ratios(0.1, 30, 41).map((p2) => Number(p2.toPrecision(4)));
+/** The frequency parameters at which a spectrum is asked [1/s²]. */
+export const SIZES = ratios(0.1, 30, 41).map((p2) => Number(p2.toPrecision(4)));
 
 /** A record to try: one sine, no earthquake. */
 export function syntheticPulse() {
@@ -18,16 +20,6 @@ export function syntheticPulse() {
   });
   const text = ["time_s,acceleration_g", ...rows, ""].join("\n");
   return new File([text], "synthetic pulse, one sine of 0.35 g and 0.8 s");
-}
-
-/**
- * The frequency parameters at which a spectrum is asked: a fixed range that includes the block's.
- * @param {number} p2 of the reader's block, or NaN
- * @returns {number[]}
- */
-export function sizesFor(p2) {
-  const own = p2 > 0 ? [p2] : [];
-  return [...new Set([...SIZES, ...own])].sort((a, b) => a - b);
 }
 
 /**
@@ -46,24 +38,9 @@ export function spectrumOf(answers, name) {
     forward: forward.x_m_s,
     reverse: reverse.x_m_s,
     warnings: labelled(forward.diagnostics),
+    texts: answers.map(spoken),
+    verdict: null,
   };
-}
-
-/**
- * The spectrum of one polarity at a frequency parameter, on straight lines between logarithms.
- * @param {Spectrum} spectrum
- * @param {"forward" | "reverse"} polarity
- * @param {number} p2
- * @returns {number} [m/s], NaN outside
- */
-export function valueAt(spectrum, polarity, p2) {
-  const { p2: sizes, [polarity]: values } = spectrum;
-  const above = sizes.findIndex((size) => size >= p2);
-  if (above < 0) return NaN;
-  if (sizes[above] === p2) return values[above];
-  if (above === 0) return NaN;
-  const share = Math.log(p2 / sizes[above - 1]) / Math.log(sizes[above] / sizes[above - 1]);
-  return values[above - 1] ** (1 - share) * values[above] ** share;
 }
 
 /**
@@ -102,11 +79,22 @@ export function fromFragment(fragment) {
         Array.isArray(list) && list.length === read.p2.length && list.every(Number.isFinite),
     );
     return sound && read.p2.length > 1 && Number.isFinite(read.pgv_m_s)
-      ? { ...read, name: String(read.name), warnings: [...(read.warnings ?? [])].map(String) }
+      ? {
+          ...read,
+          name: String(read.name),
+          warnings: [...read.warnings].map(String),
+          texts: pairsOf(read.texts),
+          verdict: read.verdict && { ...read.verdict, texts: pairsOf(read.verdict.texts) },
+        }
       : null;
   } catch {
     return null;
   }
+}
+
+/** @type {(texts: any) => import("./answer.js").Texts} */
+function pairsOf(texts) {
+  return [...texts].map(([headline, rest]) => [String(headline), String(rest)]);
 }
 
 /**

@@ -1,21 +1,17 @@
-/** The panel of the reader's record: its spectrum, its doubts, and what it means for the block. */
+/** The panel of the reader's record: its spectrum, its warnings, and the answer for the block. */
 
-import { showByRecord, showWarnings } from "./answer.js";
+import { showByRecord, showTexts, showWarnings, spoken } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
 import { isHalfTyped, nothingWrong, sayWrong } from "./fields.js";
 import { afterPause, latest } from "./latest.js";
-import { quantity } from "./numbers.js";
 import { byId, textIn } from "./page.js";
-import { recordsFrom, syntheticPulse, valueAt } from "./record.js";
-import { askCritical, askSpectrum } from "./service.js";
+import { recordsFrom, syntheticPulse } from "./record.js";
+import { askBounds, askCritical, askSpectrum } from "./service.js";
 import { spectrumPlot } from "./spectrum.js";
 import { reached, unreachable } from "./trouble.js";
 
 const PAUSE_MS = 350;
 const READING = ["units", "dt", "trace"];
-
-/** Above X(p) by this ratio, no block topples (docs: the toppling spectrum). */
-const BOUND = 1.02;
 
 /**
  * @typedef {import("./spectrum.js").Spectrum} Spectrum
@@ -40,12 +36,12 @@ export function recordPanel(tell) {
   let isNew = false;
 
   const ask = latest(async (/** @type {File} */ asked) => {
-    byId("record-said").textContent = `Waiting for the spectrum of ${asked.name} …`;
+    byId("record-said").hidden = false;
     const reading = readingNow();
     const trace = chosenTrace();
     const name = trace ? `${asked.name}, trace ${trace}` : asked.name;
     try {
-      const found = await askSpectrum(asked, reading, block?.p2 ?? NaN, name);
+      const found = await askSpectrum(asked, reading, name);
       reached();
       nothingWrong(panel);
       if (asked !== file) return;
@@ -64,7 +60,7 @@ export function recordPanel(tell) {
       sayWrong(`${asked.name}: ${words}`, byId("record-error"));
       show(null);
     } finally {
-      byId("record-said").textContent = "";
+      byId("record-said").hidden = true;
     }
   });
   const askSoon = afterPause(PAUSE_MS, ask);
@@ -101,27 +97,33 @@ export function recordPanel(tell) {
 
   const readingNow = () => Object.fromEntries(READING.map((id) => [id, textIn(id)]));
 
+  /** Show what the service says of the present block; ask where it has not said it yet. */
   function compare() {
-    byId("spectrum-words").textContent = spectrum ? inWords(spectrum, block) : "";
-    const able = spectrum && block ? canTopple(spectrum, block) : null;
-    if (!spectrum || !block || able === null) return showByRecord(null);
-    const words = `The block is ${able ? "not " : ""}more than 2 % above its toppling spectrum.`;
-    const answer = able ? "Perhaps" : "No, in neither polarity";
-    showByRecord({ name: spectrum.name, answer, words: `${words} ${pgvOf(spectrum)}` });
-    if (able && file) decide({ file, spectrum, block });
+    const { verdict = null, name = "", texts = [] } = spectrum ?? {};
+    const isOfBlock = verdict && verdict.p2 === block?.p2 && verdict.kr === block.kr;
+    showTexts(byId("spectrum-words"), texts);
+    showByRecord(name, isOfBlock ? verdict.texts : []);
+    if (file && spectrum && block && !isOfBlock) decide({ file, spectrum, block });
   }
 
   const decide = latest(async (/** @type {{file: File, spectrum: Spectrum, block: Place}} */ of) => {
-    try {
-      const { forward, reverse } = await askCritical(of.file, readingNow(), of.block.p2);
+    const { p2, kr } = of.block;
+    const asked = { ...readingNow(), p2, kr };
+    /** @type {(answers: any[]) => void} */
+    const showVerdict = (answers) => {
       if (of.spectrum !== spectrum || of.block !== block) return;
-      const words =
-        `It topples blocks of this size up to k_r = ${quantity(forward, "g")} in the forward ` +
-        `polarity and ${quantity(reverse, "g")} in the reverse one. ${pgvOf(spectrum)}`;
-      const answer = verdict(of.block.kr <= forward, of.block.kr <= reverse);
-      showByRecord({ name: spectrum.name, answer, words });
+      spectrum.verdict = { p2, kr, texts: answers.map(spoken) };
+      compare();
+      tell.changed();
+    };
+    try {
+      const bounds = await askBounds(of.file, asked, of.spectrum.name);
+      showVerdict(bounds);
+      // the certified search takes longer: only where the spectrum leaves it open
+      if (!bounds.some(({ may_topple }) => may_topple)) return;
+      showVerdict(await askCritical(of.file, asked, of.spectrum.name));
     } catch (error) {
-      if (!(error instanceof Refusal || error instanceof Unreachable)) throw error; // still perhaps
+      if (!(error instanceof Refusal || error instanceof Unreachable)) throw error; // bounds stay
     }
   });
 
@@ -167,65 +169,9 @@ export function recordPanel(tell) {
      * @param {number} [sizeTimesP2] r3 times p² of a rectangle [m/s²]
      */
     placeBlock(place, sizeTimesP2) {
-      const other = place && place.p2 !== block?.p2;
       block = place;
       plot.showBlock(place, sizeTimesP2);
       compare();
-      if (file && other) askSoon(file);
     },
   };
-}
-
-/** Whether a record can topple a block by its spectrum; null where that does not reach.
- * @type {(spectrum: Spectrum, block: Place) => boolean | null} */
-function canTopple(spectrum, { p2, y }) {
-  const xs = /** @type {const} */ (["forward", "reverse"]).map((each) => valueAt(spectrum, each, p2));
-  return xs.every(Number.isFinite) ? xs.some((x) => y <= BOUND * x) : null;
-}
-
-/** Whether a record topples a block, with the polarity that does.
- * @type {(forward: boolean, reverse: boolean) => string} */
-function verdict(forward, reverse) {
-  if (forward && reverse) return "Yes, in both polarities";
-  if (forward || reverse) return `Yes, in the ${forward ? "forward" : "reverse"} polarity`;
-  return "No, in neither polarity";
-}
-
-/** @type {(spectrum: Spectrum) => string} */
-function pgvOf(spectrum) {
-  return `Its PGV is ${quantity(spectrum.pgv_m_s, "m/s")}.`;
-}
-
-/**
- * What a record is, and whether it can topple a block.
- * @param {Spectrum} spectrum
- * @param {Place | null} block
- */
-function inWords(spectrum, block) {
-  const record = pgvOf(spectrum);
-  return block ? `${record} ${comparison(spectrum, block)}` : record;
-}
-
-/**
- * Whether a record can topple a block, in words.
- * @param {Spectrum} spectrum
- * @param {Place} block
- */
-function comparison(spectrum, { p2, y }) {
-  const known = /** @type {const} */ (["forward", "reverse"]).map((polarity) => ({
-    polarity,
-    x: valueAt(spectrum, polarity, p2),
-  }));
-  if (known.some(({ x }) => !Number.isFinite(x))) {
-    return `The spectrum does not reach p² = ${quantity(p2, "1/s²")}.`;
-  }
-  const values = known.map(({ polarity, x }) => `${quantity(x, "m/s")} ${polarity}`).join(" and ");
-  const able = known.filter(({ x }) => y <= BOUND * x).map(({ polarity }) => polarity);
-  const verdict = able.length
-    ? `That is not more than 2 % above X(p) in the ${able.join(" and the ")} polarity: so this record ` +
-      "may topple the block."
-    : "That is more than 2 % above X(p) in both polarities: without vertical motion this record does " +
-      "not topple the block.";
-  const own = `this block has y = ${quantity(y, "m/s")}`;
-  return `At p² = ${quantity(p2, "1/s²")} X(p) is ${values}; ${own}. ${verdict}`;
 }

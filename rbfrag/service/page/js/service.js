@@ -4,7 +4,7 @@ import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
 import { blockOf, MEASURES, MODEL_FIELDS, only } from "./question.js";
-import { sizesFor, spectrumOf } from "./record.js";
+import { SIZES, spectrumOf } from "./record.js";
 
 /**
  * @typedef {import("./question.js").Question} Question
@@ -12,6 +12,9 @@ import { sizesFor, spectrumOf } from "./record.js";
  * @typedef {{kind: string, numbers: Record<string, number>}} Failing how a block fails, and what
  *   predictions read of it, as /v1/drawing says
  */
+
+/** Most characters of the name of a record that the service takes. */
+const LONGEST_NAME = 200;
 
 /** Digits of the values of a grid: what is drawn does not show more, edges stay apart. */
 const DIGITS = 9;
@@ -95,23 +98,32 @@ export async function askCurve(plane, model, failing, question) {
  * The toppling spectrum of a record in both polarities.
  * @param {File} file
  * @param {Record<string, string>} reading unit, sampling interval and trace, where needed
- * @param {number} p2 of the reader's block, or NaN
  * @param {string} name under which it is shown
  */
-export async function askSpectrum(file, reading, p2, name) {
-  const query = { ...reading, polarity: "both", p2: sizesFor(p2).join(",") };
+export async function askSpectrum(file, reading, name) {
+  const query = { ...spokenOf(reading, name), polarity: "both", p2: SIZES.join(",") };
   return spectrumOf(await upload("v1/spectrum", query, file), name);
 }
 
-/** The greatest k_r of a size that a record topples, by polarity; 0 where it topples none.
- * @type {(file: File, reading: Record<string, string>, p2: number) =>
- *   Promise<{forward: number, reverse: number}>} */
-export async function askCritical(file, reading, p2) {
-  const asked = [false, true].map((reverse) =>
-    upload("v1/critical", { ...reading, p2, reverse: String(reverse) }, file),
+/** A request for an answer with its text, in which the record has a name.
+ * @type {(asked: Record<string, any>, name: string) => Record<string, any>} */
+function spokenOf(asked, name) {
+  return { ...asked, name: name.slice(0, LONGEST_NAME), text: "true" };
+}
+
+/** What the toppling spectrum says of a block, by polarity.
+ * @type {(file: File, asked: Record<string, any>, name: string) => Promise<any[]>} */
+export function askBounds(file, asked, name) {
+  return upload("v1/spectrum", { ...spokenOf(asked, name), polarity: "both" }, file);
+}
+
+/** Whether a record topples a block by the certified search, by polarity.
+ * @type {(file: File, asked: Record<string, any>, name: string) => Promise<any[]>} */
+export function askCritical(file, asked, name) {
+  const ways = [false, true].map((reverse) =>
+    upload("v1/critical", { ...spokenOf(asked, name), reverse: String(reverse) }, file),
   );
-  const [forward, reverse] = (await Promise.all(asked)).map((each) => each.kr ?? 0);
-  return { forward, reverse };
+  return Promise.all(ways);
 }
 
 /**

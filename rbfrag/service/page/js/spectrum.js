@@ -4,13 +4,16 @@ import { drawAxis, drawGrid, gridLines } from "./axes.js";
 import { d3 } from "./d3.js";
 import { readable } from "./numbers.js";
 import { sheetIn } from "./sheet.js";
+import { titleOf } from "./vocabulary.js";
 
 const MARGINS = { left: 62, right: 18, top: 46, bottom: 64 };
 const LOWEST_SHARE = 0.02;
 
 /**
+ * @typedef {import("./answer.js").Texts} Texts
  * @typedef {{name: string, pgv_m_s: number, p2: number[], forward: number[], reverse: number[],
- *   warnings: string[]}} Spectrum
+ *   warnings: string[], texts: Texts, verdict: {p2: number, kr: number, texts: Texts} | null}}
+ *   Spectrum with what the service says of it, and of a block under it
  */
 
 /**
@@ -54,12 +57,12 @@ export function spectrumPlot(place) {
     bottom.attr("transform", `translate(0,${s.bottom})`);
     left.attr("transform", `translate(${s.left},0)`);
     top.attr("transform", `translate(0,${s.top})`);
-    drawAxis(bottom, "bottom", x, "frequency parameter of the block p² [1/s²]");
+    drawAxis(bottom, "bottom", x, titleOf("p2"));
     drawAxis(left, "left", y, "X(p), PGV and block’s y [m/s]");
     const sizes = x.copy().domain(x.domain().map((/** @type {number} */ p2) => sizeTimesP2 / p2));
     top.attr("display", Number.isFinite(sizeTimesP2) ? null : "none");
     if (Number.isFinite(sizeTimesP2)) {
-      drawAxis(top, "top", sizes, "size r_3 of a rectangular block [m]");
+      drawAxis(top, "top", sizes, titleOf("r3"));
     }
     const line = (/** @type {number[]} */ values) =>
       d3

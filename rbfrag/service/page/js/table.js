@@ -28,13 +28,13 @@ export function blockTable(present) {
     file.hidden = true;
     const { values } = present();
     const measures = Object.entries(only(values, MEASURES)).map(([n, v]) => [n, plain(v)]);
-    const query = { ...only(values, ["kind", "model"]), ...Object.fromEntries(measures), form };
+    const query = { ...only(values, ["kind", "model"]), ...Object.fromEntries(measures), form, text: "true" };
     try {
       const found = await upload("v1/table", query, table);
       URL.revokeObjectURL(file.href);
       file.href = URL.createObjectURL(new Blob(["\ufeff", found.table]));
       file.hidden = false;
-      byId("table-said").textContent = `${found.answered} of ${found.rows} blocks are answered.`;
+      byId("table-said").textContent = found.text.sentences[0];
       showWarnings(byId("table-notes"), labelled(found.diagnostics));
     } catch (error) {
       if (![Refusal, Unreachable].some((kind) => error instanceof kind)) throw error;

@@ -4,25 +4,19 @@ import { afterPause } from "./latest.js";
 import { byId } from "./page.js";
 
 const SHOWN_MS = 4000;
+const MESSAGES = ["link-copied", "link-kept"];
 
 /** @param {() => URL} address of what is shown */
 export function tools(address) {
   const button = byId("copy-link");
-  const words = button.textContent;
-  const back = afterPause(SHOWN_MS, () => {
-    button.textContent = words;
-    byId("link-said").textContent = "";
-  });
+  const showOnly = (/** @type {string} */ shown) => {
+    for (const id of MESSAGES) byId(id).hidden = id !== shown;
+  };
+  const back = afterPause(SHOWN_MS, () => showOnly(""));
   button.addEventListener("click", async () => {
     const shown = address();
     history.replaceState(null, "", shown);
-    if (await copied(shown.href)) {
-      button.textContent = "Copied";
-      byId("link-said").textContent = "The link is copied. It holds all that is shown.";
-    } else {
-      byId("link-said").textContent =
-        "The browser does not let the page copy: the address line holds the link.";
-    }
+    showOnly((await copied(shown.href)) ? "link-copied" : "link-kept");
     back();
   });
   byId("print").addEventListener("click", () => print());

@@ -11,10 +11,8 @@ const RETRY_MS = 4000;
  * @param {() => void} retry
  */
 export function unreachable(error, retry) {
-  const banner = byId("unreachable");
-  const still = "What is shown is the last answer; the page keeps asking.";
-  banner.textContent = `No answer now: ${error.message}. ${still}`;
-  banner.hidden = false;
+  byId("unreachable-reason").textContent = error.message;
+  byId("unreachable").hidden = false;
   setTimeout(retry, RETRY_MS);
 }
 

@@ -52,6 +52,20 @@ export function quantityNamed(parameter) {
 }
 
 /**
+ * The title of an axis of a parameter.
+ * @param {string} parameter
+ */
+export function titleOf(parameter) {
+  const about = quantityNamed(parameter);
+  return `${withSymbol(about)} [${about.unit}]`;
+}
+
+/** @type {(quantity: Quantity) => string} */
+function withSymbol({ label, symbol }) {
+  return symbol && !label.split(" ").includes(symbol) ? `${label} ${symbol}` : label;
+}
+
+/**
  * The measures that the models of a term use.
  * @param {string} term
  */
@@ -60,10 +74,11 @@ export function labelOfTerm(term) {
 }
 
 /** @type {(id: string, quantity: Quantity) => void} */
-function labelField(id, { label, description, unit, symbol, range }) {
+function labelField(id, quantity) {
+  const { description, unit, range } = quantity;
   const element = /** @type {HTMLElement | null} */ (document.querySelector(`label[for="${id}"]`));
   if (!element) return;
-  writeText(element, symbol && !label.split(" ").includes(symbol) ? `${label} ${symbol}` : label);
+  writeText(element, withSymbol(quantity));
   element.title = description;
   const help = document.getElementById(`${id}-help`);
   if (help) help.textContent = `${description}.`;
