@@ -264,9 +264,8 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
     known = judged.known
     event = np.broadcast_to(data.event[:, None], known.shape)[known]
     failed = judged.failed[known]
-    magnitude = np.broadcast_to(source.table.magnitude[data.combination][:, None], known.shape)[
-        known
-    ]
+    of_motions = source.table.measure("magnitude")[data.combination]
+    magnitude = np.broadcast_to(of_motions[:, None], known.shape)[known]
     if not {"kr", "p2"} <= set(data.blocks):
         return Predicted(grid[known], failed, event, magnitude=magnitude)
     kr, p2 = (data.grid(name)[known] for name in ("kr", "p2"))

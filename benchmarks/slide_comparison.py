@@ -49,7 +49,7 @@ class Slides:
         assert source.displacement_m is not None
         table, k = source.table, source.k_over_pga
         names = ("pga_g", "pgv_m_s", "arias_m_s", "magnitude")
-        columns = {n: np.broadcast_to(getattr(table, n)[:, None], k.shape) for n in names}
+        columns = {n: np.broadcast_to(table.measure(n)[:, None], k.shape) for n in names}
         columns["ky"] = ky = k * table.pga_g[:, None]
         event = np.unique(table.event_id.astype(str), return_inverse=True)[1]
         used = np.isfinite(source.displacement_m) & (k < 1.0) & (ky >= KR[0]) & (ky <= KR[1])

@@ -88,7 +88,7 @@ def found(table: CombinationTable, model: FragilityModel) -> NDArray[np.bool_]:
     """Return which rows have a critical value and what the model reads."""
     known = (table.status == "found") & np.isfinite(table.y_m_s)
     for name in model.term.inputs:
-        known &= np.isfinite(getattr(table, name))
+        known &= np.isfinite(table.measure(name))
     return known
 
 
@@ -96,7 +96,7 @@ def within_lines(model: FragilityModel, table: CombinationTable) -> tuple[FloatA
     """Return PGV of the critical blocks, and 100 where one lies between both lines, else 0."""
     known = found(table, model)
     names = ("p2", "kr", *model.term.inputs)
-    p = probabilities(model, {name: getattr(table, name)[known] for name in names})
+    p = probabilities(model, {name: table.measure(name)[known] for name in names})
     return table.pgv_m_s[known], np.where((p > TAIL) & (p < 1.0 - TAIL), 100.0, 0.0)
 
 
@@ -131,7 +131,7 @@ def plot(models: dict[str, FragilityModel], table: CombinationTable, path: Path)
     )  # fmt: skip
     for i, (one, model) in enumerate(zip(axes.ravel(), models.values(), strict=True)):
         known = found(table, model)
-        values = {name: getattr(table, name)[known] for name in model.term.inputs}
+        values = {name: table.measure(name)[known] for name in model.term.inputs}
         x = np.asarray(model.term.intensity_m_s(values), dtype=np.float64)
         canvas.logarithmic(one)
         one.plot(x, table.y_m_s[known], ".", ms=1.2, color="#9a9a9a", alpha=0.4, rasterized=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.vocabulary.quantities import MEASURES
+
 
 def shaking(seed: int, npts: int = 600, dt_s: float = 0.02) -> NDArray[np.float64]:
     """Enveloped noise with a long-period pulse: topples slender blocks of every size."""
@@ -54,7 +56,7 @@ def write_suite(folder: Path, count: int = 6) -> Path:
     return folder
 
 
-def unknown_spectrum(n: int) -> dict[str, np.ndarray]:
-    """Return the columns of what is not known of n motions: spectrum, energy and magnitude."""
-    spectrum = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
-    return {name: np.full(n, np.nan) for name in (*spectrum, "arias_m_s", "magnitude")}
+def unknown_measures(n: int) -> dict[str, np.ndarray]:
+    """Return unknown measures of n motions: spectrum, energy and magnitude."""
+    others = (name for name in MEASURES if name not in ("pga_g", "pgv_m_s", "pgd_m", "tm_s"))
+    return {name: np.full(n, np.nan) for name in others}

@@ -51,7 +51,7 @@ class Points:
     def __init__(self, table: CombinationTable, names: Sequence[str] = ("pgv", "pga_tm")) -> None:
         terms = {
             name: np.asarray(
-                TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
+                TERMS[name].intensity_m_s({key: table.measure(key) for key in TERMS[name].inputs}),
                 dtype=np.float64,
             )
             for name in names

@@ -32,9 +32,10 @@ from rbfrag.motions.quality import PGD_IN_DOUBT, STRUCTURE
 from rbfrag.results.numbers import count_of
 from rbfrag.results.result import Result, ResultList, TextLine, TextTable
 from rbfrag.solver.results import NUMERICS_VERSION
-from rbfrag.vocabulary.quantities import MEASURES
+from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES
 
-_MEASURES = tuple(name for name in CombinationTable.__dataclass_fields__ if name in MEASURES)
+_MEASURES = tuple(name for name in MEASURES if QUANTITIES[name].stored)
+_OF_TABLE = {*_MEASURES} & {*CombinationTable.__dataclass_fields__}
 _ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 
@@ -216,7 +217,7 @@ def combination_table(
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = (
         "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s",
-        *(name for name in _MEASURES if name != "pgd_m"),
+        *(_OF_TABLE - {"pgd_m"}),
     )  # fmt: skip
     others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
@@ -224,6 +225,7 @@ def combination_table(
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
         event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
         pgd_m=pgd_m,
+        measures={name: floats(name) for name in _MEASURES if name not in _OF_TABLE},
         **{name: floats(name) for name in numbers},
         **{name: objects(name) for name in others},
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict
 
 Vertical = Literal["without", "with", "both"]
 
@@ -129,8 +129,8 @@ class CombinationTable:
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``,
     `upper`, the upper end of the bracket of `kr_over_pga`, where there is none;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
-    is in doubt, unless it was asked for; spectral accelerations and Arias intensity where they
-    were not computed, `magnitude` where it is not known.
+    is in doubt, unless it was asked for. `measures` holds every other stored measure of the
+    vocabulary by name, NaN where it was not computed or is unknown.
     `block` is JSON text, None where p² says all; `yield_g` is NaN where that names no strength.
     `numerics_version` is the same in all rows.
     """
@@ -155,9 +155,17 @@ class CombinationTable:
     block: NDArray[np.object_]
     yield_g: NDArray[np.float64]
     numerics_version: NDArray[np.object_]
-    sa03_g: NDArray[np.float64]
-    sa10_g: NDArray[np.float64]
-    sa20_g: NDArray[np.float64]
-    sa30_g: NDArray[np.float64]
-    arias_m_s: NDArray[np.float64]
-    magnitude: NDArray[np.float64]
+    measures: Mapping[str, NDArray[np.float64]]
+
+    def measure(self, name: str) -> NDArray[np.float64]:
+        """Return a measure of the motions, or another column, by its name."""
+        column: NDArray[np.float64] = {**vars(self), **self.measures}[name]
+        return column
+
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> CombinationTable:
+        """Return some of the combinations."""
+        columns: dict[str, Any] = {
+            name: column[chosen] for name, column in vars(self).items() if name != "measures"
+        }
+        measures = {name: column[chosen] for name, column in self.measures.items()}
+        return CombinationTable(**columns, measures=measures)

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 from rbfrag.fragility.domain import RATIOS, Ratio
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
+from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST
 from rbfrag.fragility.method import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
-from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES, SPECTRAL
+from rbfrag.vocabulary.quantities import INPUTS, INTENSITY, NUMBERS, QUANTITIES
 
 
 def _unit(name: str) -> str:
@@ -34,6 +34,9 @@ def _word(name: str) -> str:
 def _prompt(name: str) -> str:
     return QUANTITIES[name].prompt if name in QUANTITIES else f"{name}, a number"
 
+
+_FLOORED = tuple(name for name in AMPLIFIED if name not in ("pgv_m_s", "pgd_m"))
+"""Measures whose logarithms models use; PGV and PGD are intensities, which have a floor too."""
 
 _ABOVE_ZERO = {
     name: "earthquake" if name in INTENSITY else "block"
@@ -184,7 +187,7 @@ def answer_with_findings(
         at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
     )
     floored = dict(given)
-    for name in (block.strength, "pga_g", "arias_m_s", *SPECTRAL.values()):
+    for name in (block.strength, *_FLOORED):
         if name in floored:
             floored[name] = ns.maximum(floored[name], LEAST)
     values = block.completed(floored, term, ns)

@@ -136,11 +136,8 @@ def measures_of(motion: GroundMotion) -> dict[str, float]:
 
     Without spectral accelerations, which take longer.
     """
-    measures = {"pga_g": motion.pga_g, "pgv_m_s": motion.pgv_m_s, "pgd_m": motion.pgd_m}
-    measures["arias_m_s"] = motion.measures.arias_m_s
-    if motion.tm_s is not None:
-        measures["tm_s"] = motion.tm_s
-    return measures
+    measures = vars(motion.measures).items()
+    return {name: value for name, value in measures if name in INTENSITY and value is not None}
 
 
 def _spectrum_of(motion: GroundMotion, p2: float, polarity: Literal["forward", "reverse"]) -> float:

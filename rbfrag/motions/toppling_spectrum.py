@@ -255,10 +255,10 @@ class TopplingSpectrum(Result):
         """Return the spectrum of a motion that the caller names `motion`.
 
         Raises:
-            InputError: a block with several p².
+            InputError: a block with several p², or a k_r that is not above zero.
         """
-        if kr is not None and len(p2) > 1:
-            raise InputError("kr requires a single p2", fields=("kr", "p2"))
+        if kr is not None and (len(p2) > 1 or not kr > 0.0):
+            raise InputError("kr must be above zero and requires one p2", fields=("kr", "p2"))
         x_m_s = toppling_spectrum(ground, p2, polarity).tolist()
         warnings: list[str] = [*motion_warnings(ground)]
         return cls(motion, ground.label, polarity, ground.pgv_m_s, list(p2), x_m_s, warnings, kr)

@@ -72,7 +72,7 @@ def plot_fit(
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     x = (
         np.asarray(
-            term.intensity_m_s({name: getattr(table, name) for name in term.inputs}),
+            term.intensity_m_s({name: table.measure(name) for name in term.inputs}),
             dtype=np.float64,
         )
         if alone

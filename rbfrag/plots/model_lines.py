@@ -214,7 +214,7 @@ def predicted_strengths(
         Shape (n,); NaN where what the model reads is not known.
     """
     stored = (name for name in INTENSITY if QUANTITIES[name].stored)
-    columns = {name: getattr(table, name) for name in ("p2", *stored)} | {"xp_m_s": xp_m_s}
+    columns = {name: table.measure(name) for name in ("p2", *stored)} | {"xp_m_s": xp_m_s}
     given = {name: columns[name] for name in ("p2", *model.term.inputs)}
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.sqrt(table.p2)

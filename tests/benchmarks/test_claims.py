@@ -24,7 +24,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
 from rbfrag.plots.critical_strength import pulse_line, vertical_pairs
 from rbfrag.solver.results import NUMERICS_VERSION
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 G = 9.80665
 P2 = np.array([30.0, 3.0, 1.0, 0.1])
@@ -67,7 +67,7 @@ def table(seed: int = 1, *, slope: float = 0.72, scatter: float = 0.2) -> Combin
         block=np.full(n, None, dtype=object),
         yield_g=np.full(n, np.nan),
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(n),
+        measures=unknown_measures(n),
     )
 
 
@@ -163,9 +163,7 @@ def test_motion_set_does_not_depend_on_the_order_of_rows() -> None:
         motion: "abc"[motion // 24 % 3 if motion % 24 < 9 else motion % 3] for motion in range(96)
     }
     order = np.random.default_rng(5).permutation(data.p2.size)
-    turned = CombinationTable(
-        **{name: getattr(data, name)[order] for name in data.__dataclass_fields__}
-    )
+    turned = data.only(order)
     (here,), (there,) = motion_set(data, sets, seed=1), motion_set(turned, sets, seed=1)
     assert here.statistic == there.statistic
     assert here.value == pytest.approx(there.value)
@@ -188,8 +186,7 @@ def test_pulses_as_bounds() -> None:
 def test_vertical_pairs_are_matched_not_aligned() -> None:
     without = table()
     order = np.random.default_rng(0).permutation(without.p2.size)[:-20]
-    fields = {name: getattr(without, name)[order] for name in without.__dataclass_fields__}
-    shaken = CombinationTable(**fields)
+    shaken = without.only(order)
     shaken = replace(shaken, kr_over_pga=1.03 * shaken.kr_over_pga)
     pairs = vertical_pairs(without, shaken)
     assert pairs.ln_ratio.size == order.size

@@ -62,7 +62,8 @@ def slides_of(n: int = 3000) -> Slides:
     source = drawn("sliding", "pgv_pga", n)
     table = source.table
     magnitude = np.where(table.event_id == "event-00", 6.5, np.nan)
-    return Slides.of_source(replace(source, table=replace(table, magnitude=magnitude)))
+    measures = {**table.measures, "magnitude": magnitude}
+    return Slides.of_source(replace(source, table=replace(table, measures=measures)))
 
 
 def test_our_form_finds_what_made_the_data_and_beats_one_that_did_not() -> None:
@@ -101,13 +102,11 @@ def test_the_larger_of_two_polarities_is_one_row_a_motion() -> None:
         displacement_m=one.displacement_m[::-1],
     )
     order = np.random.default_rng(1).permutation(80)
-    columns = {
-        name: np.concatenate([getattr(one.table, name), getattr(back.table, name)])
-        for name in vars(one.table)
-    }
+    twice = one.table.only(np.tile(np.arange(40), 2))
+    polarity = np.concatenate([one.table.polarity, back.table.polarity])
     both = replace(
         one,
-        table=type(one.table)(**columns),
+        table=replace(twice, polarity=polarity),
         xp_m_s=np.tile(one.xp_m_s, 2),
         k_over_pga=np.tile(one.k_over_pga, (2, 1)),
         failed=np.tile(one.failed, (2, 1)),

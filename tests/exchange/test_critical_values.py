@@ -46,7 +46,8 @@ def columns(known: FitSource) -> pd.DataFrame:
     """They as the dissertation's kind of database may have them."""
     table = known.table
     return pd.DataFrame({
-        "name": table.motion_id, "earthquake": table.event_id, "magnitude": table.magnitude,
+        "name": table.motion_id, "earthquake": table.event_id,
+        "magnitude": table.measure("magnitude"),
         "pga": table.pga_g * 980.665, "pgv": table.pgv_m_s * 100.0, "pgd": table.pgd_m * 100.0,
         "tm": table.tm_s, "reverse_side": (table.polarity == "reverse").astype(int),
         "p2": table.p2, "kr": table.kr, "censored": (table.status != "found").astype(int),
@@ -97,7 +98,7 @@ def test_fits_of_the_source_are_repeated(
         "search_limit",
     ):
         ours, theirs = (
-            pd.DataFrame({each: getattr(table, each) for each in (*order, name)})
+            pd.DataFrame({each: table.measure(each) for each in (*order, name)})
             .round({"pgv_m_s": 9})
             .sort_values(order)[name]
             for table in (stored, known.table)

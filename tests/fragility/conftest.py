@@ -12,7 +12,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.solver.results import NUMERICS_VERSION
 from tests.fragility.portfolio_draws import SHARED
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 G = 9.80665
 P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
@@ -70,7 +70,7 @@ def critical_values(
         block=np.full(n, None, dtype=object),
         yield_g=np.full(n, np.nan),
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(n),
+        measures=unknown_measures(n),
     )
 
 

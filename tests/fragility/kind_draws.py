@@ -13,7 +13,7 @@ from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.results import NUMERICS_VERSION
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 TRUE = {
     ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
@@ -55,7 +55,7 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
         table = _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan))
         of_motion = {name: values[name] for name in ("magnitude", "arias_m_s")}
         return FitSource(
-            replace(table, **of_motion),
+            replace(table, measures={**table.measures, **of_motion}),
             np.full(n, np.nan), k[:, None], np.full((n, 1), np.nan), slid[:, None],
         )  # fmt: skip
     ks, ps2 = np.exp(rng.normal(-1.5, 0.4, n)), np.exp(rng.normal(1.0, 0.8, n))
@@ -110,5 +110,5 @@ def _table(
         block=np.full(n, None, dtype=object),
         yield_g=none if yield_g is None else yield_g,
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **(unknown_spectrum(n) | ({} if magnitude is None else {"magnitude": magnitude})),
+        measures=unknown_measures(n) | ({} if magnitude is None else {"magnitude": magnitude}),
     )

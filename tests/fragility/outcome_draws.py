@@ -9,7 +9,7 @@ from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_gri
 from rbfrag.fragility.method import arrays
 from rbfrag.fragility.methods import method_named
 from rbfrag.solver.results import NUMERICS_VERSION
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 G = 9.80665
 P2 = (30.0, 3.0, 0.3)
@@ -92,7 +92,7 @@ def drawn_outcomes(
         block=np.full(n, None, dtype=object),
         yield_g=np.full(n, np.nan),
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(n),
+        measures=unknown_measures(n),
     )
     return FitSource(table, xp, kr_over_pga_of_grid(p2, pgv, pga), topples)
 

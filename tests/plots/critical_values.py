@@ -8,7 +8,7 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.solver.results import NUMERICS_VERSION
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 N = 400
 
@@ -44,7 +44,7 @@ def critical_values(n: int = N) -> CombinationTable:
         block=np.full(n, None, dtype=object),
         yield_g=np.full(n, np.nan),
         numerics_version=np.full(n, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(n),
+        measures=unknown_measures(n),
     )
 
 

@@ -11,7 +11,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import fit as fit_module
 from rbfrag.plots.fit import plot_fit
 from rbfrag.solver.results import NUMERICS_VERSION
-from tests.synthetic import unknown_spectrum
+from tests.synthetic import unknown_measures
 
 N = 400
 
@@ -44,13 +44,12 @@ def table():
         block=np.full(N, None, dtype=object),
         yield_g=np.full(N, np.nan),
         numerics_version=np.full(N, NUMERICS_VERSION, dtype=object),
-        **unknown_spectrum(N),
+        measures=unknown_measures(N),
     )
 
 
 def repeated(table, times):
-    columns = {name: np.tile(column, times) for name, column in vars(table).items()}
-    return CombinationTable(**columns)
+    return table.only(np.tile(np.arange(table.p2.size), times))
 
 
 @pytest.fixture

@@ -7,8 +7,15 @@ from dataclasses import dataclass
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.fragility.measures import TERMS, Term
+from rbfrag.vocabulary.quantities import word_of
 
 EXAMPLE = "Example:  rbfrag fit --term pgv"
+
+
+def _described(term: Term) -> str:
+    """Return the name of a term, with its formula where it has one of several measures."""
+    return f"{term.name} ({', '.join(map(word_of, term.inputs))})"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,11 +47,7 @@ class ModelOptions:
 def fit(
     *,
     term: str = option(
-        "Set of intensity measures: pgv; pga_tm = PGA g Tm/(2 pi) and pgd_tm = 2 pi PGD/Tm "
-        "[m/s]; pgv_pga, pgv_pga_tm and pgv_pga_sa10_sa30: PGV with PGA (and Tm, or SA at 1 "
-        "and 3 s); xp: toppling spectrum X(p); pgv_kr: PGV with k_r; pga; sa10; pga_sa10, "
-        "pga_sa10_sa30 and pga_sa03_sa10_sa30: PGA with SA; pga_m, pgv_pga_m and pgv_pga_ia: "
-        "with magnitude or Arias intensity",
+        f"Set of intensity measures: {'; '.join(map(_described, TERMS.values()))}",
         ...,
         show_default=False,
     ),

@@ -26,7 +26,7 @@ from rbfrag.fragility.method import TOPPLING_BLOCK, BlockParameters, Method, arr
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.results import FloatArray
-from rbfrag.vocabulary.quantities import INTENSITY, QUANTITIES
+from rbfrag.vocabulary.quantities import INTENSITY, MEASURES, QUANTITIES
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -96,13 +96,12 @@ class FitSource:
 
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
         """Return some of the combinations."""
-        part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         for name in ("table", "of_block", "structures", "narrow"):
             del columns[name]
         return replace(
             self,
-            table=CombinationTable(**part),
+            table=self.table.only(chosen),
             of_block={name: v[chosen] for name, v in self.of_block.items()},
             **{name: v[chosen] for name, v in columns.items() if v is not None},
         )
@@ -442,7 +441,7 @@ def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
     return {
         "xp_m_s": source.xp_m_s,
-        **{name: getattr(table, name) for name in INTENSITY if QUANTITIES[name].stored},
+        **{name: table.measure(name) for name in INTENSITY if QUANTITIES[name].stored},
     }
 
 
@@ -568,12 +567,12 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     measures = _measures(source)
     of_record = {name: measures[name] for name in term.inputs}
     defined = np.isfinite(np.column_stack([*of_record.values()])).all(axis=1)
-    # PGA of the scaled record is k over the ratio; what is no acceleration or velocity stays
+    # PGA of the scaled record is k over the ratio
     pga = strength[:, None] / k
     scale = pga / np.where(table.pga_g > 0.0, table.pga_g, np.nan)[:, None]
-    scaled = {name: value[:, None] * scale for name, value in of_record.items()}
-    if "magnitude" in scaled:
-        scaled["magnitude"] = of_record["magnitude"][:, None]
+    scaled = {
+        name: value[:, None] * scale ** MEASURES[name].power for name, value in of_record.items()
+    }
     unscaled = {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
     return _Points(
         values={**unscaled, **block, "y_m_s": np.full(size.size, np.nan)},
@@ -588,7 +587,7 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
         outcomes="simulated outcomes",
         ranges={
             **ratio_columns({**measures, "p": size}),
-            **{name: of_record[name] for name in term.inputs if name == "magnitude"},
+            **{name: of_record[name] for name in term.inputs if not MEASURES[name].power},
             str(method.block.size): table.p2,
             "y_m_s": block["y_m_s"],
             "k_over_pga": np.column_stack([k, np.ones(size.size)]),

@@ -242,7 +242,7 @@ def log_correlations(table: CombinationTable) -> dict[str, float]:
     observed = table.status == "found"
     columns = {
         name: np.asarray(
-            TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
+            TERMS[name].intensity_m_s({key: table.measure(key) for key in TERMS[name].inputs}),
             dtype=np.float64,
         )
         for name in SINGLE_TERMS

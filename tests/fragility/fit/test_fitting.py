@@ -1,21 +1,16 @@
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.question.question import predict
-
-
-def rows_of(table, chosen):
-    return CombinationTable(**{f.name: getattr(table, f.name)[chosen] for f in fields(table)})
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +92,7 @@ def test_domain_is_the_range_of_the_fitted_points(table, report):
 
 
 def test_order_of_the_rows_changes_nothing(table, report):
-    shuffled = rows_of(table, np.random.default_rng(0).permutation(table.p2.size))
+    shuffled = table.only(np.random.default_rng(0).permutation(table.p2.size))
     again = fit(shuffled, term="pgv", method="wls")
     assert again.model.row.data_fingerprint == report.model.row.data_fingerprint
     assert again.model.row.coefficients == report.model.row.coefficients
@@ -137,7 +132,7 @@ def test_held_out_scores_are_those_of_separate_fits(draw, monkeypatch):
     table = draw(events=12, motions=2, event_share=0.4)
     densities = []
     for event in sorted(set(table.event_id)):
-        model = fit(rows_of(table, table.event_id != event), term="pgv", method="wls").model
+        model = fit(table.only(table.event_id != event), term="pgv", method="wls").model
         c0, c1, v0, v1 = model.parameters
         own = table.event_id == event
         x, y = table.pgv_m_s[own], table.y_m_s[own]
@@ -191,9 +186,9 @@ def test_guessed_and_few_earthquakes_are_warned_of(draw):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda t: rows_of(t, slice(0, 0)), "no critical values to fit.*rbfrag simulate"),
-        (lambda t: rows_of(t, slice(0, 9)), "9 critical values.*simulate more"),
-        (lambda t: rows_of(t, slice(0, 96)), r"2 earthquake\(s\).*a metadata table"),
+        (lambda t: t.only(slice(0, 0)), "no critical values to fit.*rbfrag simulate"),
+        (lambda t: t.only(slice(0, 9)), "9 critical values.*simulate more"),
+        (lambda t: t.only(slice(0, 96)), r"2 earthquake\(s\).*a metadata table"),
         (lambda t: replace(t, pgv_m_s=np.full(t.p2.size, 0.3)), "same peak ground velocity, 0.3"),
         (lambda t: replace(t, y_m_s=0.7 * t.pgv_m_s), "exactly on a line"),
         (lambda t: replace(t, y_m_s=2.0 - t.y_m_s), "does not rise"),
@@ -242,7 +237,7 @@ def test_earthquakes_of_a_single_point_do_not_break_the_resamples(draw):
     table = draw(events=4, motions=1)
     chosen = np.flatnonzero(table.event_id == "event-0").tolist()
     chosen += [int(np.flatnonzero(table.event_id == f"event-{i}")[0]) for i in (1, 2, 3)]
-    report = fit(rows_of(table, np.array(chosen)), term="pgv", method="wls")
+    report = fit(table.only(np.array(chosen)), term="pgv", method="wls")
     assert report.events == 4
     assert np.all(np.isfinite(report.model.row.covariance))
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from rbfrag.db.engine import opened_database
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit import critical
 from rbfrag.fragility.fit.critical import censored_rows, most_likely
-from rbfrag.fragility.fit.data import fit_data
+from rbfrag.fragility.fit.data import FitSource, fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
@@ -44,10 +45,17 @@ def test_a_fit_finds_the_parameters_that_made_the_data(kind: str, term: str) -> 
         assert key in report.as_dict()
 
 
+def with_magnitude(source: FitSource, magnitude: NDArray[np.float64]) -> FitSource:
+    """Return a source with other magnitudes."""
+    measures = {**source.table.measures, "magnitude": magnitude}
+    return replace(source, table=replace(source.table, measures=measures))
+
+
 def test_rows_without_magnitude_are_left_out_and_told() -> None:
     source = drawn("sliding", "pgv_pga_m", n=2000)
-    magnitude = np.where(source.table.event_id == "event-03", np.nan, source.table.magnitude)
-    lacking = replace(source, table=replace(source.table, magnitude=magnitude))
+    magnitude = source.table.measure("magnitude").copy()
+    magnitude[source.table.event_id == "event-03"] = np.nan
+    lacking = with_magnitude(source, magnitude)
     ky = source.k_over_pga[:, 0] * source.table.pga_g
     without = int((np.isnan(magnitude) & (ky >= 0.02) & (ky <= 1.0)).sum())
     assert without > 20
@@ -108,9 +116,9 @@ def test_undecided_outcomes_and_those_of_a_search_are_left_out() -> None:
 
 def test_rows_without_magnitude_are_left_out_of_forms_with_it() -> None:
     source = drawn("slumping", "pgv_pga_m", n=400)
-    magnitude = source.table.magnitude.copy()
+    magnitude = source.table.measure("magnitude").copy()
     magnitude[::2] = np.nan
-    unknown = replace(source, table=replace(source.table, magnitude=magnitude))
+    unknown = with_magnitude(source, magnitude)
     chosen = source.only(np.arange(1, 400, 2))
     of_m = fit(unknown, kind="slumping", term="pgv_pga_m").coefficients
     assert of_m == fit(chosen, kind="slumping", term="pgv_pga_m").coefficients
