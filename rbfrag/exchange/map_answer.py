@@ -209,8 +209,7 @@ def shakemap(
         kind=kind, **read, **answering,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
-    if chosen.form.advice:
-        warnings.append(Diagnostic(chosen.form.advice, "model_choice"))
+    warnings += chosen.notes
     if "pgv_m_s" not in measures:
         names = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
         text = f"the map has no PGV, the best predictor: a model of {names} is used"

@@ -159,7 +159,7 @@ class FragilityModel:
                 "of another size: fit it again"
             )
         term = TERMS[row.term]
-        notes = (Diagnostic(form.advice, "weak_predictors"),) if form.advice else ()
+        notes = (Diagnostic(form.advice, "model_choice"),) if form.advice else ()
         if row.diagnostics.get("recorded_events") == 0:
             notes = (*notes, SYNTHETIC)
         return cls(

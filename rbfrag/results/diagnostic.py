@@ -124,7 +124,6 @@ CODES: Mapping[str, tuple[str, str]] = {
     "upper_bound": (WARNING, "the yield acceleration is an upper bound"),
     "vertical_jump": (WARNING, "the vertical motion throws the block off its base"),
     "water_not_given": (NOTE, "rows without water in a table that gives it elsewhere"),
-    "weak_predictors": (NOTE, "another intensity measure or magnitude would predict better"),
     "years_of_events": (WARNING, "event years do not agree with the investigation time"),
 }
 """Severity and meaning of each code."""

@@ -124,10 +124,9 @@ def test_the_questions_cover_the_warnings() -> None:
         "after_first_slip", "back_friction_neglected", "by_mechanics", "check_unit",
         "cohesion_without_effect", "cross_tilt_neglected", "density_assumed", "drained",
         "extrapolation", "friction_not_given", "heel_tips", "leans_on_back_plane",
-        "no_drained_bound", "no_shaking", "not_backed", "not_symmetric", "rough_back_plane",
-        "single_component", "single_gmm", "suspicious_value",
+        "model_choice", "no_drained_bound", "no_shaking", "not_backed", "not_symmetric",
+        "rough_back_plane", "single_component", "single_gmm", "suspicious_value",
         "toe_slips", "undrained", "unstable_at_rest", "unused_input", "unused_measures",
-        "weak_predictors",
     }  # fmt: skip
 
 
