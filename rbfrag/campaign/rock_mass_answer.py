@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Unpack
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.campaign.shake_rockmass import shake
@@ -19,6 +20,7 @@ from rbfrag.fragility.model import Model
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.readers import MotionLike, as_motion
 from rbfrag.question.fields import MeasureFields
+from rbfrag.results.diagnostic import codes_by_row
 from rbfrag.results.numbers import interval, percent, rounded, with_interval
 from rbfrag.results.result import Result, TextLine, TextTable
 from rbfrag.rockmasses.counts import crossings, mode_counts
@@ -152,10 +154,15 @@ class RockMassAnswer(Result):
         return {**document, "warnings": list(self.warnings)}
 
     def table_columns(self) -> Mapping[str, NDArray[Any]]:
-        """Return the columns by name."""
+        """Return the columns by name, with the codes of the warnings about each block."""
         if self.outcomes is not None:
-            return outcome_columns(self.outcomes)
-        return block_columns(self.blocks, self.scenario)
+            columns = outcome_columns(self.outcomes)
+        else:
+            columns = block_columns(self.blocks, self.scenario)
+        reason = columns.pop("reason")
+        codes = codes_by_row(self.warnings, self.blocks.n)
+        codes = np.tile(codes, reason.size // max(codes.size, 1))  # a block has a row a scale
+        return {**columns, "warnings": codes, "reason": reason}
 
     def __repr__(self) -> str:
         """Return how many blocks of each mode there are, on one line."""

@@ -119,18 +119,21 @@ def mass_warnings(
     if in_motion and realisations.drained is not None:
         warnings += notes_on_water(realisations)
         modes = (each.stability.mode_code for each in (realisations, realisations.drained))
-        if others := int(np.count_nonzero(np.not_equal(*modes)[realisations.is_block])):
-            warnings.append(Diagnostic(OTHER_MODE_DRAINED.format(count=others), "other_mode"))
-    topples = realisations.of_mode("topple") & (realisations.cohesion_pa > 0.0)
-    if bonded := int(np.count_nonzero(topples)):
-        warnings.append(with_prefix(f"{bonded} toppling blocks: ", NO_EFFECT_OF_COHESION))
-    lifts = int(np.count_nonzero(realisations.is_block & realisations.stability.toe_lifts))
-    if lifts:
+        others = np.flatnonzero(np.not_equal(*modes) & realisations.is_block)
+        if others.size:
+            text = OTHER_MODE_DRAINED.format(count=others.size)
+            warnings.append(Diagnostic(text, "other_mode", rows=others))
+    bonded = np.flatnonzero(realisations.of_mode("topple") & (realisations.cohesion_pa > 0.0))
+    if bonded.size:
+        note = with_prefix(f"{bonded.size} toppling blocks: ", NO_EFFECT_OF_COHESION)
+        warnings.append(note.replaced(rows=bonded))
+    lifts = np.flatnonzero(realisations.is_block & realisations.stability.toe_lifts)
+    if lifts.size:
         text = (
-            f"{lifts} confined topples: the bond of the base is so strong that the toe lifts off "
-            "before it slides: their yields are upper bounds"
+            f"{lifts.size} confined topples: the bond of the base is so strong that the toe lifts "
+            "off before it slides: their yields are upper bounds"
         )
-        warnings.append(Diagnostic(text, "upper_bound"))
+        warnings.append(Diagnostic(text, "upper_bound", rows=lifts))
     bad = realisations.n - realisations.n_blocks
     if bad > NEAR_LIMIT * realisations.n:
         text = (
@@ -138,7 +141,8 @@ def mass_warnings(
             f"fractions: {realisations.why_impossible}: a lognormal or a truncated distribution "
             "may describe the measurements better"
         )
-        warnings.insert(0, Diagnostic(text, "rejected_realisations"))
+        rows = np.flatnonzero(~realisations.is_block)
+        warnings.insert(0, Diagnostic(text, "rejected_realisations", rows=rows))
     return [*warnings, *realisations.rock_mass.remarks]
 
 
