@@ -122,7 +122,7 @@ def test_two_columns_as_people_write_them(
         ("pgv_m_s,return_period\n0.1,0\n", "line 2: the return period 0 years"),
         ("pgv_m_s,annual_rate,x\n", "line 1: 3 columns, not two"),
         (OPENQUAKE.replace("imt='PGV'", "imt='CAV'"), "line 1: intensity measure 'CAV'"),
-        ("pgd_m,annual_rate\n0.1,0.01\n", r"'pgd_m' is unknown.*PGV, SA\(1\), PGA"),
+        ("pgd_m,annual_rate\n0.1,0.01\n", r"'pgd_m' is unknown: name the columns pga_g"),
         (OPENQUAKE.replace("50.0", "x"), "line 1: 'x' is not a number"),
         (OPENQUAKE.replace("kind='mean', investigation_time=50.0", "investigation_time=-1"),
          "investigation_time = -1"),
