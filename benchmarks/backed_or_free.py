@@ -19,9 +19,7 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 
 import rbfrag
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown
+from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown, parser, report
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion, motion_rows

@@ -9,10 +9,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.page import parser, report
-from rbfrag.bench.cases import choose_combinations, find_records
-from rbfrag.bench.critical_search import search_runs
-from rbfrag.bench.tables import markdown
+from benchmarks.critical_search import choose_combinations, search_runs
+from benchmarks.page import find_records, markdown, parser, report
 from rbfrag.bench.timing import timed
 from rbfrag.solver.excitation import Excitation, Nodes, excitation
 from rbfrag.solver.integrator.compiled import kernel

@@ -18,9 +18,7 @@ import numpy as np
 
 from benchmarks import bulk_insert
 from benchmarks.one_campaign import run_campaign
-from benchmarks.page import parser, report
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown
+from benchmarks.page import RECORDS_VARIABLE, markdown, parser, report
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_to_suite, motion_rows

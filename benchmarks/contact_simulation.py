@@ -17,9 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown
+from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown, parser, report
 from rbfrag.motions.readers import read_motions
 from rbfrag.plots.canvas import (
     MODE_COLOURS,

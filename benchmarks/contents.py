@@ -9,8 +9,7 @@ from typing import NamedTuple
 from scipy.optimize import brentq
 
 import rbfrag
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, report
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 PAGE = ROOT / "docs" / "evidence" / "contents.md"

@@ -22,8 +22,7 @@ from scipy.special import ndtri, stdtrit
 from benchmarks.joint_failures import MODELS, Study
 from benchmarks.joint_failures import PAGE as RANGES_PAGE
 from benchmarks.model_acceptance import Mark, acceptance_table
-from benchmarks.page import ROOT, parser, write_table
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit.clusters import cr3, event_derivatives, jackknife_steps

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.page import parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown, parser, report
 from tests.exchange.openquake_job import ABOUT, write_csv
 
 BLOCKS = 1000

@@ -20,9 +20,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown
+from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown, parser, report
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.readers import read_motions
 from rbfrag.plots.canvas import BLUE, ROCK, light_grid, new_figure, save_figure

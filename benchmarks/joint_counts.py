@@ -17,8 +17,7 @@ from unittest.mock import patch
 import numpy as np
 from scipy.special import ndtr
 
-from benchmarks.page import parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.large_counts import LargeCounts

@@ -18,8 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import betabinom
 
-from benchmarks.page import ROOT, parser, write_table
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.dependence import Dependence

@@ -14,9 +14,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown, seconds
+from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown, parser, report
+from rbfrag.bench.timing import seconds
 from rbfrag.motions.sample_motions import sample_folder
 
 FOLDERS = ("peer_at2_opensees", "nga_at2_misc", "slammer_csv", "geonet_v2a")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from benchmarks.held_out import STEP, folds
 from benchmarks.model_acceptance import Mark, acceptance_table
-from benchmarks.page import ROOT, parser, write_table
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, write_table
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps

@@ -13,9 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.page import parser, report
-from rbfrag.bench.cases import find_records
-from rbfrag.bench.tables import markdown
+from benchmarks.page import find_records, markdown, parser, report
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism

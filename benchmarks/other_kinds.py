@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from benchmarks.other_kinds_figure import plot_other_kinds
-from benchmarks.page import ROOT, write_table
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, write_table
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, read_models

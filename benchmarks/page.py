@@ -1,4 +1,4 @@
-"""The measured tables of the documentation, each by one script.
+"""Records of the benchmarks, and the measured tables of the documentation, each by one script.
 
 A page shows the few that a reader needs, each between two marks; the others are kept in
 benchmarks/results, in a folder by the name of the page.
@@ -7,10 +7,19 @@ benchmarks/results, in a folder by the name of the page.
 from __future__ import annotations
 
 import argparse
+import os
 import re
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
+
+from rbfrag.bench import cases
 from rbfrag.campaign.machine import machine
+
+RECORDS_VARIABLE = "RBFRAG_TEST_RECORDS"
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "evidence" / "performance.md"
@@ -22,11 +31,29 @@ def parser(description: str | None) -> argparse.ArgumentParser:
     """Return a parser with what every script understands."""
     made = argparse.ArgumentParser(description=description)
     made.add_argument(
-        "--records", help="file or folder of accelerograms (default: as rbfrag bench)"
+        "--records",
+        help=f"accelerogram file or folder (default: {RECORDS_VARIABLE}, else as rbfrag bench)",
     )
     made.add_argument("--out", type=Path, help="folder for CSV files")
     made.add_argument("--write", action="store_true", help="keep the table, in docs or results")
     return made
+
+
+def find_records(path: str | os.PathLike[str] | None = None) -> cases.Records:
+    """Return the motions of a file or folder, else of RBFRAG_TEST_RECORDS, else of rbfrag bench."""
+    return cases.find_records(path or os.environ.get(RECORDS_VARIABLE) or None)
+
+
+def markdown(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> str:
+    """Return headers and cells as a Markdown table."""
+    headers, cells = table
+    lines = [headers, ["---"] * len(headers), *cells]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def write_csv(rows: Sequence[Any], path: Path) -> None:
+    """Write rows (dataclasses) as CSV, one column per field."""
+    pd.DataFrame(rows, dtype=object).to_csv(path, index=False)
 
 
 def report(name: str, text: str, *, write: bool, page: Path | None = None) -> None:
@@ -54,6 +81,10 @@ def write_table(page: Path, name: str, text: str) -> None:
 def machine_sentence() -> str:
     """Return processor, cores, load and versions in one sentence."""
     about = machine()
+    try:
+        about["scikit-sundae"] = version("scikit-sundae")
+    except PackageNotFoundError:
+        about["scikit-sundae"] = None
     versions = ", ".join(
         f"{name} {about[name]}"
         for name in ("python", "numpy", "numba", "scipy", "scikit-sundae")

@@ -15,8 +15,7 @@ from statistics import median
 import numpy as np
 from scipy.special import ndtr
 
-from benchmarks.page import parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.lookup import suited_models
 from rbfrag.question.question import predict
 

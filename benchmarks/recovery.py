@@ -13,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.page import parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, left_out
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise, most_likely

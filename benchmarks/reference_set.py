@@ -28,9 +28,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, delete, func, select
 
 from benchmarks.database_content import content_digest
-from benchmarks.page import ROOT
-from rbfrag.bench.cases import RECORDS_VARIABLE
-from rbfrag.bench.tables import markdown
+from benchmarks.page import RECORDS_VARIABLE, ROOT, markdown
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema

@@ -17,8 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.page import parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import markdown, parser, report
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.curve import HazardCurve, hazard_curve

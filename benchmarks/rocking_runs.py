@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import Records, find_records
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, find_records, markdown, parser, report
+from rbfrag.bench.cases import Records
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation

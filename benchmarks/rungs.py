@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.held_out import outcomes
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.tables import markdown, seconds
+from benchmarks.page import ROOT, markdown, parser, report
+from rbfrag.bench.timing import seconds
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.motions import motion_rows

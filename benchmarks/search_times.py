@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.page import parser, report
-from rbfrag.bench.cases import find_records
+from benchmarks.page import find_records, parser, report
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import kept_excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES, SEARCH_LIMIT, Polarity

@@ -19,9 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
+from benchmarks.page import ROOT, markdown, parser, report
 from benchmarks.running_service import Running, running_service
-from rbfrag.bench.tables import markdown
 from rbfrag.service.work import EXAMPLE as RECORD
 
 PAGE = ROOT / "docs" / "howto" / "service.md"

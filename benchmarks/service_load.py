@@ -20,9 +20,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
-from benchmarks.page import parser, report
+from benchmarks.page import markdown, parser, report
 from benchmarks.running_service import free_port, running_program, running_service
-from rbfrag.bench.tables import markdown
 
 QUERY = "?p2=3&kr=0.1&pgv=0.6"
 

@@ -20,7 +20,7 @@ from scipy.stats import t as student
 
 import rbfrag
 from benchmarks.model_choice import clustered_mean, log_losses
-from benchmarks.page import ROOT, write_table
+from benchmarks.page import ROOT, markdown, write_table
 from benchmarks.shake_table_runs import (
     ALPHA_RAD,
     P2,
@@ -32,7 +32,6 @@ from benchmarks.shake_table_runs import (
     overturned,
     read,
 )
-from rbfrag.bench.tables import markdown
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow, held_out_loss
 from rbfrag.fragility.fit.likelihood import Binomial, most_likely

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from benchmarks.page import markdown
 from benchmarks.published_slides import KY_G, PUBLISHED, Published
-from rbfrag.bench.tables import markdown
 from rbfrag.fragility.fit.clusters import left_out
 from rbfrag.fragility.fit.critical import most_likely
 from rbfrag.fragility.fit.data import KR, LEAST_DISPLACEMENT_M, FitSource

@@ -19,9 +19,8 @@ from benchmarks.model_choice import (
     measures_cell,
     predicted,
 )
-from benchmarks.page import write_table
+from benchmarks.page import markdown, write_table
 from benchmarks.slide_comparison import comparison
-from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.fragility.fit.data import read_source
 from rbfrag.fragility.methods import method_named

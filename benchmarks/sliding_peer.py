@@ -15,9 +15,7 @@ from importlib import import_module
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import find_records
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, find_records, markdown, parser, report
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.respond import respond
 

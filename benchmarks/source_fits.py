@@ -17,8 +17,7 @@ from scipy.optimize import nnls
 
 from benchmarks.held_out import outcomes
 from benchmarks.model_choice import log_losses
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, report
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.rows import CombinationTable

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.claims.claim import IntArray, cluster_interval
-from benchmarks.page import ROOT, parser, report
+from benchmarks.page import ROOT, markdown, parser, report
 from benchmarks.reference_agreement import agreement_with_reference
-from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import combination_table

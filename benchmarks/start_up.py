@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from statistics import median
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.tables import markdown, seconds
+from benchmarks.page import ROOT, markdown, parser, report
+from rbfrag.bench.timing import seconds
 
 PULSE = "from rbfrag.motions.pulses import reversal_pulse; m = reversal_pulse(0.4, 0.5, 1.0, 0.005)"
 RESPOND = f"from rbfrag.solver.toppling_run import respond; {PULSE}; respond(m, p2=3, kr=0.1)"

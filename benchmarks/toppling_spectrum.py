@@ -8,9 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.cases import Records, find_records
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, find_records, markdown, parser, report
+from rbfrag.bench.cases import Records
 from rbfrag.bench.timing import spread, timed
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum

@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.hard_cases._records import SHAPES
-from benchmarks.page import ROOT, report
-from rbfrag.bench.cases import find_records
+from benchmarks.page import ROOT, find_records, report
 from rbfrag.fragility.fit.data import NARROW
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES

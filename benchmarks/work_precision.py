@@ -2,27 +2,53 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
+from functools import partial
 
-from benchmarks.page import FIGURE, parser, report
-from rbfrag.bench import tables
-from rbfrag.bench.cases import choose_cases, find_records
-from rbfrag.bench.methods import (
-    methods,
-    missing_peers,
-    rocking_methods,
-    rocking_reference_run,
+from benchmarks.cvode import CVODE_INSTALL, cvode_is_installed, cvode_run
+from benchmarks.page import FIGURE, find_records, markdown, parser, report, write_csv
+from benchmarks.reference import reference
+from benchmarks.rocking_peer import rocking_methods, rocking_reference
+from benchmarks.work_precision_figure import plot_work_precision
+from rbfrag.bench.cases import choose_cases
+from rbfrag.bench.work_precision import (
+    BenchMethod,
+    general_methods,
+    measure,
+    taylor_run,
+    work_precision_table,
 )
-from rbfrag.bench.work_precision import measure
-from rbfrag.plots.work_precision import plot_work_precision
+from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+
+UNSPLIT = math.inf
+
+
+def methods() -> tuple[BenchMethod, ...]:
+    """Return every available method."""
+    settings = tuple(
+        BenchMethod(
+            "rbfrag, unsplit" if ph_max == UNSPLIT else f"rbfrag, p·h ≤ {ph_max:g}",
+            f"order {order}",
+            partial(taylor_run, order=order, ph_max=ph_max),
+            of_use=(order, ph_max) == (ORDER, PH_MAX),
+        )
+        for ph_max in (UNSPLIT, PH_MAX, PH_MAX / 3.0)
+        for order in (4, 5, 6, ORDER)
+    )
+    tolerances = (1e-6, 1e-8, 1e-10) if cvode_is_installed() else ()
+    cvode = tuple(
+        BenchMethod("CVODE in Python", f"rtol {rtol:.0e}", partial(cvode_run, rtol=rtol))
+        for rtol in tolerances
+    )
+    return (*settings, *general_methods(), *cvode)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--cases", type=int, default=24)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--quick", action="store_true", help="leave out the slowest settings")
     options.add_argument("--only", nargs="+", help="methods whose name holds one of these words")
     chosen = options.parse_args(arguments)
     records = find_records(chosen.records)
@@ -31,26 +57,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
         cases,
         [
             method
-            for method in methods(quick=chosen.quick)
-            if method.of_use or not chosen.only or any(w in method.name for w in chosen.only)
+            for method in methods()
+            if method.of_use
+            or not chosen.only
+            or any(word in f"{method.family}, {method.setting}" for word in chosen.only)
         ],
+        judge=reference,
         seed=chosen.seed,
-        on_case=lambda done, total: print(f"{done}/{total}", file=sys.stderr),
+        on_case=lambda number, total: print(f"{number}/{total}", file=sys.stderr),
     )
-    for name in missing_peers():
-        print(f"not installed: {name}", file=sys.stderr)
-    rocking = measure(
-        cases, rocking_methods(quick=chosen.quick), judge=rocking_reference_run, seed=chosen.seed
-    )
+    if not cvode_is_installed():
+        print(f"not installed: {CVODE_INSTALL}", file=sys.stderr)
+    rocking = measure(cases, rocking_methods(), judge=rocking_reference, seed=chosen.seed)
     if chosen.out is not None:
-        tables.write_csv(rocking, chosen.out / "work-precision-rocking.csv")
-        tables.write_csv(rows, chosen.out / "work-precision.csv")
+        write_csv(rocking, chosen.out / "work-precision-rocking.csv")
+        write_csv(rows, chosen.out / "work-precision.csv")
         plot_work_precision(rows, chosen.out / "work-precision.png")
     if chosen.write:
         plot_work_precision(rows, FIGURE)
     about = f"{len(cases)} runs under {records.source}, seed {chosen.seed}."
     for name, measured in (("work-precision", rows), ("work-precision-rocking", rocking)):
-        table = tables.markdown(tables.work_precision_table(measured))
+        table = markdown(work_precision_table(measured))
         report(name, f"{table}\n\n{about}", write=chosen.write)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.bench.cases import RECORDS_VARIABLE
+from benchmarks.page import RECORDS_VARIABLE
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata

@@ -16,9 +16,8 @@ from benchmarks.claims.records import (
     variance_linear,
 )
 from benchmarks.claims.vertical import vertical_is_irrelevant
-from benchmarks.page import ROOT, parser, report
+from benchmarks.page import ROOT, markdown, parser, report
 from benchmarks.reference_agreement import agreement_with_reference
-from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import motion_rows, suite_names
 from rbfrag.db.queries import combination_table

@@ -17,8 +17,7 @@ from sqlalchemy import text
 
 from benchmarks.claims.claim import FloatArray, cluster_interval
 from benchmarks.claims.records import Points, line, motion_set
-from benchmarks.page import ROOT, parser, report
-from rbfrag.bench.tables import markdown
+from benchmarks.page import ROOT, markdown, parser, report
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.queries import combination_table

@@ -19,7 +19,7 @@ from benchmarks.extended.toppling import truth
 from benchmarks.hard_cases import Row
 from benchmarks.hard_cases._records import made_up, vertical_of
 from benchmarks.hard_cases._rocking_block import topple
-from rbfrag.bench.cases import RECORDS_VARIABLE
+from benchmarks.page import RECORDS_VARIABLE
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical_result import CriticalResult
 from rbfrag.solver.excitation import Excitation, excitation

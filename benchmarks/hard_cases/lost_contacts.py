@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from benchmarks.hard_cases import Row
-from rbfrag.bench.cases import find_records
+from benchmarks.page import find_records
 from rbfrag.motions.ground_motion import GroundMotion
 from tests.physics.lost_contacts import SORTS, LostContact, lost_contacts
 

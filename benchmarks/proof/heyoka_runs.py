@@ -15,11 +15,10 @@ from typing import Any
 import heyoka
 import numpy as np
 
-from benchmarks.page import parser, report
+from benchmarks.page import find_records, markdown, parser, report
 from benchmarks.proof import PAGE
 from benchmarks.proof.enclosed_run import STABLE, TOPPLED, enclose, least_later_q
-from rbfrag.bench.cases import BenchCase, choose_cases, find_records
-from rbfrag.bench.tables import markdown
+from rbfrag.bench.cases import BenchCase, choose_cases
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.toppling_run import respond
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from benchmarks.page import markdown
 from benchmarks.proof.brackets import Row
 from benchmarks.proof.enclosed_run import NOT_ENCLOSED
-from rbfrag.bench.tables import markdown
 
 
 def by_size(rows: Sequence[Row]) -> str:

@@ -1,4 +1,4 @@
-"""What every method is run on: recorded motions, and a seeded choice of blocks."""
+"""Benchmark cases: recorded motions, and a seeded random choice of blocks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,13 @@ from rbfrag.motions.sample_motions import sample_folder
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES, Polarity
 
-RECORDS_VARIABLE = "RBFRAG_TEST_RECORDS"
-
 STRENGTHS = (0.03, 0.95)
 """Range of k_r/PGA that blocks are drawn from, evenly in the logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Motions to measure on, and a sentence that says where they come from."""
+    """Motions to measure on, and a sentence on their origin."""
 
     motions: tuple[GroundMotion, ...]
     source: str
@@ -32,7 +30,7 @@ class Records:
 
 @dataclass(frozen=True, eq=False)
 class BenchCase:
-    """One block under one motion; no vertical, equally spaced samples."""
+    """One block under one motion; no vertical motion, equally spaced samples."""
 
     motion: GroundMotion
     polarity: Polarity
@@ -41,36 +39,34 @@ class BenchCase:
     kr: float
 
 
-def find_records(folder: str | os.PathLike[str] | None = None) -> Records:
+def find_records(path: str | os.PathLike[str] | None = None) -> Records:
     """Return the horizontal motions to measure on.
 
     Args:
-        folder: folder (or file) of accelerograms. None for the folder that the environment
-            variable RBFRAG_TEST_RECORDS names, else the sample records of
-            rbfrag[samples], else analytic pulses.
+        path: accelerogram file or folder; None for the sample records of rbfrag[samples], or
+            analytic pulses where these are not installed.
     """
-    if folder is None and not os.environ.get(RECORDS_VARIABLE):
-        samples = sample_folder()
-        if samples is None:
-            pulses = tuple(
-                reversal_pulse(0.4, ratio, period_s, 0.005)
-                for period_s in (0.2, 0.5, 1.0, 2.0)
-                for ratio in (0.35, 0.65, 1.0)
-            )
-            return Records(pulses, f"{len(pulses)} analytic pulses (no records are installed)")
+    if path is not None:
+        if not Path(path).exists():
+            raise InputError(f"no folder {path}: give a folder with records", fields=("records",))
+        motions = _read(Path(path))
+        if not motions:
+            raise InputError(f"no horizontal accelerogram in {path}: give another folder")
+        return Records(motions, f"{len(motions)} horizontal records")
+    samples = sample_folder()
+    if samples is not None:
         motions = _read(samples)
         return Records(motions, f"{len(motions)} sample records of rbfrag[samples]")
-    root = Path(folder if folder is not None else os.environ[RECORDS_VARIABLE])
-    if not root.exists():
-        raise InputError(f"no folder {root}: give a folder with records", fields=("records",))
-    motions = _read(root)
-    if not motions:
-        raise InputError(f"no horizontal accelerogram in {root}: give another folder")
-    return Records(motions, f"{len(motions)} horizontal records")
+    pulses = tuple(
+        reversal_pulse(0.4, ratio, period_s, 0.005)
+        for period_s in (0.2, 0.5, 1.0, 2.0)
+        for ratio in (0.35, 0.65, 1.0)
+    )
+    return Records(pulses, f"{len(pulses)} analytic pulses (no records are installed)")
 
 
 def _read(root: Path) -> tuple[GroundMotion, ...]:
-    """Read what can be read, each accelerogram once, in an order that never changes."""
+    """Read all readable files, each accelerogram once, in an order that never changes."""
     files = sorted(p for p in root.rglob("*") if p.is_file()) if root.is_dir() else [root]
     by_samples: dict[str, GroundMotion] = {}
     for file in files:
@@ -79,8 +75,8 @@ def _read(root: Path) -> tuple[GroundMotion, ...]:
         except (MotionFileError, InputError):
             continue  # manifests, read-mes and formats without a reader lie beside the records
         for motion in motions:
-            usable = motion.is_vertical is not True and motion.npts > 1
-            if usable and motion.node_time_s is None and motion.acceleration_g.any():
+            is_valid = motion.is_vertical is not True and motion.npts > 1
+            if is_valid and motion.node_time_s is None and motion.acceleration_g.any():
                 by_samples.setdefault(motion.sha256, motion)
     return tuple(by_samples.values())
 
@@ -89,7 +85,8 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Bench
     """Draw blocks that lift off: motions in turn, polarity, p² and k_r/PGA at random.
 
     Args:
-        records: where the motions come from.
+        records: motions to draw from.
+        number: number of cases.
         seed: the same seed draws the same cases.
     """
     rng = np.random.default_rng(seed)
@@ -109,19 +106,3 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Bench
     if not cases:
         raise InputError("no drawn block lifts off under these records: give other records")
     return tuple(cases)
-
-
-def choose_combinations(
-    records: Records, number: int, *, seed: int = 1
-) -> tuple[tuple[GroundMotion, Polarity, float], ...]:
-    """Draw (motion, polarity, p²) for critical searches; p² in turn, no motion twice in a row."""
-    rng = np.random.default_rng(seed)
-    order = rng.permutation(len(records.motions))
-    return tuple(
-        (
-            records.motions[order[i % order.size]],
-            POLARITIES[int(rng.integers(2))],
-            float(DEFAULT_P2[i % len(DEFAULT_P2)]),
-        )
-        for i in range(number)
-    )

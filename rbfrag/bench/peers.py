@@ -1,20 +1,16 @@
-"""The methods that rbfrag's kernel is compared with: forward Euler, scipy's solve_ivp, CVODE.
+"""Methods compared with rbfrag's kernel: forward Euler, and the solvers of scipy's solve_ivp.
 
 A general ODE solver is started at a lift-off and stopped at the impact (theta falls through zero)
 or where toppling is inevitable; the peak (theta' falls through zero) is recorded on the way.
-Rest between excursions is skipped by arithmetic, the motion after the record is decided in
-closed form: solvers are asked for nothing that rbfrag's own kernel does not do either.
-SUNDIALS CVODE, with Python callbacks, is the dissertation's method; scikit-sundae comes with the
-extra `bench` alone and is used where it is installed.
+Rest between excursions is skipped by arithmetic, the motion after the record is determined in
+closed form: solvers do not have to do anything that rbfrag's kernel does not do either.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable
-from importlib.util import find_spec
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -22,6 +18,7 @@ from rbfrag.bench.cases import BenchCase
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.results import FloatArray
 
+Real = float | np.longdouble
 Solver = Literal["RK45", "DOP853", "LSODA"]
 
 STABLE, TOPPLED = "stable", "toppled"
@@ -29,45 +26,32 @@ STABLE, TOPPLED = "stable", "toppled"
 MOST_EXCURSIONS = 100_000
 
 GRACE = 1e-3
-"""Part of an interval after a start in which no impact is looked for: theta is zero there."""
+"""Part of an interval after a start without search for an impact: theta is zero there."""
 
 ATOL_PARTS = 1e-3
 """Absolute tolerance over (relative tolerance x critical angle)."""
 
-CVODE_PACKAGE = "sksundae"
-CVODE_INSTALL = "scikit-sundae"
-
-MOST_STEPS = 1_000_000
-"""Of CVODE in one excursion."""
-
 
 class PeerAnswer(NamedTuple):
-    """Outcome and peak rotation [rad]; the peak is NaN unless the block stays."""
+    """Outcome and peak rotation [rad]; the peak is NaN unless the block remains stable."""
 
     outcome: str
     peak_rad: float
 
 
-def free_motion(
-    theta: float | np.longdouble,
-    rate: float | np.longdouble,
-    p: float | np.longdouble,
-    theta_c: float | np.longdouble,
-    peak: float | np.longdouble,
-) -> PeerAnswer:
-    """Decide by energy what becomes of a moving block once the ground is at rest.
+def free_motion(theta: Real, rate: Real, p: Real, theta_c: Real, peak: Real) -> PeerAnswer:
+    """Determine by energy the outcome of a moving block after the end of the ground motion.
 
     Args:
         theta: rotation at the end of the record [rad].
         rate: rotation rate [rad/s].
         p: frequency parameter [1/s].
         theta_c: critical angle [rad].
-        peak: greatest rotation so far [rad].
+        peak: maximum rotation so far [rad].
     """
     x, v = theta_c - theta, rate / p
     half = 2 * np.sin(np.abs(x) / 2)
-    topples = v > half if x > 0 else v > -half
-    if topples:
+    if v > half if x > 0 else v > -half:
         return PeerAnswer(TOPPLED, math.nan)
     if v > 0:
         top = theta_c - 2 * np.arcsin(np.sqrt((half - v) * (half + v)) / 2)
@@ -76,7 +60,7 @@ def free_motion(
 
 
 def euler(case: BenchCase, parts: int) -> PeerAnswer:
-    """Run one case with `parts` Euler steps per sample interval."""
+    """Run one case with `parts` Euler steps per sampling interval."""
     excited = case.excitation
     p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
     border = math.atan(min(float(excited.q.min()), 0.0))
@@ -118,7 +102,7 @@ def _march(
 
 
 class PeerExcursion(NamedTuple):
-    """How one excursion ended: at time [s], with (theta, theta'), peaks on the way."""
+    """End of one excursion: time [s], (theta, theta') and peaks on the way."""
 
     ended: str
     time_s: float
@@ -128,7 +112,7 @@ class PeerExcursion(NamedTuple):
 
 
 class PeerProblem:
-    """One case as scalar Python functions, made as cheap as Python allows."""
+    """One case as scalar Python functions, optimised for speed."""
 
     def __init__(self, case: BenchCase) -> None:
         self.k: list[float] = case.excitation.k_h.tolist()
@@ -155,7 +139,7 @@ class PeerProblem:
         self.acceleration: Callable[[float, float], float] = acceleration
 
     def next_lift(self, t: float) -> float | None:
-        """First time from t [s] on at which the threshold is exceeded."""
+        """Return the first time from t [s] on at which the threshold is exceeded."""
         i = min(int(t / self.dt), len(self.k) - 2)
         now = self.k[i] + (self.k[i + 1] - self.k[i]) * (t / self.dt - i)
         if now > self.kr:
@@ -171,35 +155,35 @@ class PeerProblem:
 def run_through(
     case: BenchCase, excursion: Callable[[PeerProblem, float], PeerExcursion]
 ) -> PeerAnswer:
-    """Run a case, one excursion after the other."""
+    """Run a case, excursion by excursion."""
     problem = PeerProblem(case)
     t: float | None = problem.next_lift(0.0)
     peak = 0.0
     for _ in range(MOST_EXCURSIONS):
         if t is None or t >= problem.end_s:
             return PeerAnswer(STABLE, peak)
-        done = excursion(problem, t)
-        peak = max(peak, *done.peaks, 0.0)
-        if done.ended == "toppled":
+        result = excursion(problem, t)
+        peak = max(peak, *result.peaks, 0.0)
+        if result.ended == "toppled":
             return PeerAnswer(TOPPLED, math.nan)
-        if done.ended == "record":
-            if done.theta <= 0.0 and done.rate <= 0.0:
+        if result.ended == "record":
+            if result.theta <= 0.0 and result.rate <= 0.0:
                 return PeerAnswer(STABLE, peak)
-            return free_motion(done.theta, done.rate, problem.p, problem.theta_c, peak)
-        if done.ended == "failed":
+            return free_motion(result.theta, result.rate, problem.p, problem.theta_c, peak)
+        if result.ended == "failed":
             return PeerAnswer("failed", math.nan)
         # an impact found where it started would be found again for ever
-        t = problem.next_lift(max(done.time_s, t + GRACE * problem.dt))
+        t = problem.next_lift(max(result.time_s, t + GRACE * problem.dt))
     return PeerAnswer("failed", math.nan)
 
 
-def solve_ivp_run(case: BenchCase, solver: Solver, rtol: float) -> PeerAnswer:
-    """Run one case by a method of scipy."""
+def scipy_run(case: BenchCase, solver: Solver, rtol: float) -> PeerAnswer:
+    """Run one case with a method of scipy."""
     return run_through(case, lambda problem, t: _scipy_excursion(problem, t, solver, rtol))
 
 
 class _Event:
-    """An event function with the attributes that scipy reads."""
+    """An event function with the attributes required by scipy."""
 
     def __init__(self, problem: PeerProblem, start: float, kind: str) -> None:
         self.kind, self.border = kind, problem.border
@@ -225,14 +209,9 @@ def _scipy_excursion(
     events = [_Event(problem, start, kind) for kind in ("impact", "toppled", "peak")]
     try:
         solution = solve_ivp(
-            lambda t, y: (y[1], acceleration(t, y[0])),
-            (start, problem.end_s),
-            (0.0, 0.0),
-            method=solver,
-            rtol=rtol,
-            atol=[absolute, absolute * problem.p],
-            events=events,
-        )
+            lambda t, y: (y[1], acceleration(t, y[0])), (start, problem.end_s), (0.0, 0.0),
+            method=solver, rtol=rtol, atol=[absolute, absolute * problem.p], events=events,
+        )  # fmt: skip
     except ValueError:  # its interpolant and its step disagree about the sign of an event
         return PeerExcursion("failed", start, 0.0, 0.0, ())
     if solution.status < 0 or solution.t_events is None or solution.y_events is None:
@@ -240,63 +219,6 @@ def _scipy_excursion(
     ended = "record"
     if solution.status == 1:
         ended = "impact" if len(solution.t_events[0]) else "toppled"
-    return PeerExcursion(
-        ended,
-        float(solution.t[-1]),
-        float(solution.y[0, -1]),
-        float(solution.y[1, -1]),
-        tuple(float(state[0]) for state in solution.y_events[2]),
-    )
-
-
-def cvode_is_installed() -> bool:
-    """Tell whether CVODE can be run here."""
-    return find_spec(CVODE_PACKAGE) is not None
-
-
-def cvode_run(case: BenchCase, rtol: float) -> PeerAnswer:
-    """Run one case."""
-    cvode = importlib.import_module(f"{CVODE_PACKAGE}.cvode").CVODE
-    return run_through(case, lambda problem, t: _cvode_excursion(cvode, problem, t, rtol))
-
-
-def _cvode_excursion(cvode: Any, problem: PeerProblem, start: float, rtol: float) -> PeerExcursion:
-    acceleration, border = problem.acceleration, problem.border
-    grace_s = start + GRACE * problem.dt
-
-    def slope(t: float, y: Any, yp: Any) -> None:
-        theta, rate = y.tolist()
-        yp[0] = rate
-        yp[1] = acceleration(t, theta)
-
-    def events(t: float, y: Any, g: Any) -> None:
-        theta, rate = y.tolist()
-        g[0] = theta if t > grace_s else 1.0
-        g[1] = theta - border
-        g[2] = rate
-
-    events.terminal = [True, True, False]  # type: ignore[attr-defined]
-    events.direction = [-1, 1, -1]  # type: ignore[attr-defined]
-    absolute = ATOL_PARTS * rtol * problem.theta_c
-    solver = cvode(
-        slope, method="Adams", rtol=rtol, atol=[absolute, absolute * problem.p], eventsfn=events,
-        num_events=3, max_num_steps=MOST_STEPS,
-    )  # fmt: skip
-    # A third time asks for output there alone: storing every step would slow CVODE down.
-    end = problem.end_s
-    solution = solver.solve([start, 0.5 * (start + end), end], [0.0, 0.0])
-    if solution.status < 0:
-        return PeerExcursion("failed", start, 0.0, 0.0, ())
-    ended, peaks = "record", []
-    if solution.i_events is not None:
-        for which, state in zip(solution.i_events, solution.y_events, strict=True):
-            if which[2]:
-                peaks.append(float(state[0]))
-            if which[0]:
-                ended = "impact"
-            elif which[1]:
-                ended = "toppled"
-    return PeerExcursion(
-        ended, float(solution.t[-1]), float(solution.y[-1, 0]), float(solution.y[-1, 1]),
-        tuple(peaks),
-    )  # fmt: skip
+    theta, rate = solution.y[:, -1].tolist()
+    peaks = tuple(float(state[0]) for state in solution.y_events[2])
+    return PeerExcursion(ended, float(solution.t[-1]), theta, rate, peaks)

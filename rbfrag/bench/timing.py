@@ -1,4 +1,4 @@
-"""How long something takes: processor time of this thread, repeated where it is short.
+"""Measurement of processor time of this thread, repeated for short work, and its text.
 
 Processor time leaves out the turns that other programs get; on a quiet machine it is the
 time that a user waits.
@@ -25,7 +25,7 @@ LONG_S = 0.02
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
-    """Return what `work` returns, and the seconds of one call.
+    """Return the result of `work`, and the seconds of one call.
 
     Work under 20 ms is repeated: the least of three readings after a first call.
     """
@@ -47,7 +47,7 @@ def timed(work: Callable[[], T]) -> tuple[T, float]:
 def timed_in_turns(
     works: Sequence[Callable[[C], T]], case: C, rng: np.random.Generator
 ) -> tuple[list[T], list[float]]:
-    """Return answers and seconds of several works on one case, run in an order drawn at random."""
+    """Return results and seconds of several works on one case, run in random order."""
     timings: dict[int, tuple[T, float]] = {}
     for i in rng.permutation(len(works)).tolist():
         timings[i] = timed(partial(works[i], case))
@@ -59,3 +59,20 @@ def spread(values: ArrayLike) -> tuple[float, float, float]:
     """Return the median and the 10 % and 90 % quantiles."""
     low, middle, high = np.quantile(np.asarray(values, dtype=float), (0.1, 0.5, 0.9))
     return float(middle), float(low), float(high)
+
+
+def seconds(value: float) -> str:
+    """Format a time with two digits and a suitable unit."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if value >= 0.9995 * size:
+            return f"{_two_digits(value / size)} {unit}"
+    return f"{_two_digits(value / 1e-9)} ns"
+
+
+def ratio(value: float) -> str:
+    """Format a ratio with two digits."""
+    return f"{_two_digits(value)}×"
+
+
+def _two_digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 9.95 else f"{value:.2g}"

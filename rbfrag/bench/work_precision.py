@@ -1,34 +1,53 @@
-"""Time against error: every method on the same cases, in turns, in one process."""
+"""Work-precision comparison: every method on the same cases, alternating, in one process."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rbfrag.bench.cases import BenchCase
-from rbfrag.bench.methods import BenchMethod
-from rbfrag.bench.peers import STABLE, PeerAnswer
-from rbfrag.bench.reference import reference
-from rbfrag.bench.timing import spread, timed_in_turns
+from rbfrag.bench.peers import STABLE, PeerAnswer, Solver, euler, scipy_run
+from rbfrag.bench.timing import ratio, seconds, spread, timed_in_turns
+from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.toppling_run import OUTCOMES, simulate
+
+SOLVERS: tuple[Solver, ...] = ("RK45", "DOP853", "LSODA")
+
+
+@dataclass(frozen=True)
+class BenchMethod:
+    """One method with one setting.
+
+    Args:
+        family: methods of one family are joined by a line in the figure.
+        setting: what distinguishes it within the family.
+        of_use: the setting that users of rbfrag get.
+    """
+
+    family: str
+    setting: str
+    run: Callable[[BenchCase], PeerAnswer]
+    of_use: bool = False
 
 
 @dataclass(frozen=True)
 class WorkPrecision:
-    """What one method did on all cases.
+    """Results of one method on all cases.
 
     Args:
         of_use: the setting that users of rbfrag get.
         wrong: cases whose outcome differs from the reference's.
-        error_median: median relative error of the peak rotation, where the block stays.
-        error_worst: greatest of these errors.
+        error_median: median relative error of the peak rotation, where the block remains stable.
+        error_worst: maximum of these errors.
         time_s: median time of one run [s].
         time_low_s: its 10 % quantile over the cases [s].
         time_high_s: its 90 % quantile [s].
-        slower: median over the cases of its time over that of rbfrag as used.
-        slower_least: least of these ratios.
+        slower: median over the cases of the ratio of its time to that of rbfrag as used.
+        slower_least: minimum of these ratios.
     """
 
     family: str
@@ -45,38 +64,69 @@ class WorkPrecision:
     slower_least: float
 
 
+def taylor_run(case: BenchCase, order: int = ORDER, ph_max: float = PH_MAX) -> PeerAnswer:
+    """Run one case with rbfrag's kernel."""
+    run = simulate(case.excitation, p2=case.p2, kr=case.kr, order=order, ph_max=ph_max)
+    return PeerAnswer(OUTCOMES[run.outcome].value, run.peak_rad)
+
+
+def refined_run(case: BenchCase) -> PeerAnswer:
+    """Run one case with rbfrag's kernel in steps a third as long."""
+    return taylor_run(case, ph_max=PH_MAX / 3.0)
+
+
+def general_methods() -> tuple[BenchMethod, ...]:
+    """Return the compared methods whose packages are installed with rbfrag."""
+    steps = [
+        BenchMethod("forward Euler", step_setting(parts), partial(euler, parts=parts))
+        for parts in (1, 8, 64)
+    ]
+    solvers = [
+        BenchMethod(f"scipy {name}", f"rtol {rtol:.0e}", partial(scipy_run, solver=name, rtol=rtol))
+        for name in SOLVERS
+        for rtol in (1e-4, 1e-6)
+    ]
+    return (*steps, *solvers)
+
+
+def step_setting(parts: int) -> str:
+    """Return the setting of a method with `parts` steps per sampling interval."""
+    return "dt" if parts == 1 else f"dt/{parts}"
+
+
 def measure(
     cases: Sequence[BenchCase],
     methods: Sequence[BenchMethod],
     *,
-    judge: Callable[[BenchCase], PeerAnswer] = reference,
+    judge: Callable[[BenchCase], PeerAnswer] = refined_run,
     seed: int = 1,
     on_case: Callable[[int, int], None] | None = None,
 ) -> tuple[WorkPrecision, ...]:
-    """Run every method on every case and compare with the extended-precision reference.
+    """Run every method on every case and compare with a reference.
 
     Args:
-        methods: with what; one of them `of_use`, to which times are compared.
-        judge: returns what is right; for another kind than toppling.
+        cases: blocks under motions.
+        methods: methods to run; one of them is `of_use`, to which times are compared.
+        judge: returns the answer that errors are measured from.
         seed: of the order in which the methods take turns on each case.
-        on_case: called after each case with (done, total).
+        on_case: called after each case with its number and the number of cases.
     """
     rng = np.random.default_rng(seed)
     for method in methods:
         method.run(cases[0])  # compiles, imports
     truth: list[PeerAnswer] = []
     answers: list[list[PeerAnswer]] = [[] for _ in methods]
-    seconds = np.empty((len(methods), len(cases)))
+    times_s = np.empty((len(methods), len(cases)))
     for j, case in enumerate(cases):
         truth.append(judge(case))
-        of_case, seconds[:, j] = timed_in_turns([method.run for method in methods], case, rng)
+        of_case, times_s[:, j] = timed_in_turns([method.run for method in methods], case, rng)
         for of_method, answer in zip(answers, of_case, strict=True):
             of_method.append(answer)
         if on_case is not None:
             on_case(j + 1, len(cases))
     base = next(i for i, method in enumerate(methods) if method.of_use)
     return tuple(
-        _row(method, truth, answers[i], seconds[i], seconds[base])
+        _row(method, truth, answers[i], times_s[i], times_s[base])
         for i, method in enumerate(methods)
     )
 
@@ -85,28 +135,48 @@ def _row(
     method: BenchMethod,
     truth: Sequence[PeerAnswer],
     answers: Sequence[PeerAnswer],
-    seconds: np.ndarray,
-    base: np.ndarray,
+    times_s: np.ndarray,
+    base_s: np.ndarray,
 ) -> WorkPrecision:
-    wrong = sum(a.outcome != t.outcome for a, t in zip(answers, truth, strict=True))
     errors = [
-        abs(a.peak_rad - t.peak_rad) / t.peak_rad
-        for a, t in zip(answers, truth, strict=True)
-        if a.outcome == t.outcome == STABLE and t.peak_rad > 0.0 and math.isfinite(a.peak_rad)
+        abs(answer.peak_rad - right.peak_rad) / right.peak_rad
+        for answer, right in zip(answers, truth, strict=True)
+        if answer.outcome == right.outcome == STABLE
+        if right.peak_rad > 0.0 and math.isfinite(answer.peak_rad)
     ]
-    middle, low, high = spread(seconds)
-    ratios = seconds / base
+    middle, low, high = spread(times_s)
+    slower = times_s / base_s
     return WorkPrecision(
         family=method.family,
         setting=method.setting,
         of_use=method.of_use,
         cases=len(truth),
-        wrong=wrong,
+        wrong=sum(a.outcome != t.outcome for a, t in zip(answers, truth, strict=True)),
         error_median=float(np.median(errors)) if errors else None,
         error_worst=max(errors, default=None),
         time_s=middle,
         time_low_s=low,
         time_high_s=high,
-        slower=float(np.median(ratios)),
-        slower_least=float(ratios.min()),
+        slower=float(np.median(slower)),
+        slower_least=float(slower.min()),
     )
+
+
+def work_precision_table(rows: Sequence[WorkPrecision]) -> tuple[list[str], list[list[str]]]:
+    """Return headers and cells: the time against error of each method."""
+    headers = [
+        "method", "setting", "wrong", "error, median", "error, worst", "time of a run", "10–90 %",
+        "slower, median", "slower, least",
+    ]  # fmt: skip
+    return headers, [
+        [
+            row.family,
+            row.setting,
+            f"{row.wrong} of {row.cases}",
+            *("–" if x is None else f"{x:.1e}" for x in (row.error_median, row.error_worst)),
+            seconds(row.time_s),
+            f"{seconds(row.time_low_s)} – {seconds(row.time_high_s)}",
+            *map(ratio, (row.slower, row.slower_least)),
+        ]
+        for row in rows
+    ]

@@ -7,7 +7,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("rbfrag", "numpy", "numba", "scipy", "scikit-sundae")
+PACKAGES = ("rbfrag", "numpy", "numba", "scipy")
 
 
 def machine() -> dict[str, str | int | float | None]:

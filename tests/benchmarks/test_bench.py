@@ -16,6 +16,7 @@ from benchmarks import (
     batch_runs,
     campaign_scale,
     critical_search,
+    cvode,
     main_job,
     page,
     scaling,
@@ -23,27 +24,16 @@ from benchmarks import (
     start_up,
     work_precision,
 )
-from rbfrag.bench import peers, run
-from rbfrag.bench.cases import (
-    RECORDS_VARIABLE,
-    Records,
-    choose_cases,
-    choose_combinations,
-    find_records,
-)
-from rbfrag.bench.critical_search import compare_searches, search_runs
-from rbfrag.bench.methods import (
-    BenchMethod,
-    methods,
-    missing_peers,
-    rocking_methods,
-    rocking_reference_run,
-    taylor_run,
-)
+from benchmarks.critical_search import choose_combinations, compare_searches, search_runs
+from benchmarks.page import RECORDS_VARIABLE, find_records
+from benchmarks.reference import reference
+from benchmarks.rocking_peer import RESTITUTION, rocking_methods, rocking_reference
+from benchmarks.work_precision import methods
+from rbfrag.bench.cases import Records, choose_cases
 from rbfrag.bench.peers import PeerAnswer
-from rbfrag.bench.reference import reference, rocking_reference
-from rbfrag.bench.tables import ratio, seconds
-from rbfrag.bench.work_precision import measure
+from rbfrag.bench.timing import ratio, seconds
+from rbfrag.bench.work_precision import BenchMethod, measure, refined_run, taylor_run
+from rbfrag.cli.commands import bench
 from rbfrag.cli.main import app
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -84,9 +74,16 @@ def test_reference_agrees_with_the_independent_integrator(records: Records) -> N
     assert seen == {"stable", "toppled"}
 
 
+def test_finer_steps_judge_as_extended_precision_does(records: Records) -> None:
+    for case in choose_cases(records, 10):
+        finer, truth = refined_run(case), reference(case)
+        assert finer.outcome == truth.outcome
+        assert finer.peak_rad == pytest.approx(truth.peak_rad, rel=1e-12, nan_ok=True)
+
+
 def test_every_method_solves_the_same_problem(records: Records) -> None:
     cases = choose_cases(records, 4)
-    rows = measure(cases, methods(quick=True))
+    rows = measure(cases, methods(), judge=reference)
     assert [row.of_use for row in rows].count(True) == 1
     for row in rows:
         assert row.cases == len(cases)
@@ -105,11 +102,11 @@ def test_the_reference_of_free_blocks_agrees_with_the_independent_integrator(
 ) -> None:
     seen = set()
     for case in choose_cases(records, 8):
-        ours = rocking_reference(case, 0.85)
+        ours = rocking_reference(case)
         block = Free(
             c=dict.fromkeys((1, -1), math.atan(case.kr)),
             p2=dict.fromkeys((1, -1), case.p2),
-            e=dict.fromkeys((1, -1), 0.85),
+            e=dict.fromkeys((1, -1), RESTITUTION),
         )
         excited = case.excitation
         other = integrate_rocking(excited.time_s, excited.k_h, excited.w, block)
@@ -122,7 +119,7 @@ def test_the_reference_of_free_blocks_agrees_with_the_independent_integrator(
 
 def test_every_method_rocks_the_same_blocks(records: Records) -> None:
     cases = choose_cases(records, 4)
-    rows = measure(cases, rocking_methods(quick=True), judge=rocking_reference_run)
+    rows = measure(cases, rocking_methods(), judge=rocking_reference)
     assert [row.setting for row in rows if row.of_use] == ["order 8"]
     for row in rows:
         assert row.wrong == 0, row
@@ -140,17 +137,14 @@ def test_a_wrong_outcome_and_an_error_are_seen(records: Records) -> None:
         return PeerAnswer("stable", 1.25 * truth[[c is case for c in cases].index(True)].peak_rad)
 
     base = BenchMethod("right", "", taylor_run, of_use=True)
-    right, wrong = measure(cases, (base, BenchMethod("wrong", "", off)))
+    right, wrong = measure(cases, (base, BenchMethod("wrong", "", off)), judge=reference)
     assert right.wrong == 0
     assert wrong.wrong == stays.count(False)
     assert wrong.error_median == pytest.approx(0.25)
 
 
-def test_without_the_peer_it_is_named_and_left_out(
-    records: Records, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(peers, "CVODE_PACKAGE", "a_package_that_is_nowhere")
-    assert missing_peers() == ("scikit-sundae",)
+def test_without_the_peer_it_is_left_out(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cvode, "CVODE_PACKAGE", "a_package_that_is_nowhere")
     assert not [m for m in methods() if "CVODE" in m.family]
     rows = compare_searches(choose_combinations(records, 1))
     assert [row.name for row in rows] == [
@@ -160,8 +154,7 @@ def test_without_the_peer_it_is_named_and_left_out(
 
 
 def test_with_the_peer_it_runs_the_same_values(records: Records) -> None:
-    installed = peers.cvode_is_installed()
-    assert missing_peers() == (() if installed else ("scikit-sundae",))
+    installed = cvode.cvode_is_installed()
     motion, polarity, p2 = choose_combinations(records, 1)[0]
     assert len(search_runs(motion, polarity, p2)) == 23
     rows = compare_searches([(motion, polarity, p2)], tolerances=(1e-6,))
@@ -195,30 +188,18 @@ def test_records_are_found_or_refused(
             find_records(wrong)
 
 
-def test_command_prints_tables_writes_files_and_json(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(run, "QUICK", run.Size(2, 1, (1, 2), (1,), (12,)))
-    out = tmp_path / "out"
-    arguments = ["bench", "--quick", "--records", str(folder), "--out", str(out)]
-    refused = CliRunner().invoke(app, arguments)
-    assert refused.exit_code == 2
-    out.mkdir()
+def test_command_prints_the_table_and_json(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "CASES", 2)
+    arguments = ["bench", "--records", str(folder)]
     shown = CliRunner().invoke(app, arguments)
     assert shown.exit_code == 0, shown.output
-    for word in ("order 8", "forward Euler", "RK4, rocking", "critical search", "shaking"):
+    for word in ("as used", "forward Euler", "scipy DOP853", "0 of 2"):
         assert word in shown.stdout
-    assert {path.name for path in out.iterdir()} == {
-        "work-precision.csv", "work-precision-rocking.csv", "critical-search.csv",
-        "record-length.csv", "workers.csv", "work-precision.svg",
-    }  # fmt: skip
-    with (out / "work-precision.csv").open() as file:
-        assert {row["cases"] for row in csv.DictReader(file)} == {"2"}
-    monkeypatch.setattr(peers, "CVODE_PACKAGE", "a_package_that_is_nowhere")
-    answer = CliRunner().invoke(app, [*arguments[:4], "--json"])
-    document = json.loads(answer.stdout)
-    assert document["not_installed"] == ["scikit-sundae"]
-    assert {row["workers"] for row in document["workers"]} == {1}
+    document = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
+    assert set(document) == {"machine", "records", "seconds", "work_precision"}
+    assert {row["cases"] for row in document["work_precision"]} == {2}
+    rejected = CliRunner().invoke(app, ["bench", "--records", str(folder / "nowhere")])
+    assert rejected.exit_code == 2
 
 
 @pytest.mark.parametrize(
@@ -226,7 +207,7 @@ def test_command_prints_tables_writes_files_and_json(
     [
         (
             work_precision.main,
-            ["--cases", "2", "--quick"],
+            ["--cases", "2", "--only", "order", "Euler"],
             ["work-precision", "work-precision-rocking"],
         ),
         (batch_runs.main, ["--combinations", "1"], ["batch-runs"]),
@@ -260,6 +241,12 @@ def test_scripts_run_and_fill_their_places_in_the_page(
     if hasattr(module, "FIGURE"):
         monkeypatch.setattr(module, "FIGURE", tmp_path / "figure.svg")
     script([*arguments, "--records", str(folder), "--out", str(tmp_path), "--write"])
+    if script is work_precision.main:
+        names = {"work-precision.csv", "work-precision-rocking.csv", "work-precision.png"}
+        assert names <= {path.name for path in tmp_path.iterdir()}
+        assert (tmp_path / "figure.svg").exists()
+        with (tmp_path / "work-precision.csv").open() as file:
+            assert {row["cases"] for row in csv.DictReader(file)} == {"2"}
     kept = list((tmp_path / "results" / "performance").iterdir())
     assert {path.stem for path in kept} == set(places)
     assert all(path.read_text(encoding="utf-8").startswith("|") for path in kept)

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.extended import double_double as dd
 from benchmarks.extended.toppling import truth
+from benchmarks.reference import reference
 from rbfrag.bench.cases import BenchCase
-from rbfrag.bench.reference import reference
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from tests.solver.reference import integrate

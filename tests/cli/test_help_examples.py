@@ -22,7 +22,7 @@ from tests.synthetic import shaking, write_at2
 ROOT = Path(__file__).parents[2]
 
 ELSEWHERE = {
-    "bench": "tests/benchmarks/test_bench.py: it takes minutes",
+    "bench": "tests/benchmarks/test_bench.py: it takes most of a minute",
     "demo": "tests/docs/test_console_blocks.py runs it",
     "serve": "tests/service: it runs until it is stopped",
 }

@@ -3,74 +3,65 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from rbfrag.cli.output import print_json, print_pairs, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 
-EXAMPLE = "Example:  rbfrag bench --quick"
+EXAMPLE = "Example:  rbfrag bench"
+
+CASES = 12
+"""Runs by each method: half a minute on a quiet machine, most of it for callbacks in Python."""
 
 
 @stacked
 def bench(
     *,
-    quick: bool = option("Reduced set of cases and settings (less than a minute)", False),
     records: str | None = option(
-        "Accelerogram file or folder [default: folder in RBFRAG_TEST_RECORDS, else sample "
-        "records of rbfrag[samples], else analytic pulses]",
+        "Accelerogram file or folder [default: sample records of rbfrag[samples], else analytic "
+        "pulses]",
         metavar="PATH",
-    ),
-    out: str | None = option(
-        "Output folder for the tables (CSV) and, with matplotlib, work-precision.svg",
-        metavar="FOLDER",
     ),
     json: options.Json = False,
 ) -> None:
     """Compare speed and error with general ODE solvers.
 
-    Every method integrates the same blocks under the same records in turns and is compared with an
-    extended-precision reference, for blocks backed by a rock face and free-standing blocks. The
-    critical search and the scaling with record length and number of workers follow. Times are
-    processor times of one thread, for workers wall times. Solvers that are not installed are listed
-    and skipped.
+    Every method integrates the same blocks, backed by a rock face, under the same records in turns.
+    Errors are differences from the rbfrag solution in steps a third as long, times are processor
+    times of one thread. The command takes less than a minute.
     """
+    import time
     from dataclasses import asdict
 
-    from rbfrag.bench import tables
-    from rbfrag.bench.run import run_bench
-    from rbfrag.errors import InputError, MissingExtraError
+    from rbfrag.bench.cases import choose_cases, find_records
+    from rbfrag.bench.work_precision import (
+        BenchMethod,
+        general_methods,
+        measure,
+        taylor_run,
+        work_precision_table,
+    )
+    from rbfrag.campaign.machine import machine
 
-    folder = None if out is None else Path(out)
-    if folder is not None and not folder.is_dir():
-        raise InputError(f"--out: create the folder {folder} first")
-
-    def say(sentence: str) -> None:
-        print(sentence, file=sys.stderr, flush=True)
-
-    result = run_bench(records, quick=quick, say=say)
-    if folder is not None:
-        for name, rows in result.tables().items():
-            tables.write_csv(rows, folder / f"{name}.csv")
-        try:
-            from rbfrag.plots.work_precision import plot_work_precision
-
-            plot_work_precision(result.work_precision, folder / "work-precision.svg")
-        except MissingExtraError as error:
-            say(f"no figure: {error}")
+    started = time.perf_counter()
+    about = machine()
+    motions = find_records(records)
+    cases = choose_cases(motions, CASES)
+    print(f"{CASES} runs under {motions.source}, by every method ...", file=sys.stderr, flush=True)
+    as_used = BenchMethod("rbfrag", "as used", taylor_run, of_use=True)
+    rows = measure(cases, (as_used, *general_methods()))
+    seconds = time.perf_counter() - started
     if json:
-        print_json(asdict(result))
+        print_json(
+            {
+                "machine": about,
+                "records": motions.source,
+                "seconds": seconds,
+                "work_precision": [asdict(row) for row in rows],
+            }
+        )
         return
-    print_pairs(result.machine)
-    print(f"{result.records}; {result.seconds:.0f} s in all")
-    for heading, table in (
-        ("Time of one run against its error", tables.work_precision_table(result.work_precision)),
-        ("The same of free-standing blocks", tables.work_precision_table(result.rocking)),
-        ("Critical search", tables.critical_table(result.critical_search)),
-        ("Length of the record", tables.length_table(result.record_length)),
-        ("Workers", tables.workers_table(result.workers)),
-    ):
-        print(f"\n{heading}")
-        print_table(*table)
-    for name in result.not_installed:
-        print(f"\nnot compared with, because not installed: {name} (pip install {name})")
+    print_pairs(about)
+    print(f"{motions.source}; {seconds:.0f} s in all\n")
+    print("Time of one run against its error, the difference from rbfrag in steps a third as long")
+    print_table(*work_precision_table(rows))

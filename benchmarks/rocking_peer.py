@@ -1,41 +1,76 @@
-"""What a free-standing block is run by beside rbfrag's kernel: RK4 at fixed steps, compiled.
+"""Methods for free-standing blocks: rbfrag, RK4 with fixed steps (compiled), the reference.
 
-The usual way to integrate rocking about both corners: impacts at the root of the step's cubic,
-the rest of the step from there, the motion after the record by energy.
+RK4 is the usual way to integrate rocking about both corners: impacts at the root of the step's
+cubic, the rest of the step from there, the motion after the record by energy.
 """
 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
+from benchmarks.reference import reference
 from rbfrag.bench.cases import BenchCase
-from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
+from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, Real, free_motion
+from rbfrag.bench.work_precision import BenchMethod, step_setting
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
 from rbfrag.solver.integrator.rocking_kernel import PAST_BALANCE
+from rbfrag.solver.integrator.taylor import ORDER
+from rbfrag.solver.models.rocking import free_block
+from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import FloatArray
-from rbfrag.solver.rocking_run import REST_SPEED
+from rbfrag.solver.rocking_run import REST_SPEED, simulate
+from rbfrag.solver.toppling_run import OUTCOMES
 
 HALVINGS = 52
 """Of a step, to the rounding of where an impact is in it."""
 
-Real = float | np.longdouble
+RESTITUTION = 0.85
+"""Of the free-standing blocks. With Housner's the responses of slender ones are chaotic, and an
+error says nothing of the method."""
 
 
-def free_rocking(
-    theta: Real, rate: Real, p: Real, theta_c: Real, restitution: Real, peak: Real
-) -> PeerAnswer:
-    """Decide by energy, impact by impact, what becomes of a block once the ground is at rest.
+def rocking_methods() -> tuple[BenchMethod, ...]:
+    """Return the methods for free-standing blocks."""
+    return (
+        *(
+            BenchMethod(
+                "rbfrag, rocking", f"order {order}", partial(rocking_run, order=order),
+                of_use=order == ORDER,
+            )
+            for order in (4, 5, 6, ORDER)
+        ),
+        *(
+            BenchMethod("RK4, rocking", step_setting(parts), partial(runge_kutta, parts=parts))
+            for parts in (1, 4, 16)
+        ),
+    )  # fmt: skip
+
+
+def rocking_run(case: BenchCase, order: int = ORDER) -> PeerAnswer:
+    """Run one case with rbfrag's kernel for free-standing blocks."""
+    block = free_block(block_of_numbers(case.p2, case.kr, {"restitution": RESTITUTION}))
+    run = simulate(case.excitation, block, order=order)
+    return PeerAnswer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
+
+
+def rocking_reference(case: BenchCase) -> PeerAnswer:
+    """Run one case with the extended-precision reference."""
+    return reference(case, sides=(1, -1), restitution=RESTITUTION, after_record=free_rocking)
+
+
+def free_rocking(theta: Real, rate: Real, p: Real, theta_c: Real, peak: Real) -> PeerAnswer:
+    """Determine by energy, impact by impact, the outcome after the end of the ground motion.
 
     Args:
         theta: rotation at the end of the record [rad].
         rate: rotation rate [rad/s].
         p: frequency parameter [1/s].
         theta_c: critical angle of both corners [rad].
-        restitution: speed after an impact over that before it.
-        peak: greatest rotation so far [rad].
+        peak: maximum rotation so far [rad].
     """
     answer = free_motion(theta, rate, p, theta_c, peak)
     for _ in range(IMPACTS_THAT_DECIDE):
@@ -43,7 +78,7 @@ def free_rocking(
             break
         height = np.sin((theta_c + theta_c - theta) / 2) * np.sin(theta / 2)
         # rate² + 2 p² (cos(theta_c - theta) - cos theta_c), without a difference of cosines
-        speed = restitution * np.sqrt(max(rate * rate + 4 * p * p * height, 0 * rate))
+        speed = RESTITUTION * np.sqrt(max(rate * rate + 4 * p * p * height, 0 * rate))
         if speed < REST_SPEED * p * theta_c:
             break
         theta, rate = 0 * theta, speed
@@ -51,19 +86,19 @@ def free_rocking(
     return answer
 
 
-def runge_kutta(case: BenchCase, restitution: float, parts: int) -> PeerAnswer:
-    """Run one case with `parts` steps of RK4 per sample interval; no vertical motion."""
+def runge_kutta(case: BenchCase, parts: int) -> PeerAnswer:
+    """Run one case with `parts` RK4 steps per sampling interval; no vertical motion."""
     excited = case.excitation
     p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
     topples, side, theta, rate, peak = _march(
-        excited.k_h, float(excited.interval_s[0]), case.kr, case.p2, theta_c, restitution,
+        excited.k_h, float(excited.interval_s[0]), case.kr, case.p2, theta_c, RESTITUTION,
         REST_SPEED * p * theta_c, parts,
     )  # fmt: skip
     if topples:
         return PeerAnswer(TOPPLED, math.nan)
     if side == 0:
         return PeerAnswer(STABLE, peak)
-    return free_rocking(theta, rate, p, theta_c, restitution, peak)
+    return free_rocking(theta, rate, p, theta_c, peak)
 
 
 @kernel
@@ -148,7 +183,7 @@ def _step(
 def _hermite(
     theta: float, rate: float, theta_end: float, rate_end: float, h: float, x: float
 ) -> tuple[float, float]:
-    """Rotation and rate at a fraction of a step, by the cubic through both ends."""
+    """Return rotation and rate at a fraction of a step, by the cubic through both ends."""
     u0, u1 = h * rate, h * rate_end
     c2 = 3.0 * (theta_end - theta) - 2.0 * u0 - u1
     c3 = 2.0 * (theta - theta_end) + u0 + u1

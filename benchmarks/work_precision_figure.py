@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
+from rbfrag.bench.work_precision import WorkPrecision
 from rbfrag.plots import canvas
 from rbfrag.plots.labels import write_near
 
@@ -16,40 +16,8 @@ PEERS = ("#7f7f7f", "#e08214", "#b35806", "#8c6d31", "#c44e52", "#7b3294")
 MARKERS = ("s", "D", "^", "v", "P", "X")
 
 
-class WorkPoint(Protocol):
-    """What the figure needs to know of one method at one setting."""
-
-    @property
-    def family(self) -> str:
-        """Method; its settings are joined by a line."""
-
-    @property
-    def setting(self) -> str:
-        """Setting, written beside the point."""
-
-    @property
-    def of_use(self) -> bool:
-        """The setting that users get."""
-
-    @property
-    def wrong(self) -> int:
-        """Wrong outcomes."""
-
-    @property
-    def error_median(self) -> float | None:
-        """Median relative error."""
-
-    @property
-    def error_worst(self) -> float | None:
-        """Greatest relative error."""
-
-    @property
-    def time_s(self) -> float:
-        """Median time [s]."""
-
-
 @canvas.in_own_style
-def plot_work_precision(points: Sequence[WorkPoint], path: canvas.Out) -> canvas.Picture:
+def plot_work_precision(points: Sequence[WorkPrecision], path: canvas.Out) -> canvas.Picture:
     """Draw time against error, a marker per method and setting, and write it to `path`.
 
     The marker is at the median error, a thin bar reaches to the worst. Open markers had

@@ -1,22 +1,22 @@
-"""Peak rotations to judge every method by, in extended precision.
+"""Reference peak rotations for all methods, in extended precision.
 
 A Taylor step of degree 16 in numpy's longdouble (64 bits of mantissa on x86), p·h <= 0.25,
 sines and cosines called at every step, roots isolated by bounds of the polynomial on each
 half of the step. It shares no code with rbfrag.solver, only the arrays of the excitation and the
 speed at which a free-standing block comes to rest.
-The truncation of a step is below (p h)^17/17!, some 1e-25; what is left is the rounding of
-longdouble. Where longdouble is no longer than a double (some platforms) some 1e-13 is left.
+The truncation of a step is below (p h)^17/17!, some 1e-25; the rounding of longdouble remains.
+Where longdouble is no longer than a double (some platforms) some 1e-13 remains.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from rbfrag.bench.cases import BenchCase
 from rbfrag.bench.peers import STABLE, TOPPLED, PeerAnswer, free_motion
-from rbfrag.bench.rocking_peer import free_rocking
 from rbfrag.solver.rocking_run import REST_SPEED
 
 Real = np.longdouble
@@ -27,76 +27,20 @@ EVEN = 1e-15
 """Part of an interval that is no step of its own: its end is reached but for rounding."""
 
 
-def reference(case: BenchCase) -> PeerAnswer:
-    """Return outcome and peak rotation [rad] of one case."""
-    excited = case.excitation
-    k = [Real(x) for x in excited.k_h]
-    w = [Real(x) for x in excited.w]
-    kr, p = Real(case.kr), np.sqrt(Real(case.p2))
-    theta_c = np.arctan(kr)
-    rest = Real(0)
-    # tan falls short past 90 degrees: the block is followed by its angle, never by tan
-    border = [
-        np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(excited.q[::-1])[::-1].tolist()
-    ]
-    g = excited.k_h - excited.w * case.kr
-    lifts = np.flatnonzero(g > 0.0)
-    peak = rest
-    moving = False
-    theta = rate = rest
-    i = 0
-    while i < len(k) - 1:
-        h = Real(excited.interval_s[i])
-        if not moving and (h == 0 or (g[i] <= 0.0 and g[i + 1] <= 0.0)):
-            later = lifts[np.searchsorted(lifts, i + 1) :]
-            if not later.size:
-                break
-            i = max(i + 1, int(later[0]) - 1)
-            continue
-        at, from_rest = rest, False
-        da, dw = k[i + 1] - k[i], w[i + 1] - w[i]
-        g0, slope = k[i] - w[i] * kr, da - dw * kr
-        if not moving:
-            from_rest = bool(g0 <= 0)
-            at = -g0 / slope if from_rest else rest
-            moving, theta, rate = True, rest, rest
-        while moving and at < 1 and h > 0:
-            left = h * (1 - at)
-            parts = max(1, math.ceil(float(p * left) / PH_MAX))
-            part = (1 - at) / parts
-            u = _coefficients(
-                theta_c - theta, rate * h * part, (p * h * part) ** 2,
-                k[i] + da * at, da * part, w[i] + dw * at, dw * part, from_rest,
-            )  # fmt: skip
-            from_rest = False
-            path, landing, peak = _followed(theta, u, peak)
-            if landing is None:
-                theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
-                at = at + part if parts > 1 else Real(1)
-                if rate > 0 and theta_c - theta < border[i]:
-                    return PeerAnswer(TOPPLED, math.nan)
-                continue
-            at += part * landing
-            now = g0 + slope * at
-            theta = rate = rest
-            if now <= 0:
-                from_rest = bool(slope > 0 and g0 + slope > 0)
-                moving = from_rest
-                at = max(at, -g0 / slope) if from_rest else at
-        i += 1
-        if moving and rate > 0 and theta_c - theta < border[i]:
-            return PeerAnswer(TOPPLED, math.nan)
-    if not moving:
-        return PeerAnswer(STABLE, float(peak))
-    return free_motion(theta, rate, p, theta_c, peak)
-
-
-def rocking_reference(case: BenchCase, restitution: float) -> PeerAnswer:
-    """Return outcome and peak rotation [rad] of a free-standing rectangle on level ground.
+def reference(
+    case: BenchCase,
+    *,
+    sides: tuple[int, ...] = (1,),
+    restitution: float = 0.0,
+    after_record: Callable[[Real, Real, Real, Real, Real], PeerAnswer] = free_motion,
+) -> PeerAnswer:
+    """Return outcome and peak rotation [rad] of one case.
 
     Args:
         case: size, strength and excitation.
-        restitution: speed after an impact over that before it.
+        sides: senses of rotation; (1, -1) for a free-standing rectangle on level ground.
+        restitution: ratio of the speeds after and before an impact.
+        after_record: outcome of a block in motion at the end of the record.
     """
     excited = case.excitation
     k = [Real(x) for x in excited.k_h]
@@ -105,9 +49,10 @@ def rocking_reference(case: BenchCase, restitution: float) -> PeerAnswer:
     theta_c, e = np.arctan(kr), Real(restitution)
     slowest = Real(REST_SPEED) * p * theta_c
     rest = Real(0)
+    # tan falls short past 90 degrees: the block is followed by its angle, never by tan
     border = {
         side: [np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(side * excited.q[::-1])]
-        for side in (1, -1)
+        for side in sides
     }
     side, theta, rate, peak = 0, rest, rest, rest
     for i in range(len(k) - 1):
@@ -116,7 +61,7 @@ def rocking_reference(case: BenchCase, restitution: float) -> PeerAnswer:
         at, from_rest = rest, False
         while at < 1 and h > 0:
             if side == 0:
-                at, side, from_rest = _departure(k[i], da, w[i] * kr, dw * kr, at)
+                at, side, from_rest = _departure(sides, k[i], da, w[i] * kr, dw * kr, at)
                 if side == 0:
                     break
             part = (1 - at) / max(1, math.ceil(float(p * h * (1 - at)) / PH_MAX))
@@ -138,13 +83,15 @@ def rocking_reference(case: BenchCase, restitution: float) -> PeerAnswer:
             return PeerAnswer(TOPPLED, math.nan)
     if side == 0:
         return PeerAnswer(STABLE, float(peak))
-    return free_rocking(theta, rate, p, theta_c, e, peak)
+    return after_record(theta, rate, p, theta_c, peak)
 
 
-def _departure(a: Real, da: Real, g: Real, dg: Real, at: Real) -> tuple[Real, int, bool]:
-    """Return where a block at rest lifts off, in which sense, and whether k_h just reaches k_r."""
+def _departure(
+    sides: tuple[int, ...], a: Real, da: Real, g: Real, dg: Real, at: Real
+) -> tuple[Real, int, bool]:
+    """Return where a block at rest lifts off, its sense, and whether k_h just reaches k_r."""
     first = (Real(1), 0, False)
-    for side in (1, -1):
+    for side in sides:
         above, slope = side * a - g, side * da - dg
         if above + slope * at > 0:
             return at, side, False
@@ -178,7 +125,7 @@ def _value(x: list[Real], t: Real) -> Real:
 
 
 def _followed(theta: Real, u: list[Real], peak: Real) -> tuple[list[Real], Real | None, Real]:
-    """Return the rotation over a step, where it falls to zero first, and the greatest so far."""
+    """Return the rotation over a step, its first return to zero, and the maximum so far."""
     path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
     landing = next(iter(_roots(path)), None)
     turns = (turn for turn in _roots(u) if landing is None or turn < landing)
