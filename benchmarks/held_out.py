@@ -185,7 +185,7 @@ def by_block(
 
 def predictions(source: FitSource, data: FitData, probability: FloatArray) -> dict[Key, float]:
     """Return the P of every block of known outcome, given on the grid of a fit, shape (n, m)."""
-    place = np.flatnonzero(data.judged.known)
+    place = np.flatnonzero(data.judged.is_known)
     return by_block(source, data, place, probability.ravel()[place])
 
 

@@ -83,7 +83,7 @@ def blocks_of(source: FitSource, aims: Aims) -> Columns:
     method, term = method_named(aims.method), TERMS[aims.term]
     own = source.only(np.isin(source.table.event_id.astype(str), FIVE))
     data = fit_data(own, method, term, kind=aims.kind)
-    known = data.judged.known
+    known = data.judged.is_known
     block = (*method.block.names, *method.block.stored)
     columns = {name: _of(data, name)[known] for name in (*block, *term.inputs)}
     motion = own.table.motion_id[data.combination]

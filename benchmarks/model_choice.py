@@ -260,7 +260,7 @@ def predicted(source: FitSource, aims: Aims) -> Predicted:
         fitted = fit_source(source, term, method, kind=aims.kind, shared=False)
         data, grid = fitted.data, fitted.result.held_out
     judged = data.judged
-    known = judged.known
+    known = judged.is_known
     event = np.broadcast_to(data.event[:, None], known.shape)[known]
     failed = judged.failed[known]
     of_motions = source.table.measure("magnitude")[data.combination]

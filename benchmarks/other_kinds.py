@@ -64,14 +64,14 @@ def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray
 def scored(name: str, p: FloatArray, data: FitData) -> list[str]:
     """Return the line of a model: scores, and how many outcomes are undecided."""
     judged = data.judged
-    outcomes = judged.failed, judged.known
-    undecided = 1.0 - judged.known[data.read].mean()
+    outcomes = judged.failed, judged.is_known
+    undecided = 1.0 - judged.is_known[data.read].mean()
     return [
         name,
         f"{log_loss(p, *outcomes):.4f}",
         f"{brier(p, *outcomes):.4f}",
         f"{calibration(p, *outcomes).slope:.2f}",
-        f"{int(judged.known.sum()):,}",
+        f"{int(judged.is_known.sum()):,}",
         f"{100.0 * undecided:.1f} %",
     ]
 
@@ -99,7 +99,7 @@ def class_lines(
     judged, of = data.judged, _class_values(data)[variable]
     lines = []
     for low, high in pairwise(edges):
-        here = judged.known & (of >= low) & (of < high)
+        here = judged.is_known & (of >= low) & (of < high)
         if not here.any():
             continue
         mean = [float(each[here].mean()) for each in (p, judged.failed)]

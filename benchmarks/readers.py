@@ -267,7 +267,7 @@ def _import(path: Path) -> object:
 
 def _predict(path: Path) -> object:
     out = path.with_name(f"answers{path.suffix}")
-    return predict_table(path, out, given={"pgv_m_s": 0.5}, model=None, level=0.95, db=None)
+    return predict_table(path, out, inputs={"pgv_m_s": 0.5}, model=None, level=0.95, db=None)
 
 
 def _predict_by_arrow(path: Path) -> object:

@@ -174,7 +174,7 @@ def draw_recordings(full: Path) -> None:
 
 
 def show(progress: CampaignProgress) -> None:
-    print(f"{progress.done}/{progress.total} combinations", file=sys.stderr, flush=True)
+    print(f"{progress.completed}/{progress.total} combinations", file=sys.stderr, flush=True)
 
 
 def reduce(full: Path, made: Path) -> None:

@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 
 from rbfrag.exchange.shakemap import read_shakemap
-from rbfrag.hazards.maps.map_failures import DRAWS, Places, map_failures
+from rbfrag.hazards.maps.map_failures import DRAWS, SiteLocations, map_failures
 from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
 from rbfrag.question.components import component_named
 
@@ -57,13 +57,15 @@ def main() -> None:
 
     answer(slice(0, 10))  # the first call loads the model
     answers, took = timed(lambda: answer(slice(None)))
-    places = Places.of(grid.lon, grid.lat)
+    places = SiteLocations.of(grid.lon, grid.lat)
     failures, joint = timed(
         lambda: map_failures(answers, {"p2": p2, "kr": kr}, places, draws=given.draws)
     )
     print(f"{grid.lon.size} nodes x {given.blocks} blocks, processor time (wall time):")
     print(f"  read {read}, answered {took}, {given.draws} draws {joint}")
-    print(f"  {answers.each.size} pairs of node and block can fail; {failures.as_dict()}")
+    print(
+        f"  {answers.pair_probability.size} pairs of node and block can fail; {failures.as_dict()}"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Every error that rbfrag raises on purpose.
+"""All errors that rbfrag raises on purpose.
 
     RbfragError
     ├── InputError                  a value, option or file that cannot be used   (exit 2)
@@ -49,7 +49,7 @@ _UNPRINTABLE = re.compile(
 
 
 def one_paragraph(message: str) -> str:
-    """Return a message fit for a terminal: one paragraph, printable, at most 499 characters."""
+    """Return a message for a terminal: one paragraph, printable, at most 499 characters."""
     text = _BLANKS.sub(" ", message.strip())
     text = _UNPRINTABLE.sub(lambda match: ascii(match[0])[1:-1], text)
     if len(text) > MOST_CHARACTERS:
@@ -59,7 +59,7 @@ def one_paragraph(message: str) -> str:
 
 
 def spelled(text: str, fields: Collection[str], spell: Callable[[str], str]) -> str:
-    """Return a text with fields as an interface spells them.
+    """Return a text with its fields in the spelling of an interface.
 
     Args:
         text: a message, in which a field with a value stands as in Python: ``kind='rocking'``.
@@ -76,12 +76,12 @@ def spelled(text: str, fields: Collection[str], spell: Callable[[str], str]) -> 
         return text
     names = "|".join(sorted(map(re.escape, fields), key=len, reverse=True))
     # no part of another word, of a path or of a file's name
-    whole = rf"(?<![\w./-])(?:{names})(?![\w/]|[.-]\w)"
-    return re.sub(whole, lambda match: spell(match[0]), text)
+    pattern = rf"(?<![\w./-])(?:{names})(?![\w/]|[.-]\w)"
+    return re.sub(pattern, lambda match: spell(match[0]), text)
 
 
 class RbfragError(Exception):
-    """Base of all errors raised on purpose; the message is meant for a person.
+    """Base class of all errors raised on purpose; the message is for the user.
 
     Args:
         message: what is wrong; fields stand in it under their keywords.
@@ -95,29 +95,29 @@ class RbfragError(Exception):
         self.fields = tuple(fields)
 
     def spelled(self, spell: Callable[[str], str]) -> str:
-        """Return the message with its fields as a door spells them."""
+        """Return the message with its fields in the spelling of an interface."""
         return spelled(str(self), self.fields, spell)
 
 
 class InputError(RbfragError, ValueError):
-    """A value, option or file that cannot be used."""
+    """A value, option or file that is invalid."""
 
 
 class UnknownFieldError(InputError, TypeError):
-    """A keyword that is none."""
+    """An unknown keyword."""
 
     @classmethod
-    def refuse(cls, given: Iterable[str], known: type, what: str) -> None:
-        """Refuse keywords that are no keys of a TypedDict.
+    def refuse(cls, names: Iterable[str], typed_dict: type, subject: str) -> None:
+        """Reject keywords that are not keys of a TypedDict.
 
         Args:
-            what: what they are said of, such as "a fit".
+            subject: what they are said of, such as "a fit".
         """
-        for name in given:
-            if name not in known.__annotations__:
+        for name in names:
+            if name not in typed_dict.__annotations__:
                 raise cls(
-                    f"unknown option {name[:60]} of {what}; the options are "
-                    f"{', '.join(known.__annotations__)}"
+                    f"unknown option {name[:60]} of {subject}; the options are "
+                    f"{', '.join(typed_dict.__annotations__)}"
                 )
 
 
@@ -159,11 +159,11 @@ def _rebuild_motion_file_error(
 
 
 class UnknownFormatError(MotionFileError):
-    """No reader recognises the content of the file."""
+    """No reader recognises the format of the file."""
 
 
 class UnitNotStatedError(MotionFileError):
-    """Neither the file nor the caller says in which unit its accelerations are."""
+    """Neither the file nor the caller gives the unit of the accelerations."""
 
 
 class MissingExtraError(InputError):
@@ -184,78 +184,78 @@ class MissingExtraError(InputError):
 
 
 class DatabaseError(RbfragError):
-    """A database that cannot be used."""
+    """A database that is invalid or inaccessible."""
 
 
 class DatabaseNotFoundError(DatabaseError):
-    """There is no database at the given place."""
+    """There is no database at this location."""
 
 
 class NotADatabaseError(DatabaseError):
-    """The file is no SQLite database, or not one of rbfrag's."""
+    """The file is not an SQLite database, or not one of rbfrag."""
 
 
 class SchemaVersionError(DatabaseError):
-    """The schema is older or newer than this rbfrag."""
+    """The schema is older or newer than this rbfrag version."""
 
 
 class DatabaseReadOnlyError(DatabaseError):
-    """The database or its folder cannot be written."""
+    """The database or its folder is not writable."""
 
 
 class DatabaseBusyError(DatabaseError):
-    """Another process holds the database; what was finished is kept."""
+    """Another process has locked the database; completed work is kept."""
 
     exit_status: ClassVar[int] = 1
 
 
 class DatabaseFailedError(DatabaseError):
-    """The disk is full or fails, or the server is gone; what was finished is kept."""
+    """The disk is full or fails, or the server is lost; completed work is kept."""
 
     exit_status: ClassVar[int] = 1
 
 
 class MergeConflictError(DatabaseError):
-    """Two databases that say different things about the same input."""
+    """Two databases with different results for the same input."""
 
 
 class ModelError(RbfragError):
-    """Trouble with a fragility model."""
+    """Error in a fragility model."""
 
 
 class UnknownModelError(ModelError):
-    """No fitted model of that name."""
+    """There is no fitted model with this name."""
 
 
 class FitError(ModelError):
-    """The data cannot carry the fit; the reason is in the message."""
+    """The data are insufficient for the fit; the message gives the reason."""
 
 
 class WorkFailedError(RbfragError):
-    """Part of the work failed; what finished is kept."""
+    """Part of the work failed; completed work is kept."""
 
     exit_status: ClassVar[int] = 1
 
 
 class StoppedError(RbfragError):
-    """Stopped on request; what finished is kept."""
+    """Stopped on request; completed work is kept."""
 
     exit_status: ClassVar[int] = 130
 
 
-def checked_name(name: str, what: str) -> str:
-    """Return a name of a model, suite, earthquake, station or block that can be stored and shown.
+def checked_name(name: str, label: str) -> str:
+    """Return a valid name of a model, suite, earthquake, station or block; reject others.
 
     Args:
         name: the name; it may be empty.
-        what: what it names, for the message: "the suite".
+        label: what it names, for the message: "the suite".
 
     Raises:
         InputError: it is longer than 200 characters.
     """
     if len(name) > LONGEST_NAME:
         raise InputError(
-            f"{what} has a name of {len(name)} characters, {name[:40]!r}…: give it at most "
+            f"{label} has a name of {len(name)} characters, {name[:40]!r}…: give it at most "
             f"{LONGEST_NAME}"
         )
     return name

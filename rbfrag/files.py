@@ -1,4 +1,4 @@
-"""Files that are read, with a sentence for every trouble, and written whole or not at all."""
+"""Reading of files with clear error messages, and atomic writing."""
 
 from __future__ import annotations
 
@@ -39,31 +39,31 @@ WORKBOOKS = (".xlsx", ".ods")
 
 
 def encoding_of(start: bytes) -> str:
-    """Return the encoding of a text by its first bytes: UTF-16 with its mark, or UTF-8."""
+    """Return the encoding of a text from its first bytes: UTF-16 with a mark, or UTF-8."""
     marked = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return "utf-16" if marked else "utf-8-sig"
 
 
 def packed_as(start: bytes) -> str | None:
-    """Return the format of a packed file, of its first bytes; None for another file."""
+    """Return the format of a packed file from its first bytes; None for another file."""
     return next((name for magic, name in _ARCHIVES if start.startswith(magic)), None)
 
 
-def as_path(given: object, name: str, what: str) -> Path:
-    """Return the path that an argument gives.
+def as_path(value: object, name: str, description: str) -> Path:
+    """Return the path of an argument.
 
     Args:
-        given: a text or a path.
+        value: a text or a path.
         name: of the argument, for the message.
-        what: what the file holds, for the message.
+        description: what the file holds, for the message.
 
     Raises:
         InputError: something else.
     """
-    if isinstance(given, str | os.PathLike):
-        return Path(given)
+    if isinstance(value, str | os.PathLike):
+        return Path(value)
     raise InputError(
-        f"{name} is of type {type(given).__name__}: give the path of {what}, as text or Path"
+        f"{name} is of type {type(value).__name__}: give the path of {description}, as text or Path"
     )
 
 
@@ -71,12 +71,14 @@ NO_FILE = "a device, pipe or socket, which may have no end"
 
 
 def is_endless(source: Path) -> bool:
-    """Return whether a path that is there is neither a file nor a folder."""
+    """Return whether an existing path is neither a file nor a folder."""
     return source.exists() and not source.is_file() and not source.is_dir()
 
 
 def bounded_bytes(source: Path, most_bytes: int) -> bytes | None:
-    """Return the content of a file; None if it is larger, whatever its folder says of its size."""
+    """Return the content of a file; None if it is larger than the limit, whatever its reported
+    size.
+    """
     if source.stat().st_size > most_bytes:
         return None
     with source.open("rb") as file:
@@ -85,58 +87,62 @@ def bounded_bytes(source: Path, most_bytes: int) -> bytes | None:
 
 
 @contextmanager
-def reading(source: Path, what: str) -> Iterator[None]:
-    """Say in words why a file cannot be read.
+def reading(source: Path, description: str) -> Iterator[None]:
+    """Convert errors in reading a file to messages.
 
     Args:
         source: the file.
-        what: what it should hold, for messages: "a hazard curve".
+        description: what it should hold, for messages: "a hazard curve".
 
     Raises:
         InputError: there is no such file, or it cannot be read or is packed or not text (UTF-8).
     """
     try:
         if source.is_dir():
-            raise InputError(f"{source} is a folder: give a file with {what}")
+            raise InputError(f"{source} is a folder: give a file with {description}")
         if is_endless(source):
-            raise InputError(f"{source} is {NO_FILE}: save {what} to a file first")
+            raise InputError(f"{source} is {NO_FILE}: save {description} to a file first")
         with source.open("rb") as file:
             packed = packed_as(file.read(6))
         workbook = source.suffix.lower() in WORKBOOKS
         if packed is not None and not (workbook and packed == "zip"):
-            raise InputError(f"{source} is a {packed} file: unpack it first and give {what}")
+            raise InputError(f"{source} is a {packed} file: unpack it first and give {description}")
         yield
     except FileNotFoundError:
-        raise InputError(f"{source}: no such file; give a file with {what}") from None
+        raise InputError(f"{source}: no such file; give a file with {description}") from None
     except UnicodeDecodeError as error:
         raise InputError(
             f"{source}: not a text file (byte {error.start} is not {error.encoding.upper()}): "
-            f"save {what} as UTF-8 (in Excel: CSV UTF-8)"
+            f"save {description} as UTF-8 (in Excel: CSV UTF-8)"
         ) from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None
 
 
-def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_BYTES) -> str:
+def source_text(
+    path: str | os.PathLike[str], description: str, most_bytes: int = MOST_BYTES
+) -> str:
     """Return the whole text of a file, with newlines as ``\\n``.
 
     Args:
         path: the file.
-        what: as for :func:`reading`.
+        description: as for :func:`reading`.
         most_bytes: larger files are refused.
 
     Raises:
         InputError: the file cannot be read, is empty, too large or not text (UTF-8).
     """
-    source = as_path(path, "path", f"a file with {what}")
-    with reading(source, what):
+    source = as_path(path, "path", f"a file with {description}")
+    with reading(source, description):
         content = bounded_bytes(source, most_bytes)
         if content is None:
-            raise InputError(f"{source} is larger than {most_bytes} bytes: too large for {what}")
+            raise InputError(
+                f"{source} is larger than {most_bytes} bytes: too large for {description}"
+            )
         text = content.decode(encoding_of(content))
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
-        raise InputError(f"{source} is empty: give a file with {what}")
+        raise InputError(f"{source} is empty: give a file with {description}")
     return text
 
 
@@ -160,7 +166,7 @@ def csv_rows(text: str, where: object = "") -> Iterator[tuple[int, list[str]]]:
 
 
 def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what TOML says.
+    """Return the content of a TOML document.
 
     Raises:
         InputError: it is not TOML, nested too deeply, or holds a key or number out of all bounds;
@@ -181,7 +187,7 @@ def toml_document(text: str, source: str | os.PathLike[str] | None = None) -> di
 
 
 def _refuse_large(values: Iterable[object]) -> None:
-    """Refuse an integer that no float can hold, at any depth."""
+    """Reject an integer too large for a float, at any depth."""
     for value in values:
         if isinstance(value, dict | list):
             _refuse_large(value.values() if isinstance(value, dict) else value)
@@ -190,7 +196,7 @@ def _refuse_large(values: Iterable[object]) -> None:
 
 
 def json_document(text: str) -> Any:
-    """Return what JSON says.
+    """Return the content of a JSON document.
 
     Raises:
         InputError: it is not JSON, nested too deeply, or has a key twice in one object.
@@ -206,7 +212,7 @@ def json_document(text: str) -> Any:
 
 
 def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the object of some keys and values of JSON, for `object_pairs_hook`.
+    """Return a JSON object with unique keys, for `object_pairs_hook`.
 
     Raises:
         InputError: a key occurs twice.
@@ -220,7 +226,7 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def is_number(value: object) -> bool:
-    """Return whether a value of a document is a number that a float can hold."""
+    """Return whether a value of a document is a number in the range of floats."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -230,13 +236,13 @@ def is_number(value: object) -> bool:
     return True
 
 
-def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: str) -> Path:
-    """Return the path if such a file can be written there; ask before long work.
+def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], label: str) -> Path:
+    """Return the path if the file can be written there; for use before long work.
 
     Args:
         path: file to write.
         suffixes: what its name may end in.
-        what: what messages call it: "table", "plot file".
+        label: what messages call it: "table", "plot file".
 
     Raises:
         InputError: another suffix, or a folder that cannot be written.
@@ -244,28 +250,28 @@ def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: s
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         raise InputError(
-            f"{what} {target}: unsupported suffix {target.suffix!r}; use {', '.join(suffixes)}"
+            f"{label} {target}: unsupported suffix {target.suffix!r}; use {', '.join(suffixes)}"
         )
     if len(os.fsencode(target.name)) > LONGEST_FILE_NAME:
         raise InputError(
-            f"{what} {target}: the name is longer than {LONGEST_FILE_NAME} bytes: shorten it"
+            f"{label} {target}: the name is longer than {LONGEST_FILE_NAME} bytes: shorten it"
         )
     if target.is_dir():
-        raise InputError(f"{what} {target} is a folder: give a file name")
+        raise InputError(f"{label} {target} is a folder: give a file name")
     if not target.parent.is_dir():
-        raise InputError(f"{what} {target}: create the folder {target.parent} first")
+        raise InputError(f"{label} {target}: create the folder {target.parent} first")
     if not os.access(target.parent, os.W_OK):
-        raise InputError(f"{what} {target}: the folder is not writable: choose another")
+        raise InputError(f"{label} {target}: the folder is not writable: choose another")
     return target
 
 
 @contextmanager
-def written_whole(target: Path, what: str = "file") -> Iterator[Path]:
-    """Yield a path of the same suffix that takes the target's place at the end, or vanishes.
+def written_whole(target: Path, label: str = "file") -> Iterator[Path]:
+    """Yield a temporary path that replaces the target on success, or is deleted.
 
     Args:
         target: file to write; an existing file is replaced at the end, not before.
-        what: what messages call it.
+        label: what messages call it.
 
     Raises:
         InputError: the disk refuses.
@@ -277,14 +283,14 @@ def written_whole(target: Path, what: str = "file") -> Iterator[Path]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
-            f"{what} {target} cannot be written: {reason}; choose a writable folder"
+            f"{label} {target} cannot be written: {reason}; choose a writable folder"
         ) from None
     finally:
         partial.unlink(missing_ok=True)
 
 
 def write_text(text: str, target: Path) -> None:
-    """Write a text (UTF-8), whole or not at all.
+    """Write a text (UTF-8) atomically.
 
     Raises:
         InputError: the disk refuses.
@@ -294,7 +300,7 @@ def write_text(text: str, target: Path) -> None:
 
 
 def number_at(text: str, where: str) -> float:
-    """Return the number that a text is; `where` it stands, for messages."""
+    """Return the number in a text; `where` locates it in messages."""
     try:
         return float(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Answers as tables: what a notebook shows, and what pandas goes on with."""
+"""Answers as tables, for notebooks and pandas."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 def columns_of(answer: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass that make a table, by name.
+    """Return the fields of a dataclass that are columns of a table, by name.
 
     These are the fields that hold one number or text, and arrays of the shape of the first field
     that is one, flat; fields of another shape are left out.
     """
     # that of dataclasses.asdict would copy histories
-    values = {each.name: getattr(answer, each.name) for each in fields(answer)}
+    values = {item.name: getattr(answer, item.name) for item in fields(answer)}
     shape = next((value.shape for value in values.values() if hasattr(value, "ravel")), None)
     columns = {}
     for name, value in values.items():
@@ -33,7 +33,7 @@ def columns_of(answer: Any) -> dict[str, Any]:
 
 
 def frame_of(columns: Mapping[str, Any]) -> pd.DataFrame:
-    """Return columns as a pandas table, of one row where none is an array."""
+    """Return columns as a pandas DataFrame, with one row if none is an array."""
     import pandas as pd
 
     several = any(hasattr(value, "ravel") for value in columns.values())
@@ -48,6 +48,6 @@ def frame_of_rows(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def html_of(frame: pd.DataFrame) -> str:
-    """Return a table for a notebook, on end where it has one row."""
+    """Return an HTML table for a notebook, transposed if it has one row."""
     html: str = frame.to_html() if len(frame) > 1 else frame.T.to_html(header=False)
     return html

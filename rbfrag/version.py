@@ -1,3 +1,3 @@
-"""The version number, in a file of its own so that `--version` loads nothing else."""
+"""The version number, in its own file so that `--version` loads nothing else."""
 
 __version__ = "0.1.0"

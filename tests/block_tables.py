@@ -23,7 +23,7 @@ def read_columns(
     of_text = [field for field, name in fields.items() if name in texts]
     with opened_table(path, [*fields], of_text) as table:
         table.need([field for field, name in fields.items() if name in names])
-        columns, faults, lines = table.whole()
+        columns, faults, lines = table.read_all()
     if faults:
         i = min(faults)
         raise InputError(f"{path}, {table.file.word} {lines[i]}: {faults[i]}")

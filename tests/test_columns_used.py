@@ -61,7 +61,7 @@ def test_a_dip_in_any_language_is_used(header: str) -> None:
 def test_an_empty_dip_is_a_missing_value() -> None:
     columns = {name: values * 2 for name, values in TABLE.items()} | {"dip_deg": [5.0, np.nan]}
     pd.DataFrame(columns).to_csv("two.csv", index=False)
-    first, second = predict_table("two.csv", given={}).blocks
+    first, second = predict_table("two.csv", inputs={}).blocks
     assert first["probability"] > 0.5
     assert second["probability"] is None
     assert second["reason"] == "dip_deg is empty: enter 0 for a level base"
@@ -73,7 +73,7 @@ def test_an_empty_dip_is_a_missing_value() -> None:
         "dip": [nothing, nothing], "phi": [20.0, nothing], "displacement": [0.1, nothing],
     }  # fmt: skip
     pd.DataFrame(rows).to_csv("planes.csv", index=False)
-    assert predict_table("planes.csv", given={"pgv_m_s": 0.6}).answered == 2
+    assert predict_table("planes.csv", inputs={"pgv_m_s": 0.6}).answered == 2
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_centimetres_are_questioned_before_the_answer(shell: Shell) -> None:
     many = rbfrag.predict(height_m=np.array([2.0, 210.0]), width_m=0.5, pgv_m_s=0.5)
     assert text in many.warnings
     Path("a.csv").write_text("height_m,width_m,pgv_m_s\n2,0.4,0.5\n210,35,0.5\n")
-    found = predict_table("a.csv", given={})
+    found = predict_table("a.csv", inputs={})
     assert text in found.warnings
     assert [row["warnings"].split().count("check_unit") for row in found.blocks] == [0, 1]
     shell("report", *asked, "--out", "a.html")
@@ -166,7 +166,7 @@ def test_count_multiplies(shell: Shell) -> None:
     Path("apart.csv").write_text(head + apart)
     results = {}
     for name in ("three", "apart"):
-        predicted = predict_table(f"{name}.csv", given={"pgv_m_s": 0.6})
+        predicted = predict_table(f"{name}.csv", inputs={"pgv_m_s": 0.6})
         rates = shell.json("hazard", "curve.csv", "--blocks", f"{name}.csv", "--joint",
                            "--component", "single")  # fmt: skip
         stands = shell.json("survival", "curve.csv", "--blocks", f"{name}.csv", "--kind",
@@ -346,7 +346,7 @@ def check_not_an_input(header: str) -> None:
     frame = pd.DataFrame({**{column_of(name): [v] for name, v in USUAL.items()}, header: ["fresh"]})
     frame.to_csv("in.csv", index=False)
     try:
-        texts = predict_table("in.csv", "out.csv", given={}).warnings
+        texts = predict_table("in.csv", "out.csv", inputs={}).warnings
     except InputError as error:
         texts = (f"ignored or rejected: {error}",)
     ignored = [text for text in texts if header in text and "ignored" in text]
@@ -395,23 +395,23 @@ def test_a_kind_column_is_understood_or_named() -> None:
     slab = {name: [v, v] for name, v in USUAL.items()}
     columns = {**slab, "Block type": ["slab", "column"]}
     pd.DataFrame(columns).to_csv("a.csv", index=False)
-    told = predict_table("a.csv", given={}).warnings
+    told = predict_table("a.csv", inputs={}).warnings
     assert any("Block type (slab, column): no word names a kind" in text for text in told)
     for words in (["slab", "free-standing"], ["", "rokcing"]):
         pd.DataFrame({**slab, "Type": words}).to_csv("a.csv", index=False)
         with pytest.raises(InputError, match="is not a kind of failure"):
-            predict_table("a.csv", given={})
+            predict_table("a.csv", inputs={})
     pd.DataFrame({**slab, "Type": ["Freistehend", ""]}).to_csv("a.csv", index=False)
-    first, second = predict_table("a.csv", given={}).blocks
+    first, second = predict_table("a.csv", inputs={}).blocks
     assert (first["kind"], second["kind"]) == ("rocking", "toppling")
 
 
 def test_a_missing_width_names_the_column_that_may_be_it() -> None:
     Path("a.csv").write_text("height_m,Thicknes of slab,pgv_m_s\n2,0.4,0.6\n")
     with pytest.raises(InputError, match=r"width is missing|for the width use"):
-        predict_table("a.csv", given={})
+        predict_table("a.csv", inputs={})
     Path("a.csv").write_text("height_m,Thicknes of slab,pgv_m_s\n2,0.4,0.6\n")
-    assert predict_table("a.csv", given={"width_m": 0.4}).answered == 1
+    assert predict_table("a.csv", inputs={"width_m": 0.4}).answered == 1
 
 
 def test_ignore_columns_overrules(shell: Shell) -> None:

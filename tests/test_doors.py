@@ -318,7 +318,7 @@ def read(path: Path) -> list[dict[str, Any]]:
 def test_a_mixed_table_answers_each_row_likewise(tmp_path: Path, form: str) -> None:
     source, rows = table(tmp_path, form)
     target = tmp_path / f"answers.{form}"
-    predict_table(source, target, given={}, model=None, level=0.95, db=None)
+    predict_table(source, target, inputs={}, model=None, level=0.95, db=None)
     answers = read(target)
     assert len(answers) == len(rows)
 

@@ -22,13 +22,13 @@ from rbfrag.service.settings import ServiceSettings
 from rbfrag.vocabulary.quantities import (
     BLOCK,
     COLUMNS,
+    COMMON,
     COMPONENT,
     INPUTS,
     INTENSITY,
     QUANTITIES,
     SCENE,
     SOURCE,
-    WHOLE,
     column_of,
     option_of,
     parameter_of,
@@ -166,7 +166,7 @@ def changed(name: str) -> dict[str, Any]:
 
 
 def test_every_field_of_a_question_has_a_case() -> None:
-    every = dict.fromkeys((*BLOCK, *WHOLE, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
+    every = dict.fromkeys((*BLOCK, *COMMON, *INTENSITY, *SCENE, *SOURCE, *COMPONENT))
     assert {*every} - {*CASES} == {"block", "gmm"}  # a shape as an object, and a file
 
 
@@ -244,7 +244,7 @@ def aliases_of(name: str) -> list[str]:
 def table_answer(columns: dict[str, list[Any]]) -> float | str:
     pd.DataFrame(columns).to_csv("one.csv", index=False)
     try:
-        row = predict_table("one.csv", given={}).blocks[0]
+        row = predict_table("one.csv", inputs={}).blocks[0]
     except InputError as error:
         return str(error)
     return row["reason"] if row["probability"] is None else float(row["probability"])

@@ -33,7 +33,7 @@ GROUPS: list[tuple[type, Collection[str]]] = [
     (fields.ShakingFields, quantities.SHAKING),
     (fields.SourceFields, quantities.SOURCE),
     (fields.ComponentFields, quantities.COMPONENT),
-    (fields.WholeFields, quantities.WHOLE),
+    (fields.WholeFields, quantities.COMMON),
     (fields.AtRestFields, quantities.AT_REST),
     (fields.AnsweringFields, quantities.ANSWERING),
     (fields.RangeFields, quantities.RANGE),

@@ -1,4 +1,4 @@
-"""Bringing accelerogram files into the database."""
+"""Import of accelerogram files into the database."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ DOUBTS = {
 
 @dataclass(frozen=True)
 class FailedFile:
-    """A file that was left out; `reason` says what is wrong, and what to do."""
+    """A file that could not be added; `reason` gives the problem and the remedy."""
 
     path: str
     reason: str
@@ -60,11 +60,11 @@ class FailedFile:
 
 @dataclass(frozen=True)
 class AddReport(Result):
-    """What :func:`add_motions` did.
+    """Result of :func:`add_motions`.
 
     Args:
         added: ids of the motions that are new.
-        known: ids of those that were stored before.
+        already_stored: ids of those that were stored before.
         processed: ids of the new ones that were uncorrected and have been processed.
         failed: files that were left out, each with its reason.
         warnings: sentences about what was added: the same samples in two files, one trace
@@ -75,24 +75,24 @@ class AddReport(Result):
     """
 
     added: tuple[int, ...]
-    known: tuple[int, ...]
+    already_stored: tuple[int, ...]
     processed: tuple[int, ...]
     failed: tuple[FailedFile, ...]
     warnings: tuple[str, ...]
     not_read: tuple[str, ...]
 
     def sentences(self) -> Iterator[str]:
-        """Yield the number of motions that were added."""
+        """Yield the number of added motions."""
         processed = f", {len(self.processed):,} of them processed" if self.processed else ""
         parts = [
             f"{len(self.added):,} motion{'' if len(self.added) == 1 else 's'} added{processed}"
         ]
-        parts += [f"{len(self.known):,} stored before"] if self.known else []
+        parts += [f"{len(self.already_stored):,} stored before"] if self.already_stored else []
         parts += [f"{len(self.failed):,} rejected"] if self.failed else []
         yield "; ".join(parts)
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield the columns of the metadata that are ignored."""
+        """Yield the ignored columns of the metadata."""
         if self.not_read:
             yield TextLine("Ignored", f"columns of the metadata: {', '.join(self.not_read)}")
 
@@ -103,7 +103,7 @@ class AddReport(Result):
                 (number, "processed" if number in self.processed else "added", "", "")
                 for number in self.added
             ),
-            *((number, "known", "", "") for number in self.known),
+            *((number, "already stored", "", "") for number in self.already_stored),
             *((None, "failed", bad.path, bad.reason) for bad in self.failed),
         ]
         names = ("motion_id", "state", "file", "reason")
@@ -112,20 +112,20 @@ class AddReport(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the report under the keys of the JSON contract."""
-        lists = {each.name: list(getattr(self, each.name)) for each in fields(self)}
+        lists = {item.name: list(getattr(self, item.name)) for item in fields(self)}
         return {**lists, "failed": [{"file": f.path, "reason": f.reason} for f in self.failed]}
 
 
 @dataclass
 class _Additions:
-    """What has been found so far."""
+    """Motions, warnings and errors so far."""
 
     suite: str | None
     high_pass: HighPass | None
     processing: str
     not_read: tuple[str, ...]
     added: list[int] = field(default_factory=list)
-    known: list[int] = field(default_factory=list)
+    already_stored: list[int] = field(default_factory=list)
     processed: list[int] = field(default_factory=list)
     failed: list[FailedFile] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -135,7 +135,7 @@ class _Additions:
 
 @dataclass(frozen=True)
 class _Stored:
-    """One trace that is in the database."""
+    """One stored trace."""
 
     motion_id: int
     new: bool
@@ -159,7 +159,7 @@ def add_motions(
     high_pass: HighPass = DEFAULT_HIGH_PASS,
     on_file: Callable[[int, int], None] | None = None,
 ) -> AddReport:
-    """Read accelerogram files and store their motions, uncorrected ones processed.
+    """Read accelerogram files and store their motions; uncorrected ones are processed.
 
     Each file is stored whole or not at all. A file that cannot be read does not stop the
     others; it is reported with its reason. The database is made when the first file has
@@ -199,25 +199,25 @@ def add_motions(
     if suite is not None and not suite.strip():
         raise InputError("suite: the name is empty; give one or omit it", fields=("suite",))
     checked_name(suite or "", "the suite")
-    stated = None if metadata is None else read_metadata(metadata)
+    table = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
     says_corrected(processing)
-    not_read = () if stated is None else stated.not_read
+    not_read = () if table is None else table.not_read
     run = _Additions(suite, None if raw else high_pass, processing, not_read)
-    if stated is not None:
+    if table is not None:
         run.failed += [
             FailedFile(
                 name,
                 f"line {row.line} of the metadata names this file, but it is not there: correct "
                 "the metadata or bring the file",
             )
-            for name, row in missing_files(stated, list(map(Path, paths)))
+            for name, row in missing_files(table, list(map(Path, paths)))
         ]
     with ExitStack() as stack:
         engine: Engine | None = None
         for number, file in enumerate(files, 1):
             try:
-                traces = read_traces(file, stated, units, dt_s, allow_partial, gain)
+                traces = read_traces(file, table, units, dt_s, allow_partial, gain)
                 _take_note_of_units(run, file, traces, units, alone=len(files) == 1)
                 if gain is not None and len(files) == 1 and not traces[0].by_gain:
                     raise MotionFileError(
@@ -234,7 +234,7 @@ def add_motions(
             else:
                 _take_note(run, stored)
                 _take_note_of_sensors(run, file, traces)
-                remarks = [each for trace in traces for each in trace.motion.remarks]
+                remarks = [remark for trace in traces for remark in trace.motion.remarks]
                 run.warnings += (
                     Diagnostic(f"{file}: {text}", "header_check")
                     for text in dict.fromkeys(doubts(remarks))
@@ -247,23 +247,23 @@ def add_motions(
     for code, names in run.doubts.items():
         listed = f"{', '.join(names[:5])}{', …' if len(names) > 5 else ''}"
         run.warnings.append(Diagnostic(f"{len(names)} traces {DOUBTS[code]}: {listed}", code))
-    return AddReport(*(tuple(getattr(run, each.name)) for each in fields(AddReport)))
+    return AddReport(*(tuple(getattr(run, item.name)) for item in fields(AddReport)))
 
 
 def _take_note(run: _Additions, stored: list[_Stored]) -> None:
-    for one in stored:
-        (run.added if one.new else run.known).append(one.motion_id)
-        if one.new and one.processed:
-            run.processed.append(one.motion_id)
-        first = run.place.setdefault(one.motion_id, one.place)
-        if first != one.place:
+    for trace in stored:
+        (run.added if trace.new else run.already_stored).append(trace.motion_id)
+        if trace.new and trace.processed:
+            run.processed.append(trace.motion_id)
+        first = run.place.setdefault(trace.motion_id, trace.place)
+        if first != trace.place:
             text = (
-                f"{one.place} holds the same samples as {first}: stored once, as motion "
-                f"{one.motion_id}"
+                f"{trace.place} holds the same samples as {first}: stored once, as motion "
+                f"{trace.motion_id}"
             )
             run.warnings.append(Diagnostic(text, "duplicate_record"))
-        elif one.doubt:
-            run.warnings.append(Diagnostic(one.doubt, "duplicate_record"))
+        elif trace.doubt:
+            run.warnings.append(Diagnostic(trace.doubt, "duplicate_record"))
 
 
 def _take_note_of_sensors(run: _Additions, file: Path, traces: list[Trace]) -> None:
@@ -338,26 +338,26 @@ def _records(file: Path) -> list[Path]:
 
 
 def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) -> _Stored:
-    motion, stated = trace.motion, trace.stated
+    motion, metadata = trace.motion, trace.metadata
     flags: list[str] = []
-    uncorrected = counts_as_uncorrected(motion, stated.processing, run.processing)
+    uncorrected = counts_as_uncorrected(motion, metadata.processing, run.processing)
     filtered = uncorrected and run.high_pass is not None
     if uncorrected and run.high_pass is not None:
         motion = processed(motion, run.high_pass)
     elif uncorrected:
         flags.append("uncorrected")
-    component = stated.component
+    component = metadata.component
     if trace.is_vertical and run.high_pass is not None:
         turned = upward(replace(motion, component=component or motion.component))
         # a component that was turned is no longer called as the metadata have it
         motion, component = turned, turned.component
     flags = [flag.code for flag in quality_flags(motion)] + flags
-    if stated.event_id:
+    if metadata.event_id:
         earthquake = EarthquakeInfo(
-            event_id=stated.event_id,
-            name=stated.earthquake,
-            magnitude=stated.magnitude,
-            time=stated.year,
+            event_id=metadata.event_id,
+            name=metadata.earthquake,
+            magnitude=metadata.magnitude,
+            time=metadata.year,
             guessed=False,
         )
     else:
@@ -366,7 +366,7 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
     if trace.is_vertical is None:
         flags.append(DIRECTION_GUESSED)
     words = (
-        stated.processing
+        metadata.processing
         or run.processing
         or {None: AS_SUPPLIED, True: "corrected", False: "uncorrected"}[trace.motion.is_corrected]
     )
@@ -375,8 +375,8 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
         motion,
         earthquake=earthquake,
         is_vertical=bool(trace.is_vertical),
-        recording=stated.companion_group,
-        station=stated.station,
+        recording=metadata.companion_group,
+        station=metadata.station,
         component=component,
         processing=words,
         flags=flags,
@@ -389,11 +389,11 @@ def _store(connection: Connection, file: Path, trace: Trace, run: _Additions) ->
         if (row.source_file, row.trace_index) != (motion.source_file, motion.trace_index):
             run.place[motion_id] = f"{row.source_file}#{row.trace_index}"
     doubt = ""
-    others = same_source(connection, motion_id)
-    if new and others:
+    duplicates = same_source(connection, motion_id)
+    if new and duplicates:
         doubt = (
             f"{name} is stored as motion {motion_id}, and the same samples with other processing "
-            f"as motion {', '.join(map(str, others))}: a campaign would count the trace twice; "
+            f"as motion {', '.join(map(str, duplicates))}: a campaign would count the trace twice; "
             "use one suite for each kind of processing"
         )
     return _Stored(motion_id, new, filtered, name, doubt)

@@ -1,4 +1,4 @@
-"""Carrying out a campaign: work is handed out, answers stored as they come, progress told."""
+"""Execution of a campaign: distributes work, stores results as they arrive and reports progress."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbfrag.solver.results import NUMERICS_VERSION
 
 @dataclass(frozen=True)
 class Workforce:
-    """Who does the work of a campaign, and who hears of it.
+    """Workers of a campaign, and its progress callback.
 
     Args:
         jobs: worker processes; None for one per processor.
@@ -47,7 +47,7 @@ class Workforce:
         resumed: int,
         started: float,
     ) -> None:
-        """Have all work done and stored.
+        """Run all work and store the results.
 
         Args:
             settings: what the campaign was asked for.
@@ -63,12 +63,12 @@ class Workforce:
             StoppedError: `stopped` said so; what was finished is stored.
             WorkFailedError: a worker died, or has other numerics.
         """
-        done = resumed
+        completed = resumed
 
         def tell() -> None:
             if self.on_progress is not None:
                 seconds = time.perf_counter() - started
-                self.on_progress(CampaignProgress(done, total, resumed, seconds))
+                self.on_progress(CampaignProgress(completed, total, resumed, seconds))
 
         where = processor_and_compiler() if self.scheduler is None else CLUSTER
         scheduler = self.scheduler if chunks else None
@@ -83,9 +83,11 @@ class Workforce:
                         f"this rbfrag with {NUMERICS_VERSION}: install the same version on all "
                         "machines"
                     )
-                done += store(campaign_id, answers)
+                completed += store(campaign_id, answers)
                 tell()
-            if done < total:
-                raise StoppedError(f"stopped: {done} of {total} stored; the same command goes on")
+            if completed < total:
+                raise StoppedError(
+                    f"stopped: {completed} of {total} stored; the same command goes on"
+                )
             with engine.begin() as connection:
                 finish_campaign(connection, campaign_id)

@@ -36,7 +36,7 @@ class DatabaseCheck(Result):
 
     @property
     def is_sound(self) -> bool:
-        """Whether no damage was found."""
+        """True if no damage was found."""
         return not self.findings
 
     def sentences(self) -> Iterator[str]:

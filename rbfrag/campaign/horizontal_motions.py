@@ -1,4 +1,4 @@
-"""The horizontal motions that a campaign simulates, and what is to be said of their sensors."""
+"""Selection of the horizontal motions of a campaign, with warnings about their sensors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbfrag.results.diagnostic import Diagnostic
 
 
 class MotionChoice(TypedDict):
-    """Which motions a campaign is of."""
+    """Selection of the motions of a campaign."""
 
     suite: str | None
     include_structures: bool

@@ -1,4 +1,6 @@
-"""What Ctrl-C does to long work: once, it ends after what is in hand; twice, at once."""
+"""Handling of Ctrl-C in long work: the first press ends it after the current step, the second
+immediately.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +23,13 @@ Stopped = Callable[[], bool]
 
 
 def never() -> bool:
-    """Return False: nothing asks for a stop."""
+    """Return False: no stop is requested."""
     return False
 
 
 @contextmanager
 def stopped_by_interrupts() -> Iterator[Stopped]:
-    """Yield a function that says whether Ctrl-C was pressed within a ``with`` block.
+    """Yield a function that returns whether Ctrl-C was pressed in a ``with`` block.
 
     The first press says so on standard error at once. The second kills the worker processes and
     ends the program with status 130: a transaction that is open is rolled back by its database.
@@ -55,7 +57,7 @@ def stopped_by_interrupts() -> Iterator[Stopped]:
 
 
 def _listen(heard: socket.socket, pressed: threading.Event) -> None:
-    """Answer each press of Ctrl-C until the other end is closed."""
+    """Handle each press of Ctrl-C until the other end is closed."""
     with heard:
         while signals := heard.recv(64):
             for number in signals:
@@ -79,7 +81,7 @@ def _answer(pressed: threading.Event) -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Hold back SIGINT for a ``with`` block; processes that are started in it never get it."""
+    """Block SIGINT in a ``with`` block; processes started in it never receive it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

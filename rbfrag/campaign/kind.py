@@ -1,4 +1,4 @@
-"""What a campaign of a kind stores: its combinations, the blocks of its grid, its sequences.
+"""Interface of campaign kinds: combinations, outcome grids and sequences.
 
 What a block of the kind does is physics, and in `rbfrag/solver/models`.
 """
@@ -29,7 +29,7 @@ from rbfrag.solver.results import (
 
 @dataclass(frozen=True)
 class Case:
-    """One combination of a campaign, whatever the motion.
+    """One combination of a campaign, independent of the motion.
 
     Args:
         p2: frequency parameter of the block [1/s²]; None where it has none.
@@ -47,14 +47,14 @@ class Case:
 
     @property
     def size(self) -> float:
-        """p² [1/s²] of a kind whose blocks have one."""
+        """p² [1/s²], for kinds whose blocks have one."""
         assert self.p2 is not None
         return self.p2
 
 
 @dataclass(frozen=True)
 class CaseRequest:
-    """What of a case is to be computed.
+    """Requested results of a case.
 
     Args:
         search: look for the critical value; False where it is known.
@@ -71,7 +71,7 @@ class CaseRequest:
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """What one motion does to the blocks of a case.
+    """Results of the blocks of a case under one motion.
 
     Args:
         critical: the critical value; None of a kind without a search.
@@ -85,7 +85,7 @@ class CaseResult:
 
 
 class Measures(Protocol):
-    """What an outcome grid reads of a motion."""
+    """Intensity measures that an outcome grid uses."""
 
     @property
     def pga_g(self) -> float:
@@ -97,7 +97,7 @@ class Measures(Protocol):
 
 
 class CampaignKind(ABC):
-    """What campaigns of a kind store.
+    """Combinations and results that campaigns of a kind store.
 
     Attributes:
         options: what they may be asked.
@@ -112,7 +112,7 @@ class CampaignKind(ABC):
 
     @abstractmethod
     def cases(self, *args: Any, **request: Any) -> tuple[Case, ...]:
-        """Return the combinations of a campaign, whatever the motion.
+        """Return the combinations of a campaign, independent of the motion.
 
         Args:
             request: options that describe blocks, by name.
@@ -123,7 +123,7 @@ class CampaignKind(ABC):
 
     @abstractmethod
     def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return the strengths k/PGA of the outcome grid, which depend on no outcome.
+        """Return the strengths k/PGA of the outcome grid, independent of the outcomes.
 
         Empty where the motion has no acceleration.
         """
@@ -132,23 +132,23 @@ class CampaignKind(ABC):
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return critical value and outcome grid of every case under one motion."""
+        """Return the critical value and the outcome grid of every case under one motion."""
 
 
 class SingleBlockCampaign(CampaignKind):
-    """A kind of which campaigns run single blocks too: options `grid` and `store_responses`."""
+    """Campaign kind that also runs single blocks: options `grid` and `store_responses`."""
 
     @abstractmethod
     def run_blocks(self, shaking: Shaking, case: Case, k_over_pga: Sequence[float]) -> SearchPoints:
-        """Run blocks of stated strengths k/PGA, falling."""
+        """Run blocks at given strengths k/PGA, in decreasing order."""
 
     @abstractmethod
     def history(self, shaking: Shaking, case: Case, k_over_pga: float) -> Response:
-        """Return the motion in time of one block."""
+        """Return the response history of one block."""
 
 
 class Sequences(CampaignKind):
-    """A kind whose blocks carry a state from one motion to the next.
+    """Kind whose blocks keep their state from one motion to the next.
 
     Attributes:
         measure: what counts as failure: where the block is left [m], or its greatest rotation
@@ -159,7 +159,7 @@ class Sequences(CampaignKind):
 
     @abstractmethod
     def blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
-        """Return the blocks that are shaken, as they are stored.
+        """Return the blocks to simulate, in their stored form.
 
         Args:
             cases: what the campaign is asked for.
@@ -167,19 +167,19 @@ class Sequences(CampaignKind):
 
     @abstractmethod
     def limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return what counts as failure, in the unit of the measure; None for past recovery.
+        """Return the failure limits, in the unit of the measure; None for loss of stability.
 
         Args:
             cases: what the campaign is asked for.
         """
 
     @abstractmethod
-    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
-        """Return a block of :meth:`blocks` on its planes."""
+    def supported_block(self, block: Mapping[str, Any]) -> SupportedBlock:
+        """Return a block of :meth:`blocks` with its planes."""
 
 
 def strengths_at(p2: float, measures: Measures, y_over_pgv: FloatArray) -> FloatArray:
-    """Return k_r/PGA of the blocks of a size whose toppling velocities are given ratios of PGV.
+    """Return k_r/PGA of blocks of a size at given ratios of toppling velocity to PGV.
 
     Args:
         p2: frequency parameter p² of the blocks [1/s²].
@@ -197,7 +197,7 @@ def strengths_at(p2: float, measures: Measures, y_over_pgv: FloatArray) -> Float
 
 
 def each_once(values: Sequence[float | None], option: str, for_none: str = "None") -> None:
-    """Refuse an empty list, and one that names a value twice.
+    """Reject an empty list and repeated values.
 
     Args:
         option: their name, for the message.

@@ -1,4 +1,4 @@
-"""The machine and the versions that times belong to."""
+"""Processor and versions, recorded with computing times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PACKAGES = ("rbfrag", "numpy", "numba", "scipy")
 
 
 def machine() -> dict[str, str | int | float | None]:
-    """Return processor, cores, load and versions; nothing that names the computer."""
+    """Return processor, cores, load and versions; nothing that identifies the computer."""
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -23,7 +23,7 @@ def machine() -> dict[str, str | int | float | None]:
 
 
 def processor_and_compiler() -> str:
-    """Return processor and compiler: where both are the same, so is every bit of a result."""
+    """Return processor and compiler; if both are equal, results are bit-identical."""
     about = machine()
     return f"{about['processor']}, numba {about['numba']}"
 
@@ -40,7 +40,7 @@ def _processor() -> str:
 
 
 def _load() -> float | None:
-    """Return the load of the last minute: how many processes wanted to run."""
+    """Return the load average of the last minute."""
     try:
         return round(os.getloadavg()[0], 2)
     except (AttributeError, OSError):

@@ -1,4 +1,4 @@
-"""Which motions follow one another in a campaign of sequences: shocks of one station, and draws."""
+"""Motion pairs of a campaign of sequences: consecutive shocks at one station, and random pairs."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def motion_pairs(
 def shocks_of_stations(
     rows: Iterable[MotionRow], times: Mapping[str, str]
 ) -> tuple[MotionPair, ...]:
-    """Return each shock after the one before it, at one station in one direction.
+    """Return each shock with its predecessor, at one station in one direction.
 
     Their order is that of the times that the metadata state; where these are equal, such as one
     year, that of the clocks of the files if all tell the time, and else that of the ids of the
@@ -70,13 +70,13 @@ def shocks_of_stations(
     Args:
         times: time or year by event id, of earthquakes that metadata state.
     """
-    places: defaultdict[tuple[str, object], list[MotionRow]] = defaultdict(list)
+    by_station: defaultdict[tuple[str, object], list[MotionRow]] = defaultdict(list)
     for row in rows:
         if row.station and not row.event_guessed and row.event_id in times:
             direction = row.component if row.orientation_deg is None else row.orientation_deg
-            places[row.station, direction].append(row)
+            by_station[row.station, direction].append(row)
     pairs = []
-    for shocks in places.values():
+    for shocks in by_station.values():
         clocks = all(row.start_time for row in shocks)
         by_event = {row.event_id: row for row in sorted(shocks, key=lambda row: row.sha256)}
         in_order = sorted(
@@ -87,14 +87,14 @@ def shocks_of_stations(
                 _numbered(row.event_id),
             ),
         )
-        pairs += [MotionPair(one, other, "station") for one, other in pairwise(in_order)]
+        pairs += [MotionPair(first, other, "station") for first, other in pairwise(in_order)]
     return tuple(pairs)
 
 
 def drawn_pairs(
     rows: Sequence[MotionRow], without: set[int], seed: int, draws: int
 ) -> tuple[MotionPair, ...]:
-    """Return every other motion after some of other earthquakes, drawn from all of them.
+    """Return random pairs: each second motion after motions of other earthquakes.
 
     Drawn are the first motions of least hash with the second (Thaler and Ravishankar 1998,
     IEEE/ACM Transactions on Networking 6(1), 1-14): the draw depends on samples and seed alone,
@@ -106,10 +106,10 @@ def drawn_pairs(
     """
     pairs = []
     for second in rows:
-        others = [row for row in rows if row.event_id != second.event_id]
+        candidates = [row for row in rows if row.event_id != second.event_id]
         if second.id not in without:
             begun = f"{seed}:{second.sha256}:"
-            firsts = nsmallest(draws, others, key=lambda row: _hash(begun + row.sha256))
+            firsts = nsmallest(draws, candidates, key=lambda row: _hash(begun + row.sha256))
             pairs += [MotionPair(first, second, "drawn") for first in firsts]
     return tuple(pairs)
 
@@ -119,6 +119,6 @@ def _hash(text: str) -> bytes:
 
 
 def _numbered(event_id: str) -> list[tuple[int, str]]:
-    """Return a key by which shock 2 comes before shock 10."""
+    """Return a sort key that puts shock 2 before shock 10."""
     parts = re.findall(r"\d+|\D+", event_id)
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]

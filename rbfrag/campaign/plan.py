@@ -1,4 +1,4 @@
-"""Which combinations a campaign is made of, and what of them is still to do."""
+"""Plan of a campaign: its combinations, and the remaining work."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ MOST_VALUES = 10_000
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What is asked for beside the critical values and the outcome grid.
+class ExtraResults:
+    """Results requested in addition to the critical values and the outcome grid.
 
     Args:
         full_map: the map of the intervals that fail and that do not.
@@ -50,7 +50,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """All combinations of one horizontal motion, so that its samples travel once.
+    """All combinations of one horizontal motion, so that its samples are sent once.
 
     Args:
         vertical: the vertical motion of its recording, where some of the cases need it.
@@ -63,7 +63,7 @@ class MotionPlan:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """What a campaign is made of.
+    """Combinations of a campaign.
 
     Args:
         motions: the longest records first, so that no worker is left with one at the end.
@@ -84,7 +84,7 @@ class CampaignPlan:
 
 @dataclass(frozen=True)
 class MotionTasks:
-    """What is to do on one horizontal motion.
+    """Remaining work on one horizontal motion.
 
     Args:
         tasks: what its combinations lack.
@@ -98,20 +98,20 @@ class MotionTasks:
 
 @dataclass(frozen=True)
 class Todo:
-    """The work that is left.
+    """Remaining work of a campaign.
 
     Args:
         motions: those with something left to do, in the order of the plan.
-        known: what is stored of each combination, by natural key.
+        combinations: what is stored of each combination, by natural key.
     """
 
     motions: tuple[MotionTasks, ...]
-    known: dict[str, KnownCombination]
+    combinations: dict[str, KnownCombination]
 
     @property
     def tasks(self) -> int:
-        """Number of combinations with something left to do."""
-        return sum(len(each.tasks) for each in self.motions)
+        """Number of combinations with remaining work."""
+        return sum(len(motion.tasks) for motion in self.motions)
 
 
 def plan_campaign(
@@ -123,7 +123,7 @@ def plan_campaign(
     vertical: Vertical = "without",
     include_structures: bool = False,
 ) -> CampaignPlan:
-    """Return every combination: horizontal motions x vertical or not x polarity x cases.
+    """Return every combination: horizontal motions x with or without vertical x polarity x cases.
 
     Args:
         cases: the blocks and what counts as failure, from the kind.
@@ -144,18 +144,18 @@ def plan_campaign(
     )
     companions = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
     pairs = [companions[row.id] for row in rows if row.id in companions]
-    fitting = {each.motion_id: each for each in pairs if each.vertical_id is not None}
-    lacking = [each.reason for each in pairs if each.vertical_id is None]
+    fitting = {pair.motion_id: pair for pair in pairs if pair.vertical_id is not None}
+    lacking = [pair.reason for pair in pairs if pair.vertical_id is None]
     if vertical != "without" and not fitting:
         raise InputError(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
             f"{_first(lacking)}; add the vertical components, or omit them"
         )
     if lacking:
-        left = "left out" if vertical == "with" else "shaken without one only"
+        treatment = "left out" if vertical == "with" else "shaken without one only"
         text = (
             f"{len(lacking)} of {len(rows)} horizontal motions have no vertical one that fits and "
-            f"are {left}: {_first(lacking)}"
+            f"are {treatment}: {_first(lacking)}"
         )
         warnings.append(Diagnostic(text, "no_vertical"))
     plans = [
@@ -171,19 +171,19 @@ def plan_campaign(
         )
         for row in rows
     ]
-    kept = sorted((p for p in plans if p.cases), key=lambda p: (-p.motion.npts, p.motion.id))
-    return CampaignPlan(kind, tuple(kept), len(lacking), tuple(warnings))
+    ordered = sorted((p for p in plans if p.cases), key=lambda p: (-p.motion.npts, p.motion.id))
+    return CampaignPlan(kind, tuple(ordered), len(lacking), tuple(warnings))
 
 
-def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> Todo:
-    """Compare a plan with what is stored.
+def remaining_work(connection: Connection, plan: CampaignPlan, extra: ExtraResults) -> Todo:
+    """Return the part of a plan that is not stored yet.
 
     Args:
-        wanted: what it asks for beside critical values and outcome grids.
+        extra: what it asks for beside critical values and outcome grids.
     """
-    known = known_combinations(connection, (case.natural_key for case in plan.cases))
+    combinations = known_combinations(connection, (case.natural_key for case in plan.cases))
     with_blocks = (
-        combinations_with_points(connection, known, wanted.blocks) if wanted.blocks else set()
+        combinations_with_points(connection, combinations, extra.blocks) if extra.blocks else set()
     )
     histories = known_responses(
         connection,
@@ -191,7 +191,7 @@ def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -
             _history_key(motion, case, ratio)
             for motion in plan.motions
             for case in motion.cases
-            for ratio in _histories(known.get(case.natural_key), wanted)
+            for ratio in _histories(combinations.get(case.natural_key), extra)
         ),
     )
     # X(p) is a measure of blocks that are described by p² and backed by a slope
@@ -202,17 +202,18 @@ def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -
     motions = []
     for motion in plan.motions:
         tasks = [
-            _task(motion, case, known, with_blocks, histories, wanted) for case in motion.cases
+            _task(motion, case, combinations, with_blocks, histories, extra)
+            for case in motion.cases
         ]
-        left = tuple(task for task in tasks if task is not None)
+        remaining = tuple(task for task in tasks if task is not None)
         spectrum = missing_sizes(spectra, motion.motion.id, sizes)
-        if left or spectrum:
-            motions.append(MotionTasks(motion, left, spectrum))
-    return Todo(tuple(motions), known)
+        if remaining or spectrum:
+            motions.append(MotionTasks(motion, remaining, spectrum))
+    return Todo(tuple(motions), combinations)
 
 
 def missing_sizes(
-    known: Container[SpectrumKey], motion_id: int, p2: Sequence[float]
+    spectra: Container[SpectrumKey], motion_id: int, p2: Sequence[float]
 ) -> dict[Polarity, tuple[float, ...]]:
     """Return the p² [1/s²] at which X(p) of a motion is not stored, by polarity.
 
@@ -221,14 +222,14 @@ def missing_sizes(
     """
     missing: dict[Polarity, tuple[float, ...]] = {}
     for polarity in POLARITIES:
-        sizes = tuple(each for each in map(float, p2) if (motion_id, polarity, each) not in known)
+        sizes = tuple(size for size in map(float, p2) if (motion_id, polarity, size) not in spectra)
         if sizes:
             missing[polarity] = sizes
     return missing
 
 
 def strengths_of(number: int) -> tuple[float, ...]:
-    """Return strengths that do not depend on any outcome: equal steps of ln(k/PGA).
+    """Return strengths independent of any outcome: equal steps of ln(k/PGA).
 
     Args:
         number: how many values, from 0.99 down to the search limit 0.01; at least 2.
@@ -242,23 +243,23 @@ def strengths_of(number: int) -> tuple[float, ...]:
     return tuple(values.tolist())
 
 
-def checked_ratios(values: Sequence[float], what: str) -> tuple[float, ...]:
-    """Return k/PGA values as they are stored, falling, each once.
+def checked_ratios(values: Sequence[float], name: str) -> tuple[float, ...]:
+    """Return k/PGA values in stored form, decreasing and unique.
 
     Raises:
         InputError: a value that is not positive and finite, or one that repeats.
     """
-    ratios = sorted((positive(value, what, "k_r/PGA") for value in values), reverse=True)
-    for one, next_one in pairwise(ratios):
-        if one == next_one:
+    ratios = sorted((positive(value, name, "k_r/PGA") for value in values), reverse=True)
+    for ratio, next_one in pairwise(ratios):
+        if ratio == next_one:
             raise InputError(
-                f"{what}: {one:g} is in the list twice: give each value once", fields=(what,)
+                f"{name}: {ratio:g} is in the list twice: give each value once", fields=(name,)
             )
     return tuple(ratios)
 
 
 def _verticals(vertical: Vertical, companion: VerticalPair | None) -> Iterable[VerticalPair | None]:
-    """Yield the vertical motions that a horizontal one is shaken with, None for without."""
+    """Yield the vertical motions to combine with a horizontal one, None for without."""
     if vertical != "with":
         yield None
     if vertical != "without" and companion is not None:
@@ -285,12 +286,12 @@ def _planned(
 def _task(
     motion: MotionPlan,
     planned: PlannedCase,
-    known: Mapping[str, KnownCombination],
+    combinations: Mapping[str, KnownCombination],
     with_blocks: set[str],
     histories: set[str],
-    wanted: Wanted,
+    extra: ExtraResults,
 ) -> Task | None:
-    there = known.get(planned.natural_key)
+    there = combinations.get(planned.natural_key)
     moves = motion.motion.pga_g > 0.0  # without motion k/PGA says nothing
     critical = None if there is None else there.kr_over_pga
     lacks_grid = there is None or (
@@ -302,15 +303,15 @@ def _task(
         planned=planned,
         search=there is None,
         grid=moves and lacks_grid,
-        full_map=wanted.full_map
+        full_map=extra.full_map
         and (there is None or (not there.mapped and there.status in ("found", "below_limit"))),
-        blocks=wanted.blocks if moves and planned.natural_key not in with_blocks else (),
+        blocks=extra.blocks if moves and planned.natural_key not in with_blocks else (),
         histories=tuple(
             ratio
-            for ratio in wanted.histories
+            for ratio in extra.histories
             if moves and _history_key(motion, planned, ratio) not in histories
         ),
-        critical_history=wanted.critical_history
+        critical_history=extra.critical_history
         and (
             there is None
             or (critical is not None and _history_key(motion, planned, critical) not in histories)
@@ -320,9 +321,9 @@ def _task(
     return task if task.asks else None
 
 
-def _histories(there: KnownCombination | None, wanted: Wanted) -> Iterable[float]:
-    yield from wanted.histories
-    if wanted.critical_history and there is not None and there.kr_over_pga is not None:
+def _histories(there: KnownCombination | None, extra: ExtraResults) -> Iterable[float]:
+    yield from extra.histories
+    if extra.critical_history and there is not None and there.kr_over_pga is not None:
         yield there.kr_over_pga
 
 

@@ -1,4 +1,4 @@
-"""A random sample of what is stored, computed again and compared: `rbfrag db check --sample`."""
+"""Repeated computation of a random sample of stored results: `rbfrag db check --sample`."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _VALUES = (
 
 
 class End(NamedTuple):
-    """How one simulated block ended.
+    """Final state of one simulated block.
 
     Args:
         theta_n: peak rotation over the critical angle; None where there is none.
@@ -65,7 +65,7 @@ class End(NamedTuple):
 
 @dataclass(frozen=True)
 class Resimulation:
-    """What computing a sample again showed.
+    """Result of the repeated computation of a sample.
 
     Args:
         sampled: combinations, and blocks under two motions, computed again.
@@ -83,7 +83,7 @@ class Resimulation:
 
 
 def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimulation:
-    """Compute a random sample of combinations and pairs of motions again and compare.
+    """Compute a random sample of combinations and motion pairs again, and compare.
 
     What was made on this kind of processor with this version of numba must come out bit for
     bit, anything else within the error of the solver. The sample is drawn from the sorted
@@ -97,7 +97,7 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
     of_pairs = set(pairs)
     keys = sorted([*keys, *pairs])
     chosen = random.Random(seed).sample(keys, min(sample, len(keys)))
-    here = processor_and_compiler()
+    processor = processor_and_compiler()
     exact = within_error = 0
     findings: list[Damage] = []
     for key in chosen:
@@ -105,7 +105,7 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
             (pair,) = stored_shock_pairs(connection, [key])
             off = _pair_differences(connection, pair, exactly=True)
             exact += not off
-            if off and pair.processor != here:
+            if off and pair.processor != processor:
                 off = _pair_differences(connection, pair, exactly=False)
                 within_error += not off
             findings += (
@@ -122,7 +122,7 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
         if not off:
             exact += 1
             continue
-        if stored.campaign_settings.get("made_on") != here:
+        if stored.campaign_settings.get("made_on") != processor:
             off = list(deviations(stored, again))
             within_error += not off
         findings += (_finding(stored, problem) for problem in off)
@@ -137,7 +137,7 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
 
 
 def _pair_differences(connection: Connection, pair: StoredShockPair, *, exactly: bool) -> list[str]:
-    """Return what computing a block under two motions again gives otherwise."""
+    """Return the differences of a repeated computation of a block under two motions."""
     then = pair.record
     first, second = (
         load_motion(connection, row) for row in (then.first_motion_id, then.second_motion_id)
@@ -183,9 +183,9 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
     ends = ends_of(answer.grid)
     if answer.critical is not None:
         ends = {**ends_of(answer.critical.points), **ends}
-    others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
-    if others and isinstance(kind, SingleBlockCampaign):
-        ends |= ends_of(kind.run_blocks(shaking, case, others))
+    missing = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
+    if missing and isinstance(kind, SingleBlockCampaign):
+        ends |= ends_of(kind.run_blocks(shaking, case, missing))
 
     def error(k_over_pga: float) -> float:
         if not isinstance(kind, SingleBlockCampaign):
@@ -200,7 +200,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
 
 @dataclass(frozen=True)
 class ComputedAgain:
-    """What the present solver answers for a stored combination.
+    """Result of the present solver for a stored combination.
 
     Args:
         critical: the search; None where the kind has none.
@@ -214,7 +214,7 @@ class ComputedAgain:
 
 
 def ends_of(points: SearchPoints | None) -> dict[float, End]:
-    """Return how simulated blocks ended, by k/PGA."""
+    """Return the final states of simulated blocks, by k/PGA."""
     if points is None:
         return {}
     slid, sensitive = points.displacement_m, points.sensitive
@@ -232,7 +232,7 @@ def ends_of(points: SearchPoints | None) -> dict[float, End]:
 
 
 def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
-    """Yield every value that is not the same bit for bit, and maps that contradict each other."""
+    """Yield every value that is not bit-identical, and contradictory maps."""
     critical = again.critical
     if critical is not None:
         for name in _VALUES:
@@ -252,7 +252,7 @@ def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str
 
 
 def deviations(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
-    """Yield what differs by more than the error of the solver."""
+    """Yield differences larger than the error of the solver."""
     values, critical = stored.values, again.critical
     borders: list[float] = []
     if critical is not None:

@@ -1,4 +1,4 @@
-"""The blocks between two fracture sets, and what a motion does to them: `rockmass`."""
+"""Blocks between two joint sets, and their failure under a ground motion: `rockmass`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ QUARTERS = ("q05", "q50", "q95")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RockMassAnswer(Result):
-    """Blocks of a rock mass, and what fails of them.
+    """Blocks of a rock mass, and the fraction that fails.
 
     Its table has one row a block; with a motion one a block and scale.
 
@@ -82,7 +82,9 @@ class RockMassAnswer(Result):
             yield _of_scale(shaking["motion"], scale)
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield rejected realisations, equal counts, measures and model, and failure limits."""
+        """Yield rejected realisations, equal counts, intensity measures and model, and failure
+        limits.
+        """
         document = self.as_dict()
         for text, count in document["impossible"].items():
             yield TextLine("Rejected", f"{count:,} realisations are no block: {text}")
@@ -165,13 +167,13 @@ class RockMassAnswer(Result):
         return {**columns, "warnings": codes, "reason": reason}
 
     def __repr__(self) -> str:
-        """Return how many blocks of each mode there are, on one line."""
-        counts = {name: each.count for name, each in mode_counts(self.blocks).items()}
+        """Return the number of blocks by mode, on one line."""
+        counts = {name: mode.count for name, mode in mode_counts(self.blocks).items()}
         return f"RockMassAnswer({self.blocks.n_blocks} blocks: {counts})"
 
 
 def _of_average(average: Mapping[str, Any]) -> str:
-    """Return a mean probability with its interval."""
+    """Return a mean probability with its confidence interval."""
     return with_interval(average["probability"], average["ci_low"], average["ci_high"])
 
 
@@ -225,7 +227,7 @@ def _scenario_table(scenario: Mapping[str, Any]) -> TextTable:
 
 
 def _failure_tables(shaking: Mapping[str, Any]) -> Iterator[TextTable]:
-    """Yield the failures by scale and mode, and the modes by which blocks end."""
+    """Yield the failures by scale and mode, and the final modes of the blocks."""
     counts = [tally for scale in shaking["scales"] for tally in scale["modes"].values()]
     outcomes = [
         name
@@ -261,7 +263,7 @@ def _failure_tables(shaking: Mapping[str, Any]) -> Iterator[TextTable]:
 
 
 class RockMassQuestion(MeasureFields[float | None], total=False):
-    """What may be asked of the blocks of a rock mass."""
+    """Options of `rockmass`."""
 
     sa_g: Mapping[float, float] | None
     motion: MotionLike | None
@@ -290,7 +292,7 @@ def rockmass(
     seed: int | None = None,
     **question: Unpack[RockMassQuestion],
 ) -> RockMassAnswer:
-    """Draw blocks from two fracture sets, with their modes, yields and failures.
+    """Sample blocks from two joint sets, with their modes, yield accelerations and failures.
 
     With a measure of the motion the probability of failure is averaged over the blocks of each
     mode that there is a fragility model for; with `motion` every block that it moves is run.
@@ -328,20 +330,20 @@ def rockmass(
     """
     UnknownFieldError.refuse(question, RockMassQuestion, "a rock mass")
     blocks = _rock_mass(mass).realise(n, seed)
-    given: dict[str, Any] = {name: each for name, each in question.items() if each is not None}
+    options: dict[str, Any] = {name: value for name, value in question.items() if value is not None}
 
     def of(names: Iterable[str]) -> dict[str, Any]:
-        return {name: given[name] for name in names if name in given}
+        return {name: options[name] for name in names if name in options}
 
-    measures = of(MeasureFields.__annotations__) | spectral(given.get("sa_g", {}))
-    level, motion = checked_level(given.get("level", 0.95)), given.get("motion")
+    measures = of(MeasureFields.__annotations__) | spectral(options.get("sa_g", {}))
+    level, motion = checked_level(options.get("level", 0.95)), options.get("motion")
     if motion is not None and measures:
         raise InputError(
             f"motion cannot be combined with {next(iter(measures))}: give the accelerogram or the "
             "intensity measures"
         )
     answer = scenario(blocks, measures, **of(ANSWERED_BY)) if measures else None
-    vertical = as_motion(given["vertical"], "vertical") if "vertical" in given else None
+    vertical = as_motion(options["vertical"], "vertical") if "vertical" in options else None
     ran = None
     if motion is not None:
         limits = FailureLimits(**of(FAILS_BY))
@@ -354,9 +356,9 @@ def rockmass(
     return RockMassAnswer(blocks, answer, ran, level, tuple(warnings))
 
 
-def _rock_mass(given: object) -> RockMass:
-    if isinstance(given, RockMass):
-        return given
-    if isinstance(given, Mapping):
-        return rock_mass_of_tables(given)
-    return read_rock_mass(as_path(given, "mass", "a rock mass"))
+def _rock_mass(source: object) -> RockMass:
+    if isinstance(source, RockMass):
+        return source
+    if isinstance(source, Mapping):
+        return rock_mass_of_tables(source)
+    return read_rock_mass(as_path(source, "mass", "a rock mass"))

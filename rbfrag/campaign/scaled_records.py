@@ -1,4 +1,4 @@
-"""Campaigns of blocks under scaled records: what a family of stated blocks does, to rest or fall.
+"""Campaigns under scaled records: a family of blocks, simulated to rest or failure.
 
 Strength and frequency do not fix the motion of such a block: shape, friction and dip do. Each block
 of a family is therefore followed to its end under the record scaled to k/PGA of a grid.
@@ -32,7 +32,7 @@ from rbfrag.solver.search.incremental_scaling import (
 
 @dataclass(frozen=True)
 class BlockClass:
-    """A parallelogram and its planes: all that decides how it moves.
+    """Parallelogram and its planes, which determine its motion.
 
     Args:
         s1_m: thickness normal to the base [m].
@@ -50,16 +50,16 @@ class BlockClass:
 
     @property
     def block(self) -> Block:
-        """Shape and size."""
+        """Geometry of the block."""
         return Block.from_fractures(self.s1_m, self.s2_m, self.gamma_deg)
 
     def as_dict(self) -> dict[str, float]:
-        """Return the block as it is stored."""
+        """Return the block in stored form."""
         return asdict(self)
 
 
 class ScaledRecords(Sequences):
-    """The outcome grid of every block of a family and rotation that counts as failure.
+    """Outcome grid of every block of a family and every rotation limit.
 
     Attributes:
         rotations_deg: the rotations where none are asked for [deg]; None for failure past
@@ -82,7 +82,7 @@ class ScaledRecords(Sequences):
         rotations_deg: Sequence[float | None] | None = None,
         family: Sequence[BlockClass] | None = None,
     ) -> tuple[Case, ...]:
-        """Return every block of the family with every rotation that counts as failure [deg].
+        """Return every block of the family with every rotation limit [deg].
 
         Raises:
             InputError: no rotation, or one that repeats; a block of another mode.
@@ -93,21 +93,21 @@ class ScaledRecords(Sequences):
         ]
         each_once(rotations, "rotation_deg", for_none="recovery")
         blocks = self.family if family is None else family
-        shaken = [(each, self._shaken(each)) for each in blocks]
+        shaken = [(block, self._shaken(block)) for block in blocks]
         return tuple(
-            Case(self.kind, its.p2, each.as_dict(), {"rotation_deg": rotation}, its.yield_g)
-            for each, its in shaken
+            Case(self.kind, its.p2, block.as_dict(), {"rotation_deg": rotation}, its.yield_g)
+            for block, its in shaken
             for rotation in rotations
         )
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return k/PGA to which the record is scaled."""
+        """Return the k/PGA to which the record is scaled."""
         return self.ratios if measures.pga_g > 0.0 else np.empty(0)
 
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return the outcome grid of every case under one motion; those of one block share runs.
+        """Return the outcome grid of every case under one motion; cases of one block share runs.
 
         Raises:
             InputError: a case of an rbfrag that did not follow its blocks past a lost contact.
@@ -125,7 +125,7 @@ class ScaledRecords(Sequences):
             for i in numbers:
                 rotation: Any = cases[i].settings["rotation_deg"]
                 fails = rotation_rad(rotation)
-                runs = [scaled_run(*each, fails) for each in zip(ends, scales, strict=True)]
+                runs = [scaled_run(*pair, fails) for pair in zip(ends, scales, strict=True)]
                 results[i] = CaseResult(None, grid_points(ratios, runs, critical_rad(shaken)))
         return results
 
@@ -134,20 +134,20 @@ class ScaledRecords(Sequences):
         return tuple(block.as_dict() for block in dict.fromkeys(map(_class_of, cases)))
 
     def limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return the stated rotations [rad]."""
-        stated: list[Any] = [case.settings["rotation_deg"] for case in cases]
+        """Return the rotation limits [rad]."""
+        rotations: list[Any] = [case.settings["rotation_deg"] for case in cases]
         return tuple(
             None if rotation is None else math.radians(rotation)
-            for rotation in dict.fromkeys(stated)
+            for rotation in dict.fromkeys(rotations)
         )
 
-    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
-        """Return the block on its planes."""
+    def supported_block(self, block: Mapping[str, Any]) -> SupportedBlock:
+        """Return the block with its planes."""
         return self._shaken(BlockClass(**block)).supported_block
 
-    def _shaken(self, each: BlockClass) -> ShakenMechanism:
+    def _shaken(self, block: BlockClass) -> ShakenMechanism:
         return shaken_mechanism(
-            model_of_kind(self.kind), each.block, beta_deg=each.beta_deg, phi_deg=each.phi_deg
+            model_of_kind(self.kind), block.block, beta_deg=block.beta_deg, phi_deg=block.phi_deg
         )
 
 

@@ -1,4 +1,4 @@
-"""Campaigns of sequences: blocks under two motions, one after the other, and under the second."""
+"""Campaigns of sequences: blocks under two consecutive motions, and under the second alone."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SequenceTask:
 
 @dataclass(frozen=True, eq=False)
 class PairWork:
-    """Two motions with all that is to do on them: they travel once."""
+    """Two motions with all work on them, sent once."""
 
     kind: str
     first_id: int
@@ -63,7 +63,7 @@ class PairWork:
 
 @dataclass(frozen=True)
 class PairResults:
-    """The answers, the number of runs they took, and the numerics of whoever gave them."""
+    """Results, number of runs, and the numerics version of the worker."""
 
     records: tuple[ShockPairRecord, ...]
     runs: int
@@ -71,7 +71,7 @@ class PairResults:
 
 
 def sequences_of_kind(name: str) -> Sequences:
-    """Return what campaigns of sequences of a kind store.
+    """Return the sequence campaign of a kind.
 
     Raises:
         InputError: there is no such kind, or a motion leaves its blocks where they were.
@@ -95,7 +95,7 @@ def simulate_sequences(
     draws: int,
     workforce: Workforce,
 ) -> CampaignSummary:
-    """Store what pairs of motions do to the blocks of a kind, and tabulate it.
+    """Simulate the blocks of a kind under pairs of motions, and store and tabulate the results.
 
     Args:
         cases: what the campaign is asked for: the blocks of slumps, and what counts as failure.
@@ -113,9 +113,9 @@ def simulate_sequences(
             pairs = motion_pairs(connection, rows, seed=seed, draws=draws)
             plan = [(pair, _tasks(pair, kind, blocks)) for pair in pairs]
             keys = [task.natural_key for _, tasks in plan for task in tasks]
-            known = known_shock_pairs(connection, keys)
+            stored = known_shock_pairs(connection, keys)
         lacking = (
-            (pair, tuple(task for task in tasks if task.natural_key not in known))
+            (pair, tuple(task for task in tasks if task.natural_key not in stored))
             for pair, tasks in plan
         )
         todo = [(pair, tasks) for pair, tasks in lacking if tasks]
@@ -134,7 +134,7 @@ def simulate_sequences(
         }  # fmt: skip
         workforce.carry_out(
             engine, settings, run_pair, _work(engine, kind.kind, todo), len(todo), store,
-            total=len(keys), resumed=len(known), started=started,
+            total=len(keys), resumed=len(stored), started=started,
         )  # fmt: skip
         with engine.connect() as connection:
             answers = stored_shock_pairs(connection, keys)
@@ -151,7 +151,7 @@ def simulate_sequences(
         not_searched=len(keys),
         runs=runs,
         seconds=time.perf_counter() - started,
-        resumed=len(known),
+        resumed=len(stored),
         warnings=(*warnings, *([warning] if drawn else ())),
         sequence=SequenceReport(
             seed=seed,
@@ -191,27 +191,27 @@ def _work(
 
 def run_pair(work: PairWork) -> PairResults:
     """Run every block under both motions, and under the second alone."""
-    sites, model = sequences_of_kind(work.kind), model_of_kind(work.kind)
+    campaign, model = sequences_of_kind(work.kind), model_of_kind(work.kind)
     records, runs = [], 0
     for task in work.tasks:
-        site = sites.site(task.block)
+        supported_block = campaign.supported_block(task.block)
 
         def under(
             motion: GroundMotion,
             start: BlockState | None = None,
-            site: SupportedBlock = site,
+            supported_block: SupportedBlock = supported_block,
             polarity: Polarity = task.polarity,
         ) -> Response:
-            """Return what the block does under a motion that finds it in a state."""
+            """Return the response of the block to a motion from an initial state."""
             shaking = Shaking(motion, None, polarity, start=start, laws=False, stepwise=False)
-            return model.respond(site, shaking)
+            return model.respond(supported_block, shaking)
 
         first, intact = under(work.first), under(work.second)
         second, runs = None, runs + 2
         if first.state is not None:
             second, runs = under(work.second, first.state), runs + 1
         critical = first.critical_angle_deg
-        assert site.yield_g is not None
+        assert supported_block.yield_g is not None
         records.append(
             ShockPairRecord(
                 natural_key=task.natural_key,
@@ -221,7 +221,7 @@ def run_pair(work: PairWork) -> PairResults:
                 polarity=task.polarity,
                 kind=work.kind,
                 block=task.block,
-                yield_g=site.yield_g,
+                yield_g=supported_block.yield_g,
                 critical_rad=None if critical is None else math.radians(critical),
                 numerics_version=NUMERICS_VERSION,
                 first=_end(first, None),

@@ -1,4 +1,4 @@
-"""Running the blocks of a rock mass under one motion, by workers."""
+"""Simulation of the blocks of a rock mass under one motion, by workers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def shake(
     on_progress: Callable[[CampaignProgress], None] | None = None,
     **shaking: Unpack[ShakingOptions],
 ) -> ShakenMass:
-    """Run every block of a rock mass that a motion moves, each in its own mode.
+    """Simulate every block of a rock mass that a motion moves, each in its own mode.
 
     The answer does not depend on the number of workers.
 
@@ -51,20 +51,20 @@ def shake(
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
     plan = plan_shaking(blocks, motion, **shaking)
-    total = int(plan.places.size)
+    total = int(plan.indices.size)
     workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))
     if jobs is None and total < WORTH_A_PROCESS:
         workers = 1
     started = time.perf_counter()
 
     def reported(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
-        done = 0
+        completed = 0
         if on_progress is not None and total:
             on_progress(CampaignProgress(0, total, 0, 0.0))
         for answer in answers:
-            done += int(answer.place.size)
+            completed += int(answer.place.size)
             if on_progress is not None:
-                on_progress(CampaignProgress(done, total, 0, time.perf_counter() - started))
+                on_progress(CampaignProgress(completed, total, 0, time.perf_counter() - started))
             yield answer
 
     answers = run_locally(

@@ -1,4 +1,4 @@
-"""Running a campaign: workers compute, one writer stores, resumed by its natural keys."""
+"""Simulation campaign: workers compute, one writer stores; resumable by natural keys."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rbfrag.campaign.kind import Case
 from rbfrag.campaign.kinds import campaign_kinds, campaign_of_kind
 from rbfrag.campaign.plan import (
     CampaignPlan,
+    ExtraResults,
     MotionTasks,
     Todo,
-    Wanted,
     checked_ratios,
     plan_campaign,
     remaining_work,
@@ -57,7 +57,7 @@ OPTIONS = (*DESCRIBED, "grid", "store_responses", "full_map")
 
 
 class CampaignOptions(TypedDict, total=False):
-    """What a campaign runs and stores."""
+    """Options of a campaign."""
 
     suite: str | None
     p2: Sequence[float] | None
@@ -142,14 +142,14 @@ def simulate(
         "suite": suite, "include_structures": request.get("include_structures", False)
     }  # fmt: skip
     full_map, histories = request.get("full_map", False), request.get("store_responses")
-    given: dict[str, Any] = {
-        name: each for name, each in request.items() if each is not None and each is not False
+    options: dict[str, Any] = {
+        name: value for name, value in request.items() if value is not None and value is not False
     }
-    described = {name: given[name] for name in DESCRIBED if name in given}
+    described = {name: options[name] for name in DESCRIBED if name in options}
     if sequence:
         sequences_of_kind(kind)
-    cases = _cases(kind, described, [name for name in OPTIONS if name in given])
-    wanted = _wanted(request.get("grid"), histories, full_map)
+    cases = _cases(kind, described, [name for name in OPTIONS if name in options])
+    extra = _extra_results(request.get("grid"), histories, full_map)
     depth = positive(request.get("map_depth", MAP_DEPTH), "map_depth", "a width of k_r/PGA")
     if sequence:
         if vertical != "without":
@@ -170,18 +170,18 @@ def simulate(
     with opened_database(db) as engine:
         with engine.connect() as connection:
             plan = plan_campaign(connection, kind, cases, vertical=vertical, **motions)
-            todo = remaining_work(connection, plan, wanted)
+            todo = remaining_work(connection, plan, extra)
         settings = {
             "kind": kind,
             "suite": suite,
             "vertical": vertical,
             **{name: list(value) for name, value in described.items() if name != "family"},
-            "grid": list(wanted.blocks),
+            "grid": list(extra.blocks),
             "store_responses": list(map(str, histories or ())),
             "map_depth": depth if full_map else None,
         }
         run = _Run(engine, plan, todo)
-        work = (_with_samples(engine, each, depth) for each in todo.motions)
+        work = (_with_samples(engine, tasks, depth) for tasks in todo.motions)
         workforce.carry_out(
             engine, settings, run_work, work, len(todo.motions), run.take, total=run.total,
             resumed=run.resumed, started=started,
@@ -189,12 +189,14 @@ def simulate(
     return run.summary(time.perf_counter() - started)
 
 
-def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[Case, ...]:
-    """Ask the kind for its combinations; it refuses the options of others."""
+def _cases(kind: str, described: dict[str, Any], names: Sequence[str]) -> tuple[Case, ...]:
+    """Return the combinations of the kind; options of other kinds are rejected."""
     campaign = campaign_of_kind(kind)
-    for name in given:
+    for name in names:
         if name not in campaign.options:
-            owners = [each for each in campaign_kinds() if name in campaign_of_kind(each).options]
+            owners = [
+                owner for owner in campaign_kinds() if name in campaign_of_kind(owner).options
+            ]
             raise InputError(
                 f"{name} requires kind {' or '.join(owners)}",
                 fields=(name, "kind"),
@@ -203,33 +205,33 @@ def _cases(kind: str, described: dict[str, Any], given: Sequence[str]) -> tuple[
 
 
 class _Run:
-    """The writer of one run, and its counts."""
+    """Writer of one campaign, with its counts."""
 
     def __init__(self, engine: Engine, plan: CampaignPlan, todo: Todo) -> None:
         self._engine = engine
         self._plan = plan
-        self._known = dict(todo.known)
+        self._combinations = dict(todo.combinations)
         self.total = len(plan.cases)
         self.resumed = self.total - todo.tasks
         self._runs = self._grid_runs = self._responses = 0
 
-    def take(self, campaign_id: int, done: MotionResults) -> int:
-        """Store the answers of one motion, count them and return their number."""
-        for result in done.results:
+    def take(self, campaign_id: int, results: MotionResults) -> int:
+        """Store and count the results of one motion; return their number."""
+        for result in results.results:
             self._compare(result)
-        _store(self._engine, campaign_id, done)
-        for result in done.results:
+        _store(self._engine, campaign_id, results)
+        for result in results.results:
             self._runs += result.runs
             self._grid_runs += 0 if result.blocks is None else len(result.blocks.outcome)
             self._responses += len(result.responses)
             if result.task.search or result.task.full_map:
                 key = result.task.planned.natural_key
-                self._known[key] = _as_known(result.critical)
-        return len(done.results)
+                self._combinations[key] = _as_known(result.critical)
+        return len(results.results)
 
     def _compare(self, result: TaskResult) -> None:
-        """Refuse a repeated search that contradicts what is stored."""
-        before = self._known.get(result.task.planned.natural_key)
+        """Reject a repeated search that contradicts a stored one."""
+        before = self._combinations.get(result.task.planned.natural_key)
         now = result.critical
         if before is None or now is None:
             return
@@ -242,9 +244,9 @@ class _Run:
             )
 
     def summary(self, seconds: float) -> CampaignSummary:
-        """Return what the campaign reports."""
-        known = self._known.values()
-        status = [each.status for each in known]
+        """Return the summary of the campaign."""
+        combinations = self._combinations.values()
+        status = [combination.status for combination in combinations]
         return CampaignSummary(
             kind=self._plan.kind,
             combinations=self.total,
@@ -253,8 +255,8 @@ class _Run:
             no_motion=status.count("no_motion"),
             outside_model=status.count("outside_model"),
             not_searched=status.count("not_searched"),
-            certified=sum(each.certified for each in known),
-            reentrant=sum(bool(each.reentrant) for each in known),
+            certified=sum(combination.certified for combination in combinations),
+            reentrant=sum(bool(combination.reentrant) for combination in combinations),
             runs=self._runs,
             grid_runs=self._grid_runs,
             responses=self._responses,
@@ -273,15 +275,15 @@ def _as_known(result: CriticalResult | None) -> KnownCombination:
     )
 
 
-def _wanted(
+def _extra_results(
     grid: int | Sequence[float] | None,
     store_responses: Sequence[float | Literal["critical"]] | None,
     full_map: bool,
-) -> Wanted:
+) -> ExtraResults:
     selected = store_responses or ()
     histories = [value for value in selected if value != "critical"]
     blocks = strengths_of(grid) if isinstance(grid, int) else checked_ratios(grid or (), "grid")
-    return Wanted(
+    return ExtraResults(
         full_map=full_map,
         blocks=blocks,
         histories=checked_ratios(histories, "store_responses"),
@@ -289,59 +291,59 @@ def _wanted(
     )
 
 
-def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> MotionWork:
-    verticals = (task.planned.vertical_id for task in each.tasks)
+def _with_samples(engine: Engine, motion_tasks: MotionTasks, map_depth: float) -> MotionWork:
+    verticals = (task.planned.vertical_id for task in motion_tasks.tasks)
     up = next((vertical_id for vertical_id in verticals if vertical_id is not None), None)
     # the connection is given back before the work is: a reader would hold up the writer
     with engine.connect() as connection:
         return MotionWork(
-            motion_id=each.plan.motion.id,
-            motion=load_motion(connection, each.plan.motion.id),
+            motion_id=motion_tasks.plan.motion.id,
+            motion=load_motion(connection, motion_tasks.plan.motion.id),
             vertical=None if up is None else load_motion(connection, up),
-            tasks=each.tasks,
-            spectrum=each.spectrum,
+            tasks=motion_tasks.tasks,
+            spectrum=motion_tasks.spectrum,
             map_depth=map_depth,
         )
 
 
-def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
+def _store(engine: Engine, campaign_id: int, results: MotionResults) -> None:
     new: list[TaskResult] = []
     stored: list[TaskResult] = []
-    for each in done.results:
-        (new if each.task.search else stored).append(each)
+    for result in results.results:
+        (new if result.task.search else stored).append(result)
     records = [
         CombinationRecord(
-            natural_key=each.task.planned.natural_key,
-            motion_id=done.motion_id,
-            vertical_motion_id=each.task.planned.vertical_id,
-            result=each.critical,
-            grid=each.grid,
-            polarity=each.task.planned.polarity,
-            p2=each.task.planned.case.p2,
-            settings=each.task.planned.case.settings,
-            kind=each.task.planned.case.kind,
-            numerics_version=done.numerics_version,
-            block=each.task.planned.case.block,
-            yield_g=each.task.planned.case.yield_g,
+            natural_key=result.task.planned.natural_key,
+            motion_id=results.motion_id,
+            vertical_motion_id=result.task.planned.vertical_id,
+            result=result.critical,
+            grid=result.grid,
+            polarity=result.task.planned.polarity,
+            p2=result.task.planned.case.p2,
+            settings=result.task.planned.case.settings,
+            kind=result.task.planned.case.kind,
+            numerics_version=results.numerics_version,
+            block=result.task.planned.case.block,
+            yield_g=result.task.planned.case.yield_g,
         )
-        for each in new
+        for result in new
     ]
     grids = {r.task.planned.natural_key: r.grid for r in stored if r.grid is not None}
     maps = {r.task.planned.natural_key: r.critical for r in stored if r.critical is not None}
-    blocks = {r.task.planned.natural_key: r.blocks for r in done.results if r.blocks is not None}
-    responses = [record for each in done.results for record in each.responses]
+    blocks = {r.task.planned.natural_key: r.blocks for r in results.results if r.blocks is not None}
+    responses = [record for result in results.results for record in result.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)
         add_grids(connection, grids)
         add_maps(connection, maps)
         insert_points(connection, blocks)
         insert_responses(connection, responses)
-        for part in done.spectrum:
+        for part in results.spectrum:
             store_spectrum(
                 connection,
-                done.motion_id,
+                results.motion_id,
                 polarity=part.polarity,
                 p2=part.p2,
                 x_m_s=part.x_m_s,
-                numerics_version=done.numerics_version,
+                numerics_version=results.numerics_version,
             )

@@ -1,4 +1,4 @@
-"""How far a campaign is, and what it reports."""
+"""Progress and summary of a campaign."""
 
 from __future__ import annotations
 
@@ -36,28 +36,28 @@ _COUNTS = ("blocks", "earthquakes", "of_station", "fails", "intact_fails", "unkn
 
 @dataclass(frozen=True)
 class CampaignProgress:
-    """How far a campaign is, in combinations; or the runs of a rock mass, in blocks."""
+    """Progress of a campaign in combinations, or of a rock mass in blocks."""
 
-    done: int
+    completed: int
     total: int
     resumed: int
     seconds: float
 
     @property
     def rate_per_s(self) -> float:
-        """What is finished per second by this run."""
-        computed = self.done - self.resumed
+        """Number completed per second in this run."""
+        computed = self.completed - self.resumed
         return computed / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated time left [s]; None before anything is finished."""
-        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
+        """Estimated remaining time [s]; None before the first result."""
+        return (self.total - self.completed) / self.rate_per_s if self.rate_per_s else None
 
 
 @dataclass(frozen=True, repr=False)
 class SequenceReport(Tabular):
-    """What a campaign of sequences shows.
+    """Results of a campaign of sequences.
 
     Args:
         seed: of the pairs that are drawn.
@@ -72,8 +72,8 @@ class SequenceReport(Tabular):
     conditional: tuple[ConditionalShare, ...]
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
-        """Return the conditional fragility by column; NaN for nothing."""
-        names = [each.name for each in fields(ConditionalShare)]
+        """Return the conditional fragility by column; NaN for missing values."""
+        names = [item.name for item in fields(ConditionalShare)]
         return {
             name: np.array(
                 [getattr(row, name) for row in self.conditional],
@@ -83,7 +83,7 @@ class SequenceReport(Tabular):
         }
 
     def text_table(self) -> TextTable:
-        """Return the conditional fragility as a terminal shows it."""
+        """Return the conditional fragility as a terminal table."""
         return TextTable(CONDITIONAL, [_conditional_cells(row) for row in self.conditional])
 
 
@@ -114,7 +114,7 @@ def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
 
 @dataclass(frozen=True, repr=False)
 class CampaignSummary(Result):
-    """What a finished campaign reports.
+    """Summary of a completed campaign.
 
     Args:
         kind: what the blocks do.

@@ -1,4 +1,4 @@
-"""A record's file read together with what a metadata table states about its traces."""
+"""Traces of a record file combined with their metadata table."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ NOTHING_STATED = TraceMetadata(file="", line=0)
 
 @dataclass(frozen=True)
 class Trace:
-    """One trace as its file has it, and what the metadata state of it, empty where nothing.
+    """One trace of a file with its metadata, empty where not given.
 
     `other_unit` is what file or metadata state where the caller stated another unit; else empty.
     `by_gain`: it was in counts, and read by the gain that the caller stated.
     """
 
     motion: GroundMotion
-    stated: TraceMetadata
+    metadata: TraceMetadata
     other_unit: str = ""
     by_gain: bool = False
 
     @property
     def is_vertical(self) -> bool | None:
-        """Whether it is a vertical component; None when neither file nor metadata say.
+        """True if the component is vertical; None if neither file nor metadata give it.
 
         Metadata take precedence: what they state, then the name that they give the component.
         """
-        stated, named = self.stated.is_vertical, is_vertical_name(self.stated.component)
-        by_metadata = named if stated is None else stated
+        vertical, named = self.metadata.is_vertical, is_vertical_name(self.metadata.component)
+        by_metadata = named if vertical is None else vertical
         return self.motion.is_vertical if by_metadata is None else by_metadata
 
     @property
     def other_direction(self) -> str:
-        """Warning that metadata and file disagree on the direction; empty where they do not."""
+        """Warning that metadata and file disagree on the direction; empty if they agree."""
         if self.motion.is_vertical in (None, self.is_vertical):
             return ""
         return (
-            f"line {self.stated.line} of the metadata says "
+            f"line {self.metadata.line} of the metadata says "
             f"{'vertical' if self.is_vertical else 'horizontal'} of trace "
             f"{self.motion.trace_index} ({self.motion.component}), which the file's own header "
             "does not"
@@ -83,11 +83,13 @@ def read_traces(
     by_table = _known_unit(rows[0].units) if rows else None
     read = partial(read_motions, file, dt_s=dt_s, allow_partial=allow_partial)
     gains = {row.trace_index: row.gain for row in rows if row.gain is not None}
-    whole = gains.get(None)
-    by_index = {index: each for index, each in gains.items() if index is not None}
+    file_gain = gains.get(None)
+    by_index = {index: value for index, value in gains.items() if index is not None}
     by_gain = False
     try:
-        motions = read(units=by_table, gain=whole if whole is not None else by_index or None)
+        motions = read(
+            units=by_table, gain=file_gain if file_gain is not None else by_index or None
+        )
     except MotionFileError as error:
         # stated by neither, or contradicted by the samples
         if units is not None and by_table is None and "units" in error.fields:
@@ -114,7 +116,7 @@ def read_traces(
         for motion in motions
     ]
     for trace in traces:
-        if trace.stated.trace_index is None and len(traces) > 1 and trace.other_direction:
+        if trace.metadata.trace_index is None and len(traces) > 1 and trace.other_direction:
             # a row about a whole file says nothing about the direction of one of its traces
             raise MotionFileError(file, f"{trace.other_direction}: give each trace a row")
     return traces
@@ -123,13 +125,13 @@ def read_traces(
 def missing_files(
     metadata: MotionMetadata, paths: list[Path]
 ) -> Iterator[tuple[str, TraceMetadata]]:
-    """Yield the files at or below some paths that the metadata name but that are not there.
+    """Yield the files named in the metadata that are missing below the given paths.
 
     Args:
         paths: files and folders that are being read; rows that point elsewhere are passed over.
     """
     folder = Path(metadata.path).absolute().parent
-    places = [path.absolute().resolve() for path in paths]
+    roots = [path.absolute().resolve() for path in paths]
     seen: set[Path] = set()
     for row in metadata.rows:
         named = folder / row.file
@@ -137,34 +139,34 @@ def missing_files(
         if place in seen or is_there(place):
             continue
         seen.add(place)
-        if any(place == searched or searched in place.parents for searched in places):
+        if any(place == searched or searched in place.parents for searched in roots):
             yield str(named), row
 
 
 def _rows_of_traces(
     file: Path, rows: list[TraceMetadata], motions: list[GroundMotion]
 ) -> dict[int, TraceMetadata]:
-    """Rows by trace: a row without an index is the row of every trace of the file."""
-    whole = next((row for row in rows if row.trace_index is None), None)
-    if whole is None:
+    """Rows by trace index; a row without an index applies to every trace of the file."""
+    file_row = next((row for row in rows if row.trace_index is None), None)
+    if file_row is None:
         return {row.trace_index: row for row in rows if row.trace_index is not None}
-    if len(motions) > 1 and whole.component:
+    if len(motions) > 1 and file_row.component:
         raise MotionFileError(
             file,
-            f"line {whole.line} of the metadata calls all {len(motions)} traces of the file "
-            f"{whole.component}: give each a row with its trace_index, from 0",
+            f"line {file_row.line} of the metadata calls all {len(motions)} traces of the file "
+            f"{file_row.component}: give each a row with its trace_index, from 0",
         )
-    return dict.fromkeys(range(len(motions)), whole)
+    return dict.fromkeys(range(len(motions)), file_row)
 
 
-def _other_unit(units: str | None, stated: str | None) -> str:
-    if units is None or not stated or stated_in_g(stated) == unit_in_g(units):
+def _other_unit(units: str | None, file_unit: str | None) -> str:
+    if units is None or not file_unit or stated_in_g(file_unit) == unit_in_g(units):
         return ""
-    return stated
+    return file_unit
 
 
 def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
-    """The traces of one file are in one unit; one statement holds for all."""
+    """Reject metadata with different units for the traces of one file."""
     for name in ("units", "dt_s"):
         values = {getattr(row, name) for row in rows} - {None}
         if len(values) > 1:
@@ -178,7 +180,7 @@ def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
 
 
 def _known_unit(text: str | None) -> str | None:
-    """Metadata may name the native unit of a format (counts, g/10) that its reader converts."""
+    """Return the unit in the metadata, unless its format converts it (counts, g/10)."""
     if text is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What a worker does: everything that is asked of one motion, arrays in, results out."""
+"""Worker of a campaign: all computations for one motion, arrays in, results out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, FloatArray, Polar
 
 @dataclass(frozen=True)
 class PlannedCase:
-    """One case under one motion, with the vertical one that goes with it: a combination."""
+    """One combination: a case under one horizontal motion, with its vertical motion."""
 
     natural_key: str
     polarity: Polarity
@@ -30,7 +30,7 @@ class PlannedCase:
     def history_key(
         self, motion: GroundMotion | MotionRow, vertical_sha256: str | None, k_over_pga: float
     ) -> str:
-        """Return the natural key of the motion in time of one block."""
+        """Return the natural key of the response history of one block."""
         assert motion.dt_s is not None  # the database holds no other motions
         return response_key(
             motion_sha256=motion.sha256,
@@ -46,7 +46,7 @@ class PlannedCase:
 
 @dataclass(frozen=True)
 class Task:
-    """What is still to do for one combination.
+    """Remaining work of one combination.
 
     Args:
         search: look for the critical value; False when it is stored.
@@ -69,7 +69,7 @@ class Task:
 
     @property
     def asks(self) -> bool:
-        """Whether there is anything to do."""
+        """True if any work remains."""
         return bool(
             self.search
             or self.grid
@@ -82,7 +82,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class TaskResult:
-    """What a task gave; None and () where nothing was asked for.
+    """Results of a task; None and () if not requested.
 
     Args:
         critical: the search; None also where the kind has none.
@@ -99,15 +99,17 @@ class TaskResult:
 
     @property
     def runs(self) -> int:
-        """How many simulations were made."""
+        """Number of simulations."""
         count = 0 if self.critical is None else self.critical.n_runs
-        count += sum(len(some.outcome) for some in (self.grid, self.blocks) if some is not None)
+        count += sum(
+            len(points.outcome) for points in (self.grid, self.blocks) if points is not None
+        )
         return count + len(self.responses)
 
 
 @dataclass(frozen=True, eq=False)
 class MotionWork:
-    """One horizontal motion with all that is to do on it: it travels once.
+    """One horizontal motion with all work on it, sent once.
 
     Args:
         vertical: the vertical one of its recording, if a task needs it.
@@ -134,7 +136,7 @@ class SpectrumPart:
 
 @dataclass(frozen=True, eq=False)
 class MotionResults:
-    """The answers, in the order of the tasks, and the numerics of whoever gave them."""
+    """Results in the order of the tasks, and the numerics version of the worker."""
 
     motion_id: int
     results: tuple[TaskResult, ...]
@@ -143,27 +145,27 @@ class MotionResults:
 
 
 def run_work(work: MotionWork) -> MotionResults:
-    """Do everything that is asked of one motion."""
+    """Run all work on one motion."""
     # together: cases of one excitation share what the kind derives from it
     groups: defaultdict[tuple[object, ...], list[Task]] = defaultdict(list)
     for task in work.tasks:
-        one = task.planned
+        planned = task.planned
         parts = (task.search or task.full_map, task.grid, task.full_map)
-        groups[(one.case.kind, one.polarity, one.vertical_id, *parts)].append(task)
-    done: dict[str, TaskResult] = {}
+        groups[(planned.case.kind, planned.polarity, planned.vertical_id, *parts)].append(task)
+    by_key: dict[str, TaskResult] = {}
     for tasks in groups.values():
         for result in _run_group(work, tasks):
-            done[result.task.planned.natural_key] = result
+            by_key[result.task.planned.natural_key] = result
     spectrum = tuple(
         SpectrumPart(polarity, tuple(p2), toppling_spectrum(work.motion, list(p2), polarity))
         for polarity, p2 in work.spectrum.items()
     )
-    results = tuple(done[task.planned.natural_key] for task in work.tasks)
+    results = tuple(by_key[task.planned.natural_key] for task in work.tasks)
     return MotionResults(work.motion_id, results, spectrum, NUMERICS_VERSION)
 
 
 def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
-    """Run tasks that ask for the same under the same excitation."""
+    """Run tasks with the same request under the same excitation."""
     first = tasks[0]
     kind = campaign_of_kind(first.planned.case.kind)
     vertical = None if first.planned.vertical_id is None else work.vertical
@@ -174,7 +176,7 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
         request = CaseRequest(search, first.grid, first.full_map, work.map_depth)
         cases = [task.planned.case for task in tasks]
         results_of_cases = kind.run_cases(shaking, cases, request)
-        answers = [(each.critical, each.grid) for each in results_of_cases]
+        answers = [(result.critical, result.grid) for result in results_of_cases]
     results = []
     for task, (critical, grid) in zip(tasks, answers, strict=True):
         blocks = None

@@ -1,4 +1,4 @@
-"""The `rbfrag` command: its commands by name, each loaded when it is called.
+"""The `rbfrag` command: its subcommands by name, each loaded on its first call.
 
 Command modules import only typer at their top; what a command needs is imported inside it,
 so that `rbfrag predict` starts without numba, pandas or matplotlib.
@@ -86,7 +86,7 @@ def _ended(error: Any) -> Any:
 
 
 class _Commands(TyperGroup):
-    """Loads a command when it is called, and turns every error raised on purpose into a message."""
+    """Loads a command on its call, and turns expected errors into messages."""
 
     def __init__(self, **about: Any) -> None:
         super().__init__(**about)
@@ -113,7 +113,7 @@ class _Commands(TyperGroup):
             formatter.write_dl(list(COMMANDS.items()))
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; an rbfrag error ends it without a traceback."""
+        """Run the command; print an rbfrag error without a traceback."""
         try:
             return super().invoke(ctx)
         except RbfragError as error:
@@ -149,8 +149,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_requested: bool) -> None:
+    if is_requested:
         print(f"rbfrag {__version__}")
         raise typer.Exit()
 

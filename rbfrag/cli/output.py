@@ -1,4 +1,4 @@
-"""What commands print: JSON for scripts, tables for people, progress of a long command."""
+"""Output of commands: JSON for scripts, tables for people, progress of long commands."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def print_json(document: object) -> None:
 
 
 def print_sentences(sentences: Iterable[str]) -> None:
-    """Print sentences, one a line, and an empty line."""
+    """Print sentences, one per line, and an empty line."""
     for sentence in sentences:
         print(sentence)
     print()
@@ -47,7 +47,7 @@ def print_pairs(pairs: Mapping[str, object]) -> None:
 def print_table(
     headers: Sequence[str], rows: Iterable[Sequence[object]], *, width: int | None = None
 ) -> None:
-    """Print a table: numbers to the right, text to the left.
+    """Print a table: numbers right-aligned, text left-aligned.
 
     Args:
         headers: names of the columns.
@@ -75,7 +75,9 @@ def print_table(
 
 
 def print_rows(rows: Sequence[Mapping[str, object]]) -> None:
-    """Print rows under their names, cut to a terminal; reasons only where there is one."""
+    """Print rows below their column names, cut to the terminal width; reasons only if there are
+    any.
+    """
     names = [name for name in rows[0] if name != "reason" or any(row[name] for row in rows)]
     width = get_terminal_size().columns if sys.stdout.isatty() else None
     print_table(names, [[row[name] for name in names] for row in rows], width=width)
@@ -88,7 +90,7 @@ def _cut(text: str, size: int) -> str:
 def print_result(
     result: Result, *, json: bool, verbose: bool = False, fields: Collection[str] = _FIELDS
 ) -> None:
-    """Print an answer: the number that decides, labelled lines, warnings, notes, tables.
+    """Print an answer: headline, labelled lines, notes, tables.
 
     Args:
         result: the answer.
@@ -128,7 +130,7 @@ def print_labelled(label: str, text: str) -> None:
 
 
 def print_warnings(warnings: Iterable[str], fields: Collection[str] = ()) -> None:
-    """Print warnings below an answer, one a line, with fields as options."""
+    """Print warnings as notes below an answer, one per line, with fields as options."""
     for i, warning in enumerate(by_severity(warnings)):
         if i == 0:
             print()
@@ -147,7 +149,9 @@ def write_table(
     excel_text: bool,
     notes: Sequence[str] = (),
 ) -> None:
-    """Write the table of a command with its warnings, and warn of texts that are formulas."""
+    """Write the table of a command with its warnings; warn of texts that spreadsheets read as
+    formulas.
+    """
     from rbfrag.exchange.excel_text import formula_warnings
     from rbfrag.exchange.tables.files import write_block_table
 
@@ -161,7 +165,7 @@ def write_table(
 
 @cache
 def say_when_compiling() -> None:
-    """Say once, where kernels are not compiled yet on this machine, why the answer takes long."""
+    """Explain once why the first answer takes long: kernels are compiled on this machine."""
     from rbfrag.solver.integrator.compiled import on_compilation
 
     on_compilation(_say_compiling)
@@ -178,7 +182,7 @@ def _say_compiling() -> None:
 def check_files(
     *, table: str | None = None, plot: str | None = None, excel_text: bool = False
 ) -> None:
-    """Refuse a table or a figure that cannot be written, before long work."""
+    """Reject an output table or figure that cannot be written, before long work."""
     if excel_text and table is not None and not table.lower().endswith(".csv"):
         raise InputError(f"--excel-text applies to CSV output only, not to {table}: omit it")
     if table is not None:
@@ -192,7 +196,7 @@ def check_files(
 
 
 def cell(value: object) -> str:
-    """Return a value as people read it: six digits, a dash for nothing."""
+    """Format a value for a table: six digits, a dash for None."""
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -219,7 +223,7 @@ SECONDS_BETWEEN_LINES = 5.0
 
 
 class ProgressBar:
-    """How far a command is: a bar with rate and time left on a terminal, lines elsewhere.
+    """Progress of a command: a bar with rate and remaining time on a terminal, lines elsewhere.
 
     Args:
         command: the command that is under way.
@@ -244,29 +248,29 @@ class ProgressBar:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, done: int, total: int, remark: str = "") -> None:
-        """Show how far the command is; what the first call calls done was done before."""
+    def show(self, completed: int, total: int, remark: str = "") -> None:
+        """Show the progress; the first call counts as completed before the start."""
         now = time.monotonic()
         if self._last is None:
-            self._first, self._started = done, now
-        rate = (done - self._first) / (now - self._started) if now > self._started else 0.0
+            self._first, self._started = completed, now
+        rate = (completed - self._first) / (now - self._started) if now > self._started else 0.0
         about = f" {self._things}" + (f" ({remark})" if remark else "")
         if sys.stderr.isatty() or self._bar is not None:
-            self._show_bar(done, total, about, rate)
+            self._show_bar(completed, total, about, rate)
         elif not self._on_lines:
             return
-        elif self._last is None or done == total or now - self._last >= SECONDS_BETWEEN_LINES:
-            text = f"{self._command}: {done}/{total}{about}"
+        elif self._last is None or completed == total or now - self._last >= SECONDS_BETWEEN_LINES:
+            text = f"{self._command}: {completed}/{total}{about}"
             if rate:
                 text += f", {rate:.1f} per second"
-                seconds = int((total - done) / rate)
-                text += f", {seconds // 60}:{seconds % 60:02d} left" if done < total else ""
+                seconds = int((total - completed) / rate)
+                text += f", {seconds // 60}:{seconds % 60:02d} left" if completed < total else ""
             print(text, file=sys.stderr, flush=True)
         else:
             return
         self._last = now
 
-    def _show_bar(self, done: int, total: int, about: str, rate: float) -> None:
+    def _show_bar(self, completed: int, total: int, about: str, rate: float) -> None:
         per_second = f"{rate:.1f} per second" if rate else ""
         if self._bar is None:
             from rich.console import Console
@@ -279,10 +283,14 @@ class ProgressBar:
                 console=Console(stderr=True),
             )  # fmt: skip
             self._task = self._bar.add_task(
-                self._command, total=total, completed=done, about=about.strip(), rate=per_second
+                self._command,
+                total=total,
+                completed=completed,
+                about=about.strip(),
+                rate=per_second,
             )
             self._bar.start()
             return
         self._bar.update(
-            self._task, completed=done, total=total, about=about.strip(), rate=per_second
+            self._task, completed=completed, total=total, about=about.strip(), rate=per_second
         )

@@ -1,4 +1,4 @@
-"""Output on any terminal and any disk."""
+"""Output to any terminal and any disk."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def _plainly(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]
-    return "".join(_IN_ASCII.get(each, "?") for each in text), error.end
+    return "".join(_IN_ASCII.get(character, "?") for character in text), error.end
 
 
 def write_plainly() -> None:
-    """Let output replace what a stream cannot write, where it would end with an error."""
+    """Replace characters that a stream cannot encode, instead of failing."""
     codecs.register_error("plainly", _plainly)
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
@@ -31,7 +31,7 @@ def write_plainly() -> None:
 
 
 def end_unwritten(error: OSError) -> None:
-    """End with status 1 where what was printed cannot be written, with a sentence why."""
+    """End with status 1 and an explanation where output cannot be written."""
     if not isinstance(error, BrokenPipeError):  # nobody reads on, which is no error
         print(f"rbfrag: the answer cannot be written: {error.strerror}", file=sys.stderr)
     # what is left unwritten would be tried again, and complained of, when the program ends

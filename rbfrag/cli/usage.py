@@ -19,8 +19,12 @@ def usage_message(error: Any) -> str:
     parameter = getattr(error, "param", None)
     message = one_paragraph(error.format_message())
     if hasattr(error, "possibilities"):
-        known = [name for each in context.command.get_params(context) for name in each.opts]
-        message = f"unknown option {option}{_suggestion(option, known)}"
+        options = [
+            name
+            for option_parameter in context.command.get_params(context)
+            for name in option_parameter.opts
+        ]
+        message = f"unknown option {option}{_suggestion(option, options)}"
     elif option is not None:
         takes = "requires a value" if "requires" in message else "takes no value: omit it"
         message = f"{option} {takes}"
@@ -40,13 +44,13 @@ def usage_message(error: Any) -> str:
     return f"{message} (help: rbfrag {' '.join(words)})"
 
 
-def _suggestion(typed: str, known: list[str]) -> str:
+def _suggestion(typed: str, words: list[str]) -> str:
     """Return the nearest of some words as a question."""
     # the name of a field in Python or in a table is an option, too
     near = [option_of(name_of(typed.lstrip("-").replace("-", "_")))]
-    near = [name for name in near if name in known] or [
-        name for name in known if len(typed) > len("--") and name.startswith(typed)
+    near = [name for name in near if name in words] or [
+        name for name in words if len(typed) > len("--") and name.startswith(typed)
     ]
-    near = near[:_MOST_SUGGESTED] or get_close_matches(typed, known, 1)
-    *others, last = near or [""]
-    return f"; did you mean {' or '.join(filter(None, (', '.join(others), last)))}?" if last else ""
+    near = near[:_MOST_SUGGESTED] or get_close_matches(typed, words, 1)
+    *first, last = near or [""]
+    return f"; did you mean {' or '.join(filter(None, (', '.join(first), last)))}?" if last else ""

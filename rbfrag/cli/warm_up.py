@@ -1,4 +1,4 @@
-"""Compiling every kernel at once: whatever needs one is done to made-up motions."""
+"""Compilation of all kernels: runs every command that needs one on synthetic motions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BLOCKS = {"p2": [3.0, 1.0, 1.0], "kr": [0.1, 0.05, 0.04]}
 
 
 def warm_up() -> Iterator[str]:
-    """Do whatever needs kernels, and yield in words what comes next.
+    """Run everything that needs kernels, and yield a description of each step.
 
     The machine code stays where kernels are kept (:mod:`rbfrag.solver.integrator.compiled`).
     """
@@ -63,13 +63,13 @@ def warm_up() -> Iterator[str]:
         toppling_spectrum(motion, 3.0)
         place = Path(folder, "motions.db")
         with opened_database(place, create=True) as engine, engine.begin() as connection:
-            for name, of, each in (
+            for name, of, record in (
                 ("a", "a", motion),
                 ("b", "b", _motion(0.8)),
                 ("up", "a", upward),
             ):
                 add_motion(
-                    connection, each, earthquake=EarthquakeInfo(of), is_vertical=name == "up",
+                    connection, record, earthquake=EarthquakeInfo(of), is_vertical=name == "up",
                     recording=of, component=name,
                 )  # fmt: skip
         for kind in campaign_kinds():

@@ -1,4 +1,4 @@
-"""Writing campaigns and the combinations they finish."""
+"""Storage of campaigns and their combinations."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ INTERVAL_COLUMNS = ("combination_id", *Interval._fields)
 
 @dataclass(frozen=True)
 class CombinationRecord:
-    """One combination as it is stored.
+    """One combination in stored form.
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.combination_key`.
@@ -68,7 +68,7 @@ class CombinationRecord:
 
 @dataclass(frozen=True)
 class KnownCombination:
-    """What a campaign asks about a combination that is stored already.
+    """State of a stored combination, for the plan of a campaign.
 
     Args:
         status: of its search.
@@ -89,7 +89,7 @@ class KnownCombination:
 
 
 def start_campaign(connection: Connection, settings: Mapping[str, object]) -> int:
-    """Record that a campaign begins, and return its id.
+    """Record the start of a campaign, and return its id.
 
     Args:
         settings: what the user asked for; values that JSON can hold.
@@ -107,12 +107,12 @@ def start_campaign(connection: Connection, settings: Mapping[str, object]) -> in
 
 
 def finish_campaign(connection: Connection, campaign_id: int) -> None:
-    """Record that a campaign did all it was asked for."""
+    """Record that a campaign is complete."""
     update_rows(connection, campaign, campaign.c.id == campaign_id, {"finished": utc_now()})
 
 
 def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCombination]:
-    """Return what is stored of each combination, by natural key.
+    """Return the state of stored combinations, by natural key.
 
     Args:
         keys: the natural keys asked about; those that are not stored are left out.
@@ -133,26 +133,26 @@ def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str,
 
 
 def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
-    """Return those natural keys whose combinations are stored already."""
+    """Return the natural keys whose combinations are stored."""
     return set(known_combinations(connection, keys))
 
 
 def combinations_with_points(
     connection: Connection, keys: Iterable[str], kr_over_pga: Sequence[float]
 ) -> set[str]:
-    """Return those natural keys whose combinations hold a simulation at each of some strengths."""
+    """Return the natural keys whose combinations have a simulation at every given strength."""
     query = select(combination.c.natural_key, simulation.c.kr_over_pga).join(simulation)
     rows = rows_of_keys(connection, query, combination.c.natural_key, keys)
     # Compared here: a long list of strengths is no list of variables for every database.
-    wanted = set(kr_over_pga)
-    counts = Counter(key for key, k in rows if k in wanted)
-    return {key for key, number in counts.items() if number == len(wanted)}
+    strengths = set(kr_over_pga)
+    counts = Counter(key for key, k in rows if k in strengths)
+    return {key for key, number in counts.items() if number == len(strengths)}
 
 
 def insert_combinations(
     connection: Connection, campaign_id: int, records: Sequence[CombinationRecord]
 ) -> int:
-    """Store many combinations, each with its simulated points, its grid and, if any, its map.
+    """Store combinations, each with its simulated points, its grid and, if present, its map.
 
     Args:
         connection: inside the caller's transaction, so that a combination is never there
@@ -168,22 +168,22 @@ def insert_combinations(
     # In one order: two campaigns on one server then wait for each other, never both at once.
     rows = [_combination_row(campaign_id, new[key]) for key in sorted(new)]
     insert_rows(connection, combination, _COLUMNS, rows)
-    known = known_combinations(connection, new)
+    stored = known_combinations(connection, new)
     # What another campaign stored meanwhile stays all its own: two processors may have made
     # maps that differ in the last bits, and a mixture of both would be none.
     query = select(combination.c.natural_key).where(combination.c.campaign_id == campaign_id)
-    own = {key for (key,) in rows_of_keys(connection, query, combination.c.natural_key, new)}
-    new = {key: record for key, record in new.items() if key in own}
+    own_keys = {key for (key,) in rows_of_keys(connection, query, combination.c.natural_key, new)}
+    new = {key: record for key, record in new.items() if key in own_keys}
     results = {key: record.result for key, record in new.items() if record.result is not None}
-    _insert_intervals(connection, known, results)
+    _insert_intervals(connection, stored, results)
     points = {key: result.points for key, result in results.items()}
     grids = {key: record.grid for key, record in new.items() if record.grid is not None}
-    _insert_points(connection, known, points, grids)
+    _insert_points(connection, stored, points, grids)
     return len(new)
 
 
 def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) -> None:
-    """Store simulated blocks of combinations that are there; a strength that is there stays.
+    """Store simulated blocks of stored combinations; strengths already stored are kept.
 
     Args:
         points: the blocks, by the natural key of their combination.
@@ -192,42 +192,44 @@ def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) ->
 
 
 def add_grids(connection: Connection, grids: Mapping[str, SearchPoints]) -> None:
-    """Store the blocks of the kind's grid of combinations that are there without them.
+    """Store the outcome grids of stored combinations that have none.
 
     Args:
         grids: the blocks by the natural key of their combination, number i of the grid at place i.
     """
-    known = _all_known(connection, grids)
-    _insert_points(connection, known, {}, {k: v for k, v in grids.items() if not known[k].gridded})
+    stored = _all_known(connection, grids)
+    _insert_points(
+        connection, stored, {}, {k: v for k, v in grids.items() if not stored[k].gridded}
+    )
 
 
 def add_maps(connection: Connection, results: Mapping[str, CriticalResult]) -> None:
-    """Store the maps of combinations that are there without one, and what only a map tells.
+    """Store the maps of stored combinations that have none, and the results that require a map.
 
     Args:
         results: searches with their maps, by the natural key of their combination.
     """
-    known = _all_known(connection, results)
-    new = {key: result for key, result in results.items() if not known[key].mapped}
-    _insert_intervals(connection, known, new)
+    stored = _all_known(connection, results)
+    new = {key: result for key, result in results.items() if not stored[key].mapped}
+    _insert_intervals(connection, stored, new)
     for key, result in new.items():
         columns = _result_values(result)
         values = {name: columns[name] for name in _OF_A_MAP}
-        update_rows(connection, combination, combination.c.id == known[key].id, values)
+        update_rows(connection, combination, combination.c.id == stored[key].id, values)
 
 
 def _all_known(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCombination]:
-    wanted = list(keys)
-    known = known_combinations(connection, wanted)
-    for key in wanted:
-        if key not in known:
+    key_list = list(keys)
+    stored = known_combinations(connection, key_list)
+    for key in key_list:
+        if key not in stored:
             raise InputError(f"unknown combination {key}")
-    return known
+    return stored
 
 
 def _insert_points(
     connection: Connection,
-    known: Mapping[str, KnownCombination],
+    stored: Mapping[str, KnownCombination],
     points: Mapping[str, SearchPoints],
     grids: Mapping[str, SearchPoints],
 ) -> None:
@@ -235,27 +237,27 @@ def _insert_points(
     met: dict[tuple[object, ...], tuple[object, ...]] = {}
     numbered: dict[tuple[object, ...], tuple[object, ...]] = {}
     for key, blocks in points.items():
-        for row in _point_rows(known[key].id, blocks, repeat(None)):
+        for row in _point_rows(stored[key].id, blocks, repeat(None)):
             met.setdefault(row[:2], row)
     for key, blocks in grids.items():
-        for row in _point_rows(known[key].id, blocks, count()):
+        for row in _point_rows(stored[key].id, blocks, count()):
             numbered.setdefault(row[:2], row)
-    others = [row for place, row in met.items() if place not in numbered]
-    insert_rows(connection, simulation, POINT_COLUMNS, others)
+    unnumbered = [row for place, row in met.items() if place not in numbered]
+    insert_rows(connection, simulation, POINT_COLUMNS, unnumbered)
     meeting = GRID_MEETS_POINT
     insert_rows(connection, simulation, POINT_COLUMNS, [*numbered.values()], on_conflict=meeting)
 
 
 def _insert_intervals(
     connection: Connection,
-    known: Mapping[str, KnownCombination],
+    stored: Mapping[str, KnownCombination],
     results: Mapping[str, CriticalResult],
 ) -> None:
     rows: list[tuple[object, ...]] = []
     for key, result in results.items():
         map_ = result.intervals
         ends = zip(map_.k_lo.tolist(), map_.k_hi.tolist(), map_.outcome, strict=True)
-        rows += ((known[key].id, *interval) for interval in ends)
+        rows += ((stored[key].id, *interval) for interval in ends)
     insert_rows(connection, outcome_interval, INTERVAL_COLUMNS, rows)
 
 

@@ -1,4 +1,4 @@
-"""SQLAlchemy engines of a file or a server, whose errors are rbfrag's own."""
+"""SQLAlchemy engines of a file or a server; their errors become rbfrag errors."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ _KEEPALIVES = {
 
 
 def database_label(url: URL) -> str:
-    """Return the database as messages name it: the file, or the URL without its password."""
+    """Return the name of the database for messages: the file, or the URL without its password."""
     if url.get_backend_name() == "sqlite":
         return url.database or ""
     return url.set(drivername="postgresql").render_as_string(hide_password=True)
 
 
 def raw_sqlite(connection: Connection) -> sqlite3.Connection:
-    """Return the sqlite3 connection under an SQLAlchemy one."""
+    """Return the sqlite3 connection of an SQLAlchemy connection."""
     return cast(sqlite3.Connection, connection.connection.dbapi_connection)
 
 
@@ -60,7 +60,7 @@ def unchecked_engine(
     read_only: bool = False,
     foreign_keys: bool = True,
 ) -> Engine:
-    """Return an engine without asking whose database it is, for checks and migrations.
+    """Return an engine without checking the database, for checks and migrations.
 
     Args:
         place: what :func:`rbfrag.db.location.locate` returned.
@@ -120,7 +120,7 @@ def _connected(_dialect: object, _record: object, cargs: Any, cparams: Any) -> A
 
 
 def _wait_at_most(seconds: float, connection: Any, _record: object) -> None:
-    """Have the server give up a lock or a statement that takes longer."""
+    """Limit the time that the server waits for a lock or runs a statement."""
     before, connection.autocommit = connection.autocommit, True  # else it ends with a rollback
     for name in ("lock_timeout", "statement_timeout"):
         connection.execute(f"SET {name} = {max(int(1000.0 * seconds), 1)}")
@@ -128,7 +128,7 @@ def _wait_at_most(seconds: float, connection: Any, _record: object) -> None:
 
 
 def sqlalchemy_url(place: Path | str) -> URL:
-    """Return the URL of what :func:`rbfrag.db.location.locate` returned."""
+    """Return the SQLAlchemy URL of the result of :func:`rbfrag.db.location.locate`."""
     if isinstance(place, Path):
         return URL.create("sqlite", database=str(place))
     try:
@@ -165,7 +165,7 @@ def _explained_server_error(
 ) -> DatabaseError | None:
     # psycopg is an extra: its classes are told by what they carry, not by import.
     state: Any = getattr(error, "sqlstate", None)
-    if all(each.__module__.partition(".")[0] != "psycopg" for each in type(error).__mro__):
+    if all(base.__module__.partition(".")[0] != "psycopg" for base in type(error).__mro__):
         return None
     reason = " ".join(str(error).split())
     lost = ("OperationalError", "ConnectionTimeout", "SilentServerError")

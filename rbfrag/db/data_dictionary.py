@@ -1,4 +1,4 @@
-"""What every column means, as the schema says it, for people who read the tables."""
+"""Data dictionary: meaning of every column, from the schema, for readers of the tables."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def data_dictionary() -> tuple[TableMeaning, ...]:
 
 
 def table_meaning(table: Table) -> TableMeaning:
-    """Return what one table of the schema means."""
+    """Return the meaning of one table of the schema."""
     return TableMeaning(table.name, table.info["meaning"], tuple(map(_column, table.columns)))
 
 
@@ -62,7 +62,7 @@ def dictionary_as_json() -> dict[str, Any]:
 
 
 def dictionary_as_markdown() -> str:
-    """Return the dictionary as Markdown, a section for each table."""
+    """Return the dictionary as Markdown, one section per table."""
     return "\n".join(
         f"## {table.name}\n\n{table.meaning}\n\n{columns_as_markdown(table.columns)}"
         for table in data_dictionary()

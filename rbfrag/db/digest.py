@@ -1,4 +1,4 @@
-"""The digest that each row carries: a hash of its values, by which altered ones are found.
+"""Digest of each row: a hash of its values, which reveals altered rows.
 
 Standard library only: a model that `rbfrag predict` reads can be verified without SQLAlchemy.
 """

@@ -1,4 +1,4 @@
-"""Opening the database: SQLAlchemy engines whose errors are rbfrag's own."""
+"""Opening of the database: SQLAlchemy engines whose errors become rbfrag errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def open_database(
     create: bool = False,
     read_only: bool = False,
 ) -> Engine:
-    """Open a database of this rbfrag's schema.
+    """Open a database with the schema of this rbfrag version.
 
     A transaction of a writing SQLite engine takes the write lock when it begins
     (``BEGIN IMMEDIATE``), so that it never fails half-way for want of it: open with
@@ -68,7 +68,7 @@ def open_database(
 def opened_database(
     db: str | PathLike[str] | None = None, *, create: bool = False, read_only: bool = False
 ) -> Iterator[Engine]:
-    """Open a database for a ``with`` block and close its connections behind it."""
+    """Open a database for a ``with`` block and close its connections afterwards."""
     engine = open_database(db, create=create, read_only=read_only)
     try:
         yield engine
@@ -86,7 +86,7 @@ def _check_server_database(connection: Connection, label: str, *, read_only: boo
 
 
 def stated_revision(connection: Connection) -> str | None:
-    """Return the schema revision that a database states."""
+    """Return the schema revision of a database."""
     revisions = (
         connection.scalars(text(f"SELECT version_num FROM {VERSION_TABLE}")).all()
         if inspect(connection).has_table(VERSION_TABLE)

@@ -1,4 +1,4 @@
-"""Whole tables as pandas frames, portion by portion."""
+"""Tables as pandas DataFrames, in chunks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ROWS_OF_ARRAYS = 16  # a history or a record is a megabyte
 def chosen_columns(
     table: str, columns: Sequence[str] | None = None, *, arrays: bool = False
 ) -> tuple[ColumnMeaning, ...]:
-    """Return the columns named, or all of a table; samples and histories only with `arrays`.
+    """Return the named columns, or all of a table; samples and histories only with `arrays`.
 
     Raises:
         InputError: there is no such table or column; the message lists those there are.
@@ -45,7 +45,7 @@ def chosen_columns(
 def frames(
     connection: Connection, table: str, columns: Sequence[ColumnMeaning]
 ) -> Iterator[pd.DataFrame]:
-    """Yield a table in the order of its key, so many rows that memory is bounded; one at least."""
+    """Yield a table in key order, in chunks of bounded memory; at least one."""
     # Imported here: no other answer of rbfrag needs pandas.
     import pandas as pd
 

@@ -1,5 +1,6 @@
-"""The one place that writes rows: inserts that may be repeated, updates, deletions, their digests
-and what the ledger counts of them."""
+"""All writes of rows: repeatable inserts, updates and deletions, with their digests and ledger
+entries.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +39,7 @@ _ROWS_AT_ONCE = 5_000
 
 
 def insert_if_new(connection: Connection, table: Table, values: Mapping[str, object]) -> bool:
-    """Insert one row unless a unique key of the table holds it already.
+    """Insert one row unless its unique key is already in the table.
 
     Returns:
         True when the row was inserted.
@@ -46,19 +47,19 @@ def insert_if_new(connection: Connection, table: Table, values: Mapping[str, obj
     build = postgresql.insert if connection.dialect.name == "postgresql" else sqlite.insert
     row = _digested(table, values)
     statement = build(table).values(**row).on_conflict_do_nothing().inline()
-    done = connection.execute(statement, execution_options=_COUNTED)
-    if done.rowcount == 1:
+    result = connection.execute(statement, execution_options=_COUNTED)
+    if result.rowcount == 1:
         _tally_one(connection, table, row)
-    return done.rowcount == 1
+    return result.rowcount == 1
 
 
 def insert_row(connection: Connection, table: Table, values: Mapping[str, object]) -> int:
     """Insert one row and return its id."""
     row = _digested(table, values)
-    done = connection.execute(insert(table).values(**row))
-    assert done.inserted_primary_key is not None
+    result = connection.execute(insert(table).values(**row))
+    assert result.inserted_primary_key is not None
     _tally_one(connection, table, row)
-    return int(done.inserted_primary_key[0])
+    return int(result.inserted_primary_key[0])
 
 
 def insert_rows(
@@ -69,7 +70,7 @@ def insert_rows(
     *,
     on_conflict: str = "DO NOTHING",
 ) -> None:
-    """Insert many rows at the speed of the driver; those whose key is there are left alone.
+    """Insert many rows at driver speed; rows with an existing key are skipped.
 
     The rows go to the driver's `executemany` as they are: SQLAlchemy's own treatment of each
     value would cost more than the insertion.
@@ -93,8 +94,10 @@ def insert_rows(
     )
     values = [(*row, digest) for row, digest in zip(rows, digests, strict=True)]
     connection.exec_driver_sql("SAVEPOINT many")
-    done = connection.exec_driver_sql(f"{statement} DO NOTHING", values, execution_options=_COUNTED)
-    if done.rowcount == len(rows):
+    result = connection.exec_driver_sql(
+        f"{statement} DO NOTHING", values, execution_options=_COUNTED
+    )
+    if result.rowcount == len(rows):
         tally(connection, table, columns, rows, digests)
     else:  # some key was there: only one by one it shows which
         connection.exec_driver_sql("ROLLBACK TO SAVEPOINT many")
@@ -110,14 +113,14 @@ def _insert_one(
     row: tuple[object, ...],
     statement: str,
 ) -> None:
-    """Insert a row by a statement that may change the one of its key instead."""
+    """Insert a row by a statement that may instead change the row with its key."""
     named = dict(zip(columns, row, strict=True))
     before = None
     if "DO UPDATE" in statement:
         key = [column == named[column.name] for column in table.primary_key.columns]
         before = connection.scalar(select(table.c.digest).where(*key).with_for_update())
-    done = connection.exec_driver_sql(statement, row, execution_options=_COUNTED)
-    if done.rowcount:
+    result = connection.exec_driver_sql(statement, row, execution_options=_COUNTED)
+    if result.rowcount:
         _tally_one(connection, table, named)
         if before is not None:
             _tally_one(connection, table, {**named, "digest": before}, sign=-1)
@@ -132,7 +135,7 @@ def _tally_one(
 def update_rows(
     connection: Connection, table: Table, where: ColumnElement[bool], values: Mapping[str, object]
 ) -> None:
-    """Change columns of the rows that meet a condition.
+    """Update columns of the rows that meet a condition.
 
     Raises:
         DatabaseError: such a row was altered; a digest of the changed row would hide that.
@@ -157,14 +160,14 @@ def delete_rows(connection: Connection, table: Table, *where: ColumnElement[bool
 
 
 def keep_writers_out(connection: Connection) -> None:
-    """Have no other transaction write while this one lasts, as SQLite does by itself."""
+    """Block other writing transactions during this one, as SQLite does by default."""
     if connection.dialect.name == "postgresql":
         names = ", ".join(sorted(metadata.tables))
         connection.exec_driver_sql(f"LOCK TABLE {names} IN SHARE ROW EXCLUSIVE MODE")
 
 
 def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:
-    """Refuse a whole row whose values are not those that were written."""
+    """Reject a row whose values differ from those written."""
     try:
         sound = _digested(table, row)["digest"] == row["digest"]
     except (ValueError, TypeError, ArithmeticError):  # a value of another type than its column's
@@ -199,7 +202,7 @@ def _digested(table: Table, values: Mapping[str, object]) -> dict[str, object]:
 
 @cache
 def _digested_columns(table: Table) -> dict[str, ValueType]:
-    """Return the types of the columns that the digest is of, by name, in the order of names."""
+    """Return the types of the columns in the digest, by name, in the order of names."""
     names = sorted(column.name for column in table.c if column.name not in NOT_DIGESTED)
     return {name: _value_type(table.c[name].type) for name in names}
 
@@ -220,7 +223,7 @@ def utc_now() -> str:
 
 
 def renew_digests(connection: Connection, table: Table, before: Table | None = None) -> None:
-    """Write the digest of every row anew, of the columns that the table has.
+    """Recompute the digest of every row, for the present columns of the table.
 
     Args:
         before: the table that the stored digests are of. A row whose values have not its stored
@@ -247,16 +250,18 @@ def renew_digests(connection: Connection, table: Table, before: Table | None = N
             then = table_digests(before, before.c.keys(), had)
             sound = [row.digest == digest for row, digest in zip(rows, then, strict=True)]
         anew = table_digests(table, columns, values)
-        kept = [
-            pair for pair, each in zip(zip(rows, anew, strict=True), sound, strict=True) if each
+        intact = [
+            pair
+            for pair, is_sound in zip(zip(rows, anew, strict=True), sound, strict=True)
+            if is_sound
         ]
-        if kept:
+        if intact:
             changes = [
                 {"anew": digest} | {f"at_{key.name}": row._mapping[key.name] for key in keys}
-                for row, digest in kept
+                for row, digest in intact
             ]
             connection.execute(change, changes)
-            changed, digests = zip(*kept, strict=True)
+            changed, digests = zip(*intact, strict=True)
             tally(connection, table, columns, changed, [row.digest for row in changed], sign=-1)
             tally(connection, table, columns, changed, digests)
         last = [rows[-1]._mapping[key.name] for key in keys]
@@ -264,7 +269,7 @@ def renew_digests(connection: Connection, table: Table, before: Table | None = N
 
 
 def storable(text: str) -> str:
-    r"""Return text without what databases refuse, changed visibly.
+    r"""Return text without characters that databases reject, visibly replaced.
 
     File names may hold bytes that are no text, and damaged headers hold NUL; both become
     ``\x..`` instead of failing the insert.
@@ -276,9 +281,9 @@ def storable(text: str) -> str:
 def rows_of_keys(
     connection: Connection, query: Select[Any], column: ColumnElement[str], keys: Iterable[str]
 ) -> Iterator[Any]:
-    """Yield the rows of a query whose column is one of many keys, in any order."""
+    """Yield the rows whose column is one of many keys, in any order."""
     query = query.where(column.in_(bindparam("keys", expanding=True)))
-    wanted = list(dict.fromkeys(keys))
+    unique_keys = list(dict.fromkeys(keys))
     # as many at a time as any SQLite build takes variables
-    for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        yield from connection.execute(query, {"keys": wanted[start : start + _KEYS_AT_ONCE]})
+    for start in range(0, len(unique_keys), _KEYS_AT_ONCE):
+        yield from connection.execute(query, {"keys": unique_keys[start : start + _KEYS_AT_ONCE]})

@@ -1,4 +1,4 @@
-"""Natural keys: the hash of everything that decides a stored result."""
+"""Natural keys: hashes of all inputs of a stored result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def combination_key(
     block: Mapping[str, object] | None = None,
     **inputs: Any,
 ) -> str:
-    """Return the key of one combination: equal inputs, equal key, on every machine.
+    """Return the key of one combination: equal inputs give equal keys on every machine.
 
     Args:
         p2: block frequency parameter p² [1/s²]; None where the block needs none.
@@ -36,12 +36,12 @@ def combination_key(
     Returns:
         SHA-256 as 64 hexadecimal digits.
     """
-    given = _inputs(**inputs) | {"p2": None if p2 is None else float(p2), "settings": settings}
-    return _digest(given if block is None else {**given, "block": block})
+    content = _inputs(**inputs) | {"p2": None if p2 is None else float(p2), "settings": settings}
+    return _digest(content if block is None else {**content, "block": block})
 
 
 def response_key(*, p2: float, kr: float, **inputs: Any) -> str:
-    """Return the key of one stored response: that of its block under its motion.
+    """Return the key of one stored response, from its block and its motion.
 
     Args:
         p2: block frequency parameter p² [1/s²].
@@ -75,7 +75,7 @@ def pair_key(
 def key_of_row(
     row: Mapping[str, Any] | RowMapping, samples: Mapping[int, tuple[str, float]]
 ) -> str:
-    """Return the natural key that a stored result has by its columns.
+    """Return the natural key of a stored result from its columns.
 
     Args:
         row: of `combination`, `response` or `shock_pair`.
@@ -120,7 +120,7 @@ def _inputs(
 
 
 def canonical_json(value: object) -> str:
-    """Return JSON text that is equal for equal values: sorted keys, shortest exact floats.
+    """Return canonical JSON text: sorted keys, shortest exact floats.
 
     Args:
         value: mappings, sequences, text, numbers (numpy's too), booleans and None.

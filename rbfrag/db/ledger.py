@@ -1,4 +1,4 @@
-"""The ledger: how many rows of each table rbfrag wrote, and the XOR of their digests.
+"""Ledger of written rows: their number in each table, and the XOR of their digests.
 
 A row that another program deletes or adds leaves no trace in the other rows; the ledger tells of
 it. It is kept in memory and written by one statement when the transaction commits.
@@ -21,7 +21,7 @@ Tallies = dict[tuple[str, int], tuple[int, int]]
 
 _OWNERS = ("campaign_id", "combination_id")
 """What says whose a row is: a campaign, or a combination, which is of one."""
-_KEPT = "rbfrag_ledger"
+_PENDING = "rbfrag_ledger"
 _IDS_AT_ONCE, _MOST_KEPT = 500, 10_000
 _WRITE = (
     "INSERT INTO ledger (of_table, campaign, row_count, digests) VALUES ({0}, {0}, {0}, {0}) "
@@ -33,7 +33,7 @@ _WRITE = (
 
 
 def keep_ledger(engine: Engine) -> None:
-    """Have each transaction of an engine write the rows that :func:`tally` was told of."""
+    """Write the counts of :func:`tally` in each transaction of an engine."""
     event.listen(engine, "begin", _forget)
     event.listen(engine, "commit", _write)
 
@@ -47,7 +47,7 @@ def tally(
     *,
     sign: int = 1,
 ) -> None:
-    """Note rows that the open transaction inserts or deletes.
+    """Record rows that the open transaction inserts or deletes.
 
     Args:
         columns: names of the columns of `rows`.
@@ -55,29 +55,29 @@ def tally(
     """
     owner = next((name for name in _OWNERS if name in table.c), "")
     owners = map(itemgetter(columns.index(owner)), rows) if owner else repeat(0)
-    kept = connection.info.setdefault(_KEPT, {})
+    pending = connection.info.setdefault(_PENDING, {})
     for of, group in groupby(zip(owners, digests, strict=False), itemgetter(0)):
         values = [digest for _, digest in group]
-        number, together = kept.get((table.name, owner, of), (0, 0))
-        kept[table.name, owner, of] = number + sign * len(values), reduce(xor, values, together)
-    if len(kept) > _MOST_KEPT:  # a merge in one transaction may be of any size
+        number, together = pending.get((table.name, owner, of), (0, 0))
+        pending[table.name, owner, of] = number + sign * len(values), reduce(xor, values, together)
+    if len(pending) > _MOST_KEPT:  # a merge in one transaction may be of any size
         _write(connection)
 
 
 def has_ledger(connection: Connection) -> bool:
-    """Return whether a database has a ledger: one of schema 0008 and before has none."""
+    """Return whether a database has a ledger; schema 0008 and earlier have none."""
     return inspect(connection).has_table(ledger.name)
 
 
 def written_tallies(connection: Connection) -> Tallies:
-    """Return what the ledger says, the open transaction included."""
+    """Return the ledger, including the open transaction."""
     _write(connection)
     rows = connection.execute(select(ledger))
     return {(row.of_table, row.campaign): (row.row_count, row.digests) for row in rows}
 
 
 def stored_tallies(connection: Connection) -> Tallies:
-    """Return what the tables hold."""
+    """Return the counts and digests of the stored rows."""
     return {
         (name, campaign): sums
         for name, table in sorted(metadata.tables.items())
@@ -86,19 +86,19 @@ def stored_tallies(connection: Connection) -> Tallies:
 
 
 def renew_ledger(connection: Connection) -> None:
-    """Take the rows that are there for the rows that were written."""
+    """Replace the ledger by the present rows."""
     _forget(connection)
     connection.execute(delete(ledger))
     _insert(connection, stored_tallies(connection))
 
 
 def note_sound(connection: Connection, time: str) -> None:
-    """Note that :func:`rbfrag.db.check.database.check_database` found nothing at that time."""
+    """Record that :func:`rbfrag.db.check.database.check_database` found nothing at that time."""
     connection.execute(update(ledger).values(found_sound=time))
 
 
 def last_sound(connection: Connection) -> str | None:
-    """Return when a check last found nothing; None for never, or without a ledger."""
+    """Return the time of the last check without findings; None if never, or without a ledger."""
     if not has_ledger(connection):
         return None
     time: str | None = connection.scalar(select(func.max(ledger.c.found_sound)))
@@ -121,15 +121,15 @@ def _by_campaign(connection: Connection, table: Table) -> dict[int, tuple[int, i
 
 
 def _forget(connection: Connection) -> None:
-    connection.info.pop(_KEPT, None)
+    connection.info.pop(_PENDING, None)
 
 
 def _write(connection: Connection) -> None:
-    kept = connection.info.pop(_KEPT, {})
-    of_points = sorted({of for _, owner, of in kept if owner == "combination_id"})
+    pending = connection.info.pop(_PENDING, {})
+    of_points = sorted({of for _, owner, of in pending if owner == "combination_id"})
     campaigns = dict(_campaigns(connection, of_points))
     sums: Tallies = {}
-    for (name, owner, of), (number, digests) in kept.items():
+    for (name, owner, of), (number, digests) in pending.items():
         key = name, campaigns[of] if owner == "combination_id" else of
         before = sums.get(key, (0, 0))
         sums[key] = before[0] + number, before[1] ^ digests
@@ -138,8 +138,8 @@ def _write(connection: Connection) -> None:
 
 def _campaigns(connection: Connection, ids: Sequence[int]) -> Iterator[tuple[int, int]]:
     for start in range(0, len(ids), _IDS_AT_ONCE):
-        some = ", ".join(map(str, ids[start : start + _IDS_AT_ONCE]))
-        query = f"SELECT id, campaign_id FROM combination WHERE id IN ({some})"
+        id_list = ", ".join(map(str, ids[start : start + _IDS_AT_ONCE]))
+        query = f"SELECT id, campaign_id FROM combination WHERE id IN ({id_list})"
         yield from ((row[0], row[1]) for row in connection.exec_driver_sql(query))
 
 

@@ -1,4 +1,4 @@
-"""Where the database is and which schema this rbfrag works with, without loading SQLAlchemy.
+"""Location of the database and its supported schema, without loading SQLAlchemy.
 
 The schema is named apart from the migrations, so that `rbfrag predict` can check a database
 without loading Alembic; a test proves that both agree.
@@ -36,7 +36,7 @@ APPLICATION_ID = 0x72626672
 
 
 def locate(db: str | PathLike[str] | None) -> Path | str:
-    """Return the SQLite file, or the URL of another database, that `db` means.
+    """Return the SQLite file, or the URL of another database, for `db`.
 
     Args:
         db: a path or an SQLAlchemy URL; None for the environment variable ``RBFRAG_DB``,
@@ -84,12 +84,12 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
 
 
 def is_unnamed(db: str | PathLike[str] | None) -> bool:
-    """Return whether no database is named, by `db` or by the environment."""
+    """Return whether neither `db` nor the environment names a database."""
     return db is None and not os.environ.get("RBFRAG_DB")
 
 
 def data_place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
-    """Return where the data to read are, and whether these are the built-in data, read only.
+    """Return the location of the data, and whether it is the built-in data set (read only).
 
     Args:
         db: as for :func:`locate`; the built-in data answer where none is named and the current
@@ -102,12 +102,12 @@ def data_place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
 
 
 def reference_file() -> Path | None:
-    """Return the shipped reference database, or None where none is shipped."""
+    """Return the built-in database, or None if there is none."""
     return REFERENCE if REFERENCE.is_file() else None
 
 
 def sole_revision(revisions: Sequence[str], where: str) -> str | None:
-    """Return the revision that a database states, None where it states none.
+    """Return the schema revision of a database, None if it has none.
 
     Raises:
         SchemaVersionError: it states several, as after a copy of tables into tables.
@@ -121,7 +121,7 @@ def sole_revision(revisions: Sequence[str], where: str) -> str | None:
 
 
 def check_revision(revision: str, where: str, *, read_only: bool = False) -> None:
-    """Refuse a database whose schema this rbfrag does not work with.
+    """Reject a database with an unsupported schema.
 
     Args:
         revision: the revision stored in the database.

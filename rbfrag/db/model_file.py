@@ -1,4 +1,4 @@
-"""A fitted model as a row: encoded, decoded, and read straight from an SQLite file.
+"""Fitted models as rows: encoding, decoding, and reading directly from an SQLite file.
 
 Standard library only: `rbfrag predict` loads nothing heavier than `sqlite3` for its model. Both
 readers, the one over SQLAlchemy and the one here, decode alike and so agree to the bit: JSON writes
@@ -27,7 +27,7 @@ MODEL_FORM = 2
 
 @dataclass(frozen=True)
 class ModelRow:
-    """One fitted fragility model as stored.
+    """One fitted fragility model in stored form.
 
     Args:
         name: unique name.
@@ -63,7 +63,7 @@ class ModelRow:
     dependence: Mapping[str, object] | None = None
 
 
-COLUMNS = tuple(each.name for each in fields(ModelRow))
+COLUMNS = tuple(column.name for column in fields(ModelRow))
 """The columns that make a model, in the order of :func:`decode_model`."""
 
 STORED = (*COLUMNS, "digest")
@@ -76,7 +76,7 @@ _TYPES: Mapping[str, ValueType] = {"is_default": "boolean", "form": "integer"}
 
 
 def refuse_taken(name: str, taken: Collection[str]) -> None:
-    """Reject a name that a stored model has."""
+    """Reject the name of an existing model."""
     if name in taken:
         raise InputError(
             f"the model {name!r} exists: choose another name, or set replace",
@@ -85,7 +85,7 @@ def refuse_taken(name: str, taken: Collection[str]) -> None:
 
 
 def encode_model(row: ModelRow) -> dict[str, Any]:
-    """Return a model as values by column.
+    """Return a model as column values.
 
     Raises:
         InputError: an empty name, a covariance of another size than the coefficients, a number
@@ -130,7 +130,7 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
 
 
 def decode_model(values: Sequence[Any]) -> ModelRow:
-    """Return the model of one row, its values in the order of :data:`STORED`.
+    """Return the model of one row, with the values in the order of :data:`STORED`.
 
     Raises:
         DatabaseError: the row is not what was stored: its digest differs, or it does not read as
@@ -197,8 +197,8 @@ RETIRED = {
 """What answers in the place of models that were shipped once."""
 
 
-def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
-    """Return the sentence for a model that is not there.
+def unknown_model(name: str | None, names: Sequence[str], where: str) -> str:
+    """Return the error text for an unknown model.
 
     Args:
         name: the name asked for; None for the default.
@@ -206,14 +206,14 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     """
     if name in RETIRED:
         return f"there is no model {name!r} any more: use {RETIRED[name]} in its place"
-    if not known:
+    if not names:
         return f"{where} holds no model yet: make one by rbfrag fit"
     if name is None:
         return (
-            f"{where} has no default model: name one of {', '.join(known)}, or choose "
+            f"{where} has no default model: name one of {', '.join(names)}, or choose "
             "the default by rbfrag models default"
         )
-    return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
+    return f"there is no model {name!r} in {where}; it holds: {', '.join(names)}"
 
 
 DECIDING = ("log_loss_held_out_kr05", "log_loss_held_out")
@@ -221,24 +221,24 @@ DECIDING = ("log_loss_held_out_kr05", "log_loss_held_out")
 
 
 def held_out_loss(row: ModelRow, *names: str) -> float:
-    """Return the log loss of a model on earthquakes left out; infinite where it has none.
+    """Return the held-out log loss of a model; infinite if it has none.
 
     Args:
         names: scores, of which the first that there is counts; empty for `DECIDING`.
     """
     scores = row.diagnostics.get("scores")
-    known = scores if isinstance(scores, Mapping) else {}
-    values = (known.get(name) for name in names or DECIDING)
+    score_map = scores if isinstance(scores, Mapping) else {}
+    values = (score_map.get(name) for name in names or DECIDING)
     return next((float(value) for value in values if isinstance(value, int | float)), math.inf)
 
 
 def answers_special_questions(row: ModelRow) -> bool:
-    """Return whether a model answers special questions only: of a record, or of one rotation."""
+    """Return whether a model is for special cases only: a record, or one rotation."""
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
 
 def recommended(rows: Sequence[ModelRow], kind: str = "toppling") -> ModelRow | None:
-    """Return the model of a kind that answers when none is named, None where there is none.
+    """Return the default model of a kind, None if there is none.
 
     That is the one that was chosen, else the one of the least log loss on earthquakes left out,
     else the one that was fitted first.

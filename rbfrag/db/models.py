@@ -1,4 +1,4 @@
-"""Writing and reading fitted models."""
+"""Storage of fitted models."""
 
 from __future__ import annotations
 
@@ -79,22 +79,22 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
         stored = connection.execute(query).one_or_none()
         default = None if stored is None else _with_default(connection, decode_model(stored))
     if default is None:
-        known = names_of_models(connection)
+        names = names_of_models(connection)
         place = database_label(connection.engine.url)
-        raise UnknownModelError(unknown_model(name, known, place))
+        raise UnknownModelError(unknown_model(name, names, place))
     return default
 
 
 def _with_default(connection: Connection, row: ModelRow) -> ModelRow:
-    """Return a model that says whether it is the default; as stored where another is damaged."""
+    """Return a model with its default flag; as stored if another model is damaged."""
     try:
-        return next(each for each in model_rows(connection) if each.name == row.name)
+        return next(model for model in model_rows(connection) if model.name == row.name)
     except DatabaseError:
         return row
 
 
 def set_default(connection: Connection, name: str) -> None:
-    """Make a model the one of its kind that answers when none is named."""
+    """Set the default model of its kind."""
     _clear_default(connection, load_model(connection, name).kind)
     named = fragility_model.c.name == name
     update_rows(connection, fragility_model, named, {"is_default": True})

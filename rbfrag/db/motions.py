@@ -1,4 +1,4 @@
-"""Writing and reading accelerograms, with their earthquakes and suites."""
+"""Storage of accelerograms, with their earthquakes and suites."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def add_motion(
     flags: Sequence[str] = (),
     suite: str | None = None,
 ) -> tuple[int, bool]:
-    """Store a motion, or find it when the same samples are there already.
+    """Store a motion, or find the stored one with the same samples.
 
     A motion is its samples and their interval; labels do not make another one. Nor does a
     filter that rounds otherwise: the same samples of a file, processed alike, are one motion
@@ -150,7 +150,7 @@ def samples_of_motions(connection: Connection) -> dict[int, tuple[str, float]]:
 
 
 def times_of_earthquakes(connection: Connection) -> dict[str, str]:
-    """Return origin times or years, as metadata state them, by event id."""
+    """Return origin times or years from metadata, by event id."""
     column = schema.earthquake.c
     query = select(column.event_id, column.time).where(~column.guessed, column.time.is_not(None))
     return {row.event_id: row.time for row in connection.execute(query)}
@@ -162,7 +162,7 @@ def motion_row(connection: Connection, motion_id: int) -> MotionRow:
 
 
 def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
-    """Return a stored motion with its samples, bit for bit as it was stored.
+    """Return a stored motion with its samples, bit-identical to the stored ones.
 
     Raises:
         InputError: there is no motion of that id, or a reference file left its samples out.
@@ -195,13 +195,13 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
 
 
 def same_source(connection: Connection, motion_id: int) -> list[int]:
-    """Return the other motions that were made from the same samples of a file, by id."""
-    own = select(schema.motion.c.source_sha256).where(schema.motion.c.id == motion_id)
+    """Return the ids of other motions made from the same samples of a file."""
+    source = select(schema.motion.c.source_sha256).where(schema.motion.c.id == motion_id)
     interval = select(schema.motion.c.dt_s).where(schema.motion.c.id == motion_id)
     query = (
         select(schema.motion.c.id)
         .where(
-            schema.motion.c.source_sha256 == own.scalar_subquery(),
+            schema.motion.c.source_sha256 == source.scalar_subquery(),
             schema.motion.c.dt_s == interval.scalar_subquery(),
             schema.motion.c.id != motion_id,
         )
@@ -211,25 +211,25 @@ def same_source(connection: Connection, motion_id: int) -> list[int]:
 
 
 def measures_of(motion: GroundMotion) -> dict[str, float | None]:
-    """Return the :data:`COMPUTED` of a motion, by column."""
+    """Return the :data:`COMPUTED` measures of a motion, by column."""
     values = {**asdict(motion.measures), **motion.spectral_accelerations}
     return {name: values[name] for name in COMPUTED}
 
 
 def same_measure(
-    name: str, one: float | None, other: float | None, pgv_m_s: float, pgd_m: float
+    name: str, first: float | None, other: float | None, pgv_m_s: float, pgd_m: float
 ) -> bool:
-    """Return whether a measure is the same but for sums in another order on another processor.
+    """Return whether a measure is equal except for the order of summation on another processor.
 
     Args:
         name: one of :data:`COMPUTED`.
         pgv_m_s: PGV of the motion [m/s], which a final velocity is what is left of.
         pgd_m: PGD of the motion [m].
     """
-    if one is None or other is None:
-        return one is other
+    if first is None or other is None:
+        return first is other
     scale = {"final_velocity_m_s": pgv_m_s, "final_displacement_m": pgd_m}.get(name, 0.0)
-    return math.isclose(one, other, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale)
+    return math.isclose(first, other, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale)
 
 
 def _applied(motion: GroundMotion) -> str | None:
@@ -298,7 +298,7 @@ def _listed(row: RowMapping, name: str) -> list[Any]:
 
 
 def recording_id_for(connection: Connection, event: EarthquakeInfo, name: str, station: str) -> int:
-    """Return the row id of a recording of an earthquake, both made when new."""
+    """Return the row id of a recording of an earthquake; create both if new."""
     earthquake_id = earthquake_id_for(connection, event, recording=name)
     values = {"earthquake_id": earthquake_id, "name": name, "station": station}
     insert_if_new(connection, schema.recording, values)
@@ -307,7 +307,7 @@ def recording_id_for(connection: Connection, event: EarthquakeInfo, name: str, s
 
 
 def delete_orphans(connection: Connection, recording_id: int) -> None:
-    """Delete a recording without motions, and a guessed earthquake that nothing refers to.
+    """Delete a recording without motions, and a guessed earthquake without references.
 
     Args:
         recording_id: the recording that a motion was moved away from.
@@ -323,18 +323,18 @@ def delete_orphans(connection: Connection, recording_id: int) -> None:
 
 
 def _refuse_contradiction(
-    motion: GroundMotion, stored: RowMapping, stated: EarthquakeInfo, is_vertical: bool
+    motion: GroundMotion, stored: RowMapping, info: EarthquakeInfo, is_vertical: bool
 ) -> None:
     name = motion.source_file or motion.label
-    known = f"the same samples are stored as motion {stored['id']} (from {stored['source_file']})"
-    if stored["event_id"] != stated.event_id:
+    prefix = f"the same samples are stored as motion {stored['id']} (from {stored['source_file']})"
+    if stored["event_id"] != info.event_id:
         raise InputError(
-            f"{name}: {known} of event {stored['event_id']!r}, not {stated.event_id!r}: "
+            f"{name}: {prefix} of event {stored['event_id']!r}, not {info.event_id!r}: "
             "correct the metadata"
         )
     if stored["is_vertical"] != is_vertical:
         direction = "vertical" if stored["is_vertical"] else "horizontal"
-        raise InputError(f"{name}: {known}, a {direction} component: correct the metadata")
+        raise InputError(f"{name}: {prefix}, a {direction} component: correct the metadata")
 
 
 def _row_query() -> Select[Any]:
@@ -375,7 +375,7 @@ def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMa
 
 
 def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording: str) -> int:
-    """Return the row id of an earthquake, made when new.
+    """Return the row id of an earthquake; create it if new.
 
     A guessed event never becomes a stated one of the same id: both stand side by side. What
     is said first about an event stays (sources give one event several names and
@@ -389,25 +389,25 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
         raise InputError(f"event {info.event_id}: {info.magnitude} is not a valid magnitude")
     event_id = storable(info.event_id) or UNKNOWN_EVENT + recording
     guessed = info.guessed or not info.event_id
-    known = {
+    columns = {
         "name": storable(info.name),
         "magnitude": info.magnitude,
         "time": None if info.time is None else storable(info.time),
     }
-    insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **known})
+    insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **columns})
     row = connection.execute(
         select(earthquake).where(
             earthquake.c.event_id == event_id, earthquake.c.guessed.is_(guessed)
         )
     ).one()
-    missing = {key: value for key, value in known.items() if value and not row._mapping[key]}
+    missing = {key: value for key, value in columns.items() if value and not row._mapping[key]}
     if missing:
         update_rows(connection, earthquake, earthquake.c.id == row.id, missing)
     return int(row.id)
 
 
 def add_to_suite(connection: Connection, name: str, motion_id: int) -> None:
-    """Put a motion into a suite, made when new; a motion that is in it stays in it."""
+    """Add a motion to a suite; create the suite if new."""
     if not name.strip():
         raise InputError("the name of a suite must not be empty")
     name = storable(name)
@@ -429,6 +429,6 @@ def require_suite(connection: Connection, name: str) -> int:
     """
     suite_id = connection.scalar(select(suite.c.id).where(suite.c.name == storable(name)))
     if suite_id is None:
-        known = ", ".join(suite_names(connection)) or "none"
-        raise InputError(f"unknown suite {name!r}; the suites are {known}")
+        names = ", ".join(suite_names(connection)) or "none"
+        raise InputError(f"unknown suite {name!r}; the suites are {names}")
     return int(suite_id)

@@ -1,4 +1,4 @@
-"""Connections to PostgreSQL that do not wait for ever. Loaded with psycopg alone."""
+"""PostgreSQL connections with a time limit on waiting. Loaded only with psycopg."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ logging.getLogger("psycopg").addHandler(logging.NullHandler())
 
 
 class SilentServerError(psycopg.OperationalError):
-    """A server that does not answer any more."""
+    """The server does not respond."""
 
 
 class PatientConnection(psycopg.Connection[Any]):
-    """A connection whose waits end where the server has gone silent.
+    """Connection that stops waiting for a silent server.
 
     A statement may take its time: a server that takes another connection is at work. One that takes
     none is gone, though its host, or what stands before it, keeps the connections open, which
@@ -35,7 +35,7 @@ class PatientConnection(psycopg.Connection[Any]):
     """
 
     def wait(self, gen: Any, *args: Any, **kwargs: Any) -> Any:
-        """Wait as psycopg does, with an end."""
+        """Wait like psycopg, with a time limit."""
         waiting = _patient(gen, self._is_alive, self.pgconn.finish, self.info.host)
         return super().wait(waiting, *args, **kwargs)
 
@@ -55,7 +55,7 @@ def _patient(
     close: Callable[[], None],
     host: str,
 ) -> Generator[Any, Any, Any]:
-    """Pass what a wait is about on, and end it after a silence.
+    """Pass the states of a wait through, and end it after a period of silence.
 
     Args:
         gen: yields what it waits for, and is sent what is ready, 0 several times a second.

@@ -1,4 +1,4 @@
-"""The named queries: what the fits and the reports read."""
+"""Named queries of fits and reports."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _ON_STRUCTURE = motion.c.flags.contains(f'"{STRUCTURE}"')
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DatabaseInfo(Result):
-    """What a database holds.
+    """Contents of a database.
 
     Args:
         dialect: ``sqlite`` or ``postgresql``.
@@ -91,7 +91,8 @@ class DatabaseInfo(Result):
 
 @dataclass(frozen=True)
 class SuiteCount:
-    """Contents of a database by suite and response kind, as in the dissertation's Table 4.2.
+    """Contents of a database for one suite and one kind of response, as in the dissertation's Table
+    4.2.
 
     Args:
         suite: name of the suite; None for the motions that are in none.
@@ -147,7 +148,8 @@ def combination_table(
     doubtful_pgd: bool = False,
     include_structures: bool = False,
 ) -> CombinationTable:
-    """Return the combinations of a kind, with critical values and their motions' intensity.
+    """Return the combinations of a kind, with critical values and the intensity measures of their
+    motions.
 
     A pair of motion, polarity and block appears once, though several campaigns may have searched
     it with different settings: the search that went lowest counts (of equals, the one of the
@@ -195,51 +197,51 @@ def combination_table(
             continue
         block = (row["p2"], row["block"])
         rows.setdefault((row["motion_id"], row["vertical_motion_id"], row["polarity"], block), row)
-    kept = sorted(rows.values(), key=lambda row: str(row["natural_key"]))
+    selected = sorted(rows.values(), key=lambda row: str(row["natural_key"]))
 
     def floats(name: str) -> Any:
         try:
             return np.array(
-                [np.nan if row[name] is None else row[name] for row in kept], dtype=np.float64
+                [np.nan if row[name] is None else row[name] for row in selected], dtype=np.float64
             )
         except (ValueError, TypeError):
-            for row in kept:
+            for row in selected:
                 stored_number(row[name], f"{name} of combination {row['id']}")
             raise
 
     def objects(name: str) -> Any:
-        column = np.empty(len(kept), dtype=object)
-        column[:] = [row[name] for row in kept]
+        column = np.empty(len(selected), dtype=object)
+        column[:] = [row[name] for row in selected]
         return column
 
     pgd_m = floats("pgd_m")
     if not doubtful_pgd:
-        pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
+        pgd_m[np.array([_pgd_in_doubt(row) for row in selected], dtype=np.bool_)] = np.nan
     numbers = (
         "p2", "yield_g", "search_limit", "kr_over_pga", "upper", "kr", "y_m_s",
         *(_OF_TABLE - {"pgd_m"}),
     )  # fmt: skip
-    others = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
+    object_names = ("event_id", "polarity", "status", "natural_key", "block", "numerics_version")
     return CombinationTable(
-        combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
-        motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
-        event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
+        combination_id=np.array([row["id"] for row in selected], dtype=np.int64),
+        motion_id=np.array([row["motion_id"] for row in selected], dtype=np.int64),
+        event_guessed=np.array([row["guessed"] for row in selected], dtype=np.bool_),
         pgd_m=pgd_m,
         measures={name: floats(name) for name in _MEASURES if name not in _OF_TABLE},
         **{name: floats(name) for name in numbers},
-        **{name: objects(name) for name in others},
+        **{name: objects(name) for name in object_names},
     )
 
 
 def recordings_of_motions(connection: Connection) -> dict[int, int]:
-    """Return the recording, which is the site in an earthquake, that each motion is of."""
+    """Return the recording of each motion, which is the site in an earthquake."""
     rows = connection.execute(select(motion.c.id, motion.c.recording_id))
     return {int(row.id): int(row.recording_id) for row in rows}
 
 
 @dataclass(frozen=True, eq=False)
 class OutcomeGrid:
-    """The blocks of a kind's grid, of shape (n, m): combination by number in the grid.
+    """Outcome grid of a kind, shape (n, m): combination by index in the grid.
 
     Args:
         k_over_pga: strength over PGA; NaN where a block is not stored.
@@ -259,7 +261,7 @@ class OutcomeGrid:
 
 
 def motions_on_structures(connection: Connection, kind: str) -> int:
-    """Return the number of motions recorded on structures that a kind's combinations have."""
+    """Return the number of motions recorded on structures among a kind's combinations."""
     query = (
         select(func.count(combination.c.motion_id.distinct()))
         .join(motion, motion.c.id == combination.c.motion_id)
@@ -269,7 +271,7 @@ def motions_on_structures(connection: Connection, kind: str) -> int:
 
 
 def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGrid:
-    """Return what the blocks of the grid do in some combinations, of one kind.
+    """Return the outcomes of the grid blocks of combinations of one kind.
 
     Args:
         combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
@@ -277,10 +279,10 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
     Returns:
         Arrays of shape (n, m), m being the greatest number in the grid that is stored plus one.
     """
-    wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
+    ids = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
     column = simulation.c
     rows: list[Any] = []
-    if wanted.size:
+    if ids.size:
         fails = case((column.outcome == "toppled", 1.0), (column.outcome == "stable", 0.0))
         query = select(
             column.combination_id,
@@ -291,23 +293,23 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
             column.displacement_m,
             column.sensitive,
         ).where(
-            column.combination_id.between(int(wanted.min()), int(wanted.max())),
+            column.combination_id.between(int(ids.min()), int(ids.max())),
             column.grid.is_not(None),
         )
         rows = list(connection.execute(query))
     values = np.array([tuple(row) for row in rows], dtype=np.float64).reshape(-1, 7)
     owner, number = values[:, 0].astype(np.int64), values[:, 1].astype(np.int64)
-    grid = np.full((5, wanted.size, int(number.max(initial=-1)) + 1), np.nan)
-    order = np.argsort(wanted)
-    at = np.searchsorted(wanted, owner, sorter=order)
-    at = order[np.minimum(at, wanted.size - 1)]
-    mine = wanted[at] == owner
+    grid = np.full((5, ids.size, int(number.max(initial=-1)) + 1), np.nan)
+    order = np.argsort(ids)
+    at = np.searchsorted(ids, owner, sorter=order)
+    at = order[np.minimum(at, ids.size - 1)]
+    mine = ids[at] == owner
     grid[:, at[mine], number[mine]] = values[mine, 2:].T
     return OutcomeGrid(*grid)
 
 
 def database_info(connection: Connection) -> DatabaseInfo:
-    """Return what the database holds, counted, and which model of toppling is its default."""
+    """Return the counts of a database, and its default model for toppling."""
     by_status = select(combination.c.status, func.count().label("number")).group_by(
         combination.c.status
     )
@@ -333,7 +335,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
 
 
 def suite_counts(connection: Connection) -> SuiteCounts:
-    """Return what the database holds of every suite and kind, by name.
+    """Return the contents of every suite and kind, by name.
 
     A motion that is in several suites counts in each, so that columns need not add up to the
     numbers of rows.
@@ -386,19 +388,19 @@ def _pgd_in_doubt(row: RowMapping) -> bool:
 
 
 def _age(numerics_version: str) -> tuple[bool, int, str]:
-    """Return what sorts versions of the numerics, the newest last: they count up from imported."""
+    """Return a sort key of numerics versions, the newest last; imported values come first."""
     return numerics_version != IMPORTED, len(numerics_version), numerics_version
 
 
 def _combination_query() -> Select[Any]:
-    own = (
+    columns = (
         "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
         "yield_g", "settings", "numerics_version", "status", "search_limit", "kr_over_pga",
         "upper", "kr", "y_m_s",
     )  # fmt: skip
     of_motion = (*(name for name in _MEASURES if name in motion.c), "flags")
     return select(
-        *(combination.c[name] for name in own),
+        *(combination.c[name] for name in columns),
         *(motion.c[name] for name in of_motion),
         earthquake.c.event_id,
         earthquake.c.guessed,

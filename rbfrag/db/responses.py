@@ -1,4 +1,4 @@
-"""Writing and reading the motion in time of single blocks, kept on request."""
+"""Storage of response histories of single blocks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class ResponseRecord:
-    """One response with its history as it is stored.
+    """One response with its history in stored form.
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.response_key`, of all but `response`.
@@ -42,12 +42,12 @@ class ResponseRecord:
 
 
 def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) -> None:
-    """Store responses with their histories; those whose key is there are left alone."""
+    """Store responses with their histories; existing keys are skipped."""
     insert_rows(connection, response, _COLUMNS, [_row(record) for record in records])
 
 
 def known_responses(connection: Connection, keys: Iterable[str]) -> set[str]:
-    """Return those natural keys whose responses are stored already."""
+    """Return the natural keys whose responses are stored."""
     column = response.c.natural_key
     return {key for (key,) in rows_of_keys(connection, select(column), column, keys)}
 

@@ -1,4 +1,4 @@
-"""What goes into the database and comes out of it: frozen dataclasses.
+"""Rows of the database as frozen dataclasses.
 
 This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs it.
 """
@@ -13,7 +13,7 @@ Vertical = Literal["without", "with", "both"]
 
 
 class Selection(TypedDict, total=False):
-    """Which combinations of a kind are read.
+    """Selection of combinations of a kind.
 
     Args:
         suite: only motions of this suite.
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EarthquakeInfo:
-    """The earthquake a motion belongs to.
+    """The earthquake of a motion.
 
     Args:
         event_id: the key that earthquakes are told apart by.
@@ -98,7 +98,7 @@ class MotionRow:
 
 
 class Interval(NamedTuple):
-    """One interval of a map: its ends, k_r/PGA, and what becomes of every block in it."""
+    """One interval of a map: its ends in k_r/PGA, and the outcome of every block in it."""
 
     k_lo: float
     k_hi: float
@@ -106,7 +106,7 @@ class Interval(NamedTuple):
 
 
 class Point(NamedTuple):
-    """One simulated block; `grid` is its number in the kind's outcome grid, None beside it.
+    """One simulated block; `grid` is its index in the kind's outcome grid, None outside of it.
 
     `sensitive` is None of kinds whose outcomes are not.
     """
@@ -124,7 +124,7 @@ IMPORTED = "imported"  # numerics version of critical values that rbfrag has not
 
 @dataclass(frozen=True)
 class CombinationTable:
-    """Critical values with the intensity of their motions: columns of equal length.
+    """Critical values with the intensity measures of their motions: columns of equal length.
 
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``,
     `upper`, the upper end of the bracket of `kr_over_pga`, where there is none;

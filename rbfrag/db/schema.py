@@ -1,4 +1,4 @@
-"""The tables. Units are in the column names; natural unique keys hold no NULL.
+"""Tables of the database. Units are in the column names; natural unique keys contain no NULL.
 
 New databases are made from these definitions, and migrations bring older ones to them. What each
 table and column means stands beside it, for :mod:`rbfrag.db.data_dictionary`. Each row carries a
@@ -89,7 +89,7 @@ def _optional(name: str, type_: Any, meaning: str, unit: str = "") -> Column[Any
 
 
 def _quantity(name: str, *, nullable: bool | None = None) -> Column[Any]:
-    """Return the column of a quantity, as the vocabulary declares it."""
+    """Return the column of a quantity from the vocabulary."""
     about = QUANTITIES[name]
     missing = "missing" in about.stored if nullable is None else nullable
     return _column(name, Double, about.stored, about.unit, nullable=missing)
@@ -106,7 +106,7 @@ def _row_number() -> Column[Any]:
 
 
 def _shaken() -> tuple[Column[Any], ...]:
-    """Return the columns that say under which excitation a block was run, and as what."""
+    """Return the columns of the excitation and the kind of a simulated block."""
     return (
         _reference("motion_id", "motion.id", "RESTRICT", "the horizontal motion"),
         _reference(
@@ -431,7 +431,7 @@ response = _table(
 
 
 def _end(of: str, meaning: str, *, may_be_missing: bool = False) -> tuple[Column[Any], ...]:
-    """Return the columns that say how one motion of two leaves a block."""
+    """Return the columns of the final state of a block after one motion of a pair."""
     outcome = f"how the block ends {meaning}: as of simulation"
     return (
         _column(f"{of}_outcome", Text, outcome, nullable=may_be_missing),
@@ -569,7 +569,7 @@ vertical = motion.alias("vertical")
 
 
 def with_motions(table: Table) -> Join:
-    """Return a table that names motions, joined to the horizontal and the :data:`vertical` one."""
+    """Return a table joined to its horizontal and its :data:`vertical` motion."""
     return table.join(motion, motion.c.id == table.c.motion_id).outerjoin(
         vertical, vertical.c.id == table.c.vertical_motion_id
     )

@@ -1,4 +1,4 @@
-"""Writing and reading what two motions, one after the other, do to a block."""
+"""Storage of block responses to two consecutive motions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLUMNS = tuple(column.name for column in shock_pair.c if column.name not in NOT
 
 
 class ShockEnd(NamedTuple):
-    """How one motion of two leaves a block.
+    """Final state of a block after one motion of a pair.
 
     Args:
         outcome: how the run ended.
@@ -45,7 +45,7 @@ NOT_RUN = ShockEnd(None, None, None, None)
 
 @dataclass(frozen=True)
 class ShockPairRecord:
-    """One block under two motions as it is stored.
+    """One block under two motions in stored form.
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.pair_key`.
@@ -93,20 +93,20 @@ class StoredShockPair:
 def insert_shock_pairs(
     connection: Connection, campaign_id: int, records: Sequence[ShockPairRecord]
 ) -> None:
-    """Store blocks under two motions; those whose key is there are left alone."""
+    """Store blocks under two motions; existing keys are skipped."""
     # in one order: two campaigns on one server then wait for each other, never both at once
-    ordered = sorted(records, key=lambda each: each.natural_key)
-    insert_rows(connection, shock_pair, COLUMNS, [_row(campaign_id, each) for each in ordered])
+    ordered = sorted(records, key=lambda record: record.natural_key)
+    insert_rows(connection, shock_pair, COLUMNS, [_row(campaign_id, record) for record in ordered])
 
 
 def known_shock_pairs(connection: Connection, keys: Iterable[str]) -> set[str]:
-    """Return those natural keys that are stored."""
+    """Return the natural keys that are stored."""
     column = shock_pair.c.natural_key
     return {key for (key,) in rows_of_keys(connection, select(column), column, keys)}
 
 
 def pair_keys_with_samples(connection: Connection, *, numerics_version: str) -> list[str]:
-    """Return, sorted, the natural keys of pairs of motions that can be computed again."""
+    """Return the sorted natural keys of motion pairs that can be computed again."""
     first = motion.alias("first")
     query = (
         select(shock_pair.c.natural_key)
@@ -125,7 +125,7 @@ def pair_keys_with_samples(connection: Connection, *, numerics_version: str) -> 
 
 
 def stored_shock_pairs(connection: Connection, keys: Iterable[str]) -> list[StoredShockPair]:
-    """Return what is stored under some natural keys, in the order of the keys' text."""
+    """Return the stored motion pairs of natural keys, in the order of the keys."""
     query = select(
         shock_pair, campaign.c.settings, earthquake.c.event_id, motion.c.pga_g
     ).select_from(
@@ -134,18 +134,22 @@ def stored_shock_pairs(connection: Connection, keys: Iterable[str]) -> list[Stor
         .join(earthquake)
         .join(campaign, campaign.c.id == shock_pair.c.campaign_id)
     )
-    names = [each.name for each in fields(ShockPairRecord) if each.name not in (*PARTS, "block")]
+    names = [
+        attribute.name
+        for attribute in fields(ShockPairRecord)
+        if attribute.name not in (*PARTS, "block")
+    ]
     pairs = []
     for stored in rows_of_keys(connection, query, shock_pair.c.natural_key, keys):
         row = stored._mapping
-        what = f"of pair of motions {row['id']}"
-        settings = stored_json(row["settings"], dict, f"settings of the campaign {what}")
+        label = f"of pair of motions {row['id']}"
+        settings = stored_json(row["settings"], dict, f"settings of the campaign {label}")
         ends: dict[str, Any] = {
             part: ShockEnd(*(row[f"{part}_{name}"] for name in ShockEnd._fields)) for part in PARTS
         }
         record = ShockPairRecord(
             **{name: row[name] for name in names},
-            block=stored_json(row["block"], dict, f"block {what}"),
+            block=stored_json(row["block"], dict, f"block {label}"),
             **ends,
         )
         of_second = row["event_id"], row["pga_g"]

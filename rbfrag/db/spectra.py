@@ -1,4 +1,4 @@
-"""The toppling spectrum of each motion, stored and read back."""
+"""Storage of the toppling spectrum of each motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def store_spectrum(
     x_m_s: Sequence[float] | NDArray[np.float64],
     numerics_version: str = NUMERICS_VERSION,
 ) -> None:
-    """Store values of one motion's spectrum; values that are there already stay.
+    """Store values of one motion's spectrum; existing values are kept.
 
     Args:
         p2: frequency parameters [1/s²], shape (n,).
@@ -58,9 +58,9 @@ def spectrum_values(
         toppling_spectrum.c.p2,
         toppling_spectrum.c.x_m_s,
     ).where(toppling_spectrum.c.numerics_version == numerics_version)
-    wanted = None if p2 is None else set(map(float, p2))
+    sizes = None if p2 is None else set(map(float, p2))
     return {
         (motion_id, polarity, size): x
         for motion_id, polarity, size, x in connection.execute(query)
-        if wanted is None or size in wanted
+        if sizes is None or size in sizes
     }

@@ -1,4 +1,4 @@
-"""One SQLite file on disk: opening, recognising it, and explaining its errors.
+"""SQLite file on disk: opening, identification and error messages.
 
 Standard library only: `rbfrag predict` reads its model through this module.
 """
@@ -160,7 +160,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path, *, read_on
 def explained_sqlite_error(
     error: sqlite3.Error | UnicodeDecodeError, path: Path | str
 ) -> DatabaseError:
-    """Return the rbfrag error that explains what SQLite ran into, or text that is none."""
+    """Return the rbfrag error for an SQLite error, or for text that cannot be decoded."""
     if isinstance(error, UnicodeDecodeError):
         return DatabaseError(
             f"{path} is damaged (a text in it is not UTF-8): run  rbfrag db check  and restore it "

@@ -1,4 +1,4 @@
-"""One stored combination with all that belongs to it, as arrays."""
+"""One stored combination with all its results, as arrays."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from rbfrag.solver.results import OutcomeIntervals, SearchPoints
 
 @dataclass(frozen=True, eq=False)
 class StoredCombination:
-    """What a database says about one critical search.
+    """Results of one stored critical search.
 
     Args:
         pga_g: PGA of the horizontal motion [g].
@@ -54,7 +54,7 @@ class StoredCombination:
 
 
 def keys_with_samples(connection: Connection, *, numerics_version: str) -> list[str]:
-    """Return, sorted, the natural keys of combinations that can be computed again.
+    """Return the sorted natural keys of combinations that can be computed again.
 
     Args:
         numerics_version: of the solver at hand; other versions may give other numbers.

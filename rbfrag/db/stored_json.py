@@ -1,4 +1,4 @@
-"""JSON that stands in a column, read back or refused in one sentence."""
+"""JSON columns: decoded, or rejected with a one-sentence error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rbfrag.errors import DatabaseError
 
 
 def stored_json(text: Any, kind: type, where: str) -> Any:
-    """Return what a column of JSON says.
+    """Return the value of a JSON column.
 
     Args:
         text: what the column holds; None (nothing) gives None.
@@ -31,7 +31,7 @@ def stored_json(text: Any, kind: type, where: str) -> Any:
 
 
 def stored_number(value: Any, where: str) -> Any:
-    """Return a number of a column, or None; SQLite takes texts into columns of numbers."""
+    """Return a number of a column, or None; SQLite accepts text in number columns."""
     if value is None or isinstance(value, int | float):
         return value
     raise _damaged(where, f"{value!r} is not a number")

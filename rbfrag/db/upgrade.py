@@ -1,4 +1,4 @@
-"""Making a database, and bringing one to this rbfrag's schema."""
+"""Creation of a database, and its upgrade to the current schema."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _LOCK = APPLICATION_ID  # any number that is ours: two upgrades of one server ta
 
 
 def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
-    """Bring a database to the schema of this rbfrag, in one transaction.
+    """Upgrade a database to the current schema, in one transaction.
 
     Args:
         db: a path or an SQLAlchemy URL; None as for :func:`rbfrag.db.engine.open_database`.
@@ -65,7 +65,7 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
 
 
 def migrate(engine: Engine) -> None:
-    """Make the tables, or bring those that are there to the schema of this rbfrag.
+    """Create the tables, or upgrade the existing ones to the current schema.
 
     Args:
         engine: of :func:`rbfrag.db.engine.unchecked_engine`, opened for writing and, on SQLite,
@@ -111,7 +111,7 @@ def _require_sound_references(connection: Connection) -> None:
 
 
 def create_if_missing(place: Path | str) -> None:
-    """Make the database at `place` unless something is there already.
+    """Create the database at `place` unless it exists.
 
     An SQLite file is built under another name in the same folder and given its own name when
     it is complete, so that neither a killed process nor two at once leave half a database.
@@ -154,7 +154,9 @@ def _draft_prefix(place: Path, pid: int | str) -> str:
 
 
 def _remove_drafts_of_the_dead(place: Path, folder: Path) -> None:
-    """Remove what processes of this computer left that were killed while they made the database."""
+    """Remove draft files of processes of this computer that were killed while creating the
+    database.
+    """
     if os.name != "posix":
         return  # where nothing tells, without harm, whether a process lives
     before, after = _draft_prefix(place, "*").split("*")

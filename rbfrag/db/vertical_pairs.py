@@ -1,4 +1,4 @@
-"""Which vertical motion goes with each horizontal one."""
+"""Pairing of horizontal motions with their vertical component."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rbfrag.motions.direction import is_downward_name, lead_in_of, why_not_toget
 
 @dataclass(frozen=True)
 class VerticalPair:
-    """A horizontal motion and the vertical one of the same recording.
+    """A horizontal motion and the vertical component of the same recording.
 
     Args:
         vertical_id: the vertical motion; None where there is none to use.
@@ -37,7 +37,7 @@ class VerticalPair:
 
 
 def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[int, VerticalPair]:
-    """Return the vertical companion of every horizontal motion, by the id of the horizontal.
+    """Return the vertical component of every horizontal motion, by id of the horizontal one.
 
     A companion is the one vertical motion of the same recording, whether or not it is in the
     suite, with the same sampling interval, start and processing, upward positive. Components
@@ -53,7 +53,7 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
 
 
 def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
-    """Return the vertical companion of one horizontal motion.
+    """Return the vertical component of one horizontal motion.
 
     Raises:
         InputError: there is no motion of that id, or it is a vertical one.
@@ -61,18 +61,20 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
     row = motion_row(connection, motion_id)
     if row.is_vertical:
         raise InputError(f"motion {motion_id} is a vertical component: give a horizontal one")
-    own = select(motion.c.recording_id).where(motion.c.id == motion_id).scalar_subquery()
+    recording_id = select(motion.c.recording_id).where(motion.c.id == motion_id).scalar_subquery()
     query = (
         select(motion.c.id)
-        .where(motion.c.is_vertical, motion.c.recording_id == own)
+        .where(motion.c.is_vertical, motion.c.recording_id == recording_id)
         .order_by(motion.c.id)
     )
-    return _pair(row, [motion_row(connection, each) for each in connection.scalars(query)])
+    return _pair(
+        row, [motion_row(connection, vertical_id) for vertical_id in connection.scalars(query)]
+    )
 
 
 @dataclass(frozen=True)
 class MixedRecording:
-    """A recording whose components differ in their sampling interval, `dt_s` rising."""
+    """Recording whose components differ in sampling interval, `dt_s` increasing."""
 
     name: str
     dt_s: tuple[float, ...]
@@ -80,7 +82,7 @@ class MixedRecording:
 
 
 def recordings_of_mixed_dt(connection: Connection) -> list[MixedRecording]:
-    """Return every recording whose components differ in their sampling interval."""
+    """Return every recording whose components differ in sampling interval."""
     mixed = (
         select(motion.c.recording_id)
         .group_by(motion.c.recording_id)

@@ -1,4 +1,4 @@
-"""A table of draws: what one block may be, a row each, with weights."""
+"""A table of draws: samples of one uncertain block's parameters, one row each, with weights."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
     """
     fields = [name for name in BLOCK if not name.endswith("_sigma")]
     with opened_table(path, (*fields, "weight"), ()) as table:
-        columns, faults, lines = table.whole()
+        columns, faults, lines = table.read_all()
     if faults:
-        places = [f"{table.file.word} {lines[i]}" for i in sorted(faults)]
-        raise InputError(f"{path}, {in_list(places, (faults[i] for i in sorted(faults)))}")
+        row_names = [f"{table.file.word} {lines[i]}" for i in sorted(faults)]
+        raise InputError(f"{path}, {in_list(row_names, (faults[i] for i in sorted(faults)))}")
     weight = columns.pop("weight", None)
     drawn = {name: values for name, values in columns.items() if not np.isnan(values).all()}
     if not drawn:
@@ -45,8 +45,8 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
     if has_shape(drawn):
         with table.named():
             blocks = many_blocks(drawn, size, rows=True)
-        for each in (*blocks.refused, *blocks.unstable):
-            raise InputError(f"{path}: draw {each.places[0] + 1}: {each.texts()[0]}")
+        for group in (*blocks.refused, *blocks.unstable):
+            raise InputError(f"{path}: draw {group.indices[0] + 1}: {group.texts()[0]}")
         if len(blocks.groups) > 1:
             kinds = " and ".join(str(group.kind) for group in blocks.groups)
             raise InputError(f"{path}: all draws of a block must have one kind, not {kinds}")

@@ -1,4 +1,4 @@
-"""The fragility of blocks as a function of one measure of shaking, for other tools."""
+"""Fragility of blocks as a function of one intensity measure, for other tools."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _BEGINNINGS = 500
 
 
 class BlockFunctions(NamedTuple):
-    """The fragilities of blocks.
+    """Fragility functions of blocks, with their model and warnings.
 
     Args:
         functions: one of each block, or of their class.
@@ -62,7 +62,7 @@ class BlockFunctions(NamedTuple):
 
 
 class BlockCurve(NamedTuple):
-    """P at levels close enough to be joined by chords; 0 below the first of them.
+    """P at levels close enough for linear interpolation; 0 below the first level.
 
     Args:
         u: ln of the levels, shape (n,).
@@ -75,7 +75,7 @@ class BlockCurve(NamedTuple):
     lowest: float | None = None
 
     def smoothed(self, meaning: Component, measure: str) -> BlockCurve:
-        """Return P over another definition of the component, whose scatter is integrated.
+        """Return P for another definition of the component, integrated over its dispersion.
 
         The steps of u must be equal. A single component is definition/ratio · exp(sigma ξ), ξ
         standard normal. What P jumps by where it begins is integrated in closed form.
@@ -93,7 +93,7 @@ class BlockCurve(NamedTuple):
         return BlockCurve(u + math.log(meaning.ratio(measure)), p, self.lowest)
 
     def between(self, top: float) -> BlockCurve:
-        """Return the part from P = `LEAST` to a level, or to where P is all but 1."""
+        """Return the part of the curve from P = `LEAST` to a level, or to where P is almost 1."""
         if self.p[0] >= LEAST and self.u[-1] <= math.log(top):
             return self
         begins, ends = np.searchsorted(self.p, (LEAST, _SURE))
@@ -103,7 +103,7 @@ class BlockCurve(NamedTuple):
         return BlockCurve(grid, self.at(grid), self.lowest)
 
     def at(self, u: FloatArray | float) -> FloatArray:
-        """Return P between the levels, where its logarithm is nearly straight."""
+        """Return P between the levels, interpolated in its logarithm."""
         return np.asarray(np.exp(np.interp(u, self.u, np.log(np.maximum(self.p, _NOTHING)))))
 
 
@@ -151,12 +151,12 @@ def block_functions(
             yield curve.smoothed(meaning, measure)
 
     top, state = TOP[measure], FAILED.get(mode_of_kind(model.row.kind), "failed")
-    each = iter([_mean(shown(), top)]) if one_class else shown()
+    all_curves = iter([_mean(shown(), top)]) if one_class else shown()
     functions: list[FragilityFunction] = []
     weak: list[str] = []
     of = iter(names)
-    while some := list(islice(each, _CHUNK)):
-        named = list(zip(of, some, strict=False))
+    while chunk := list(islice(all_curves, _CHUNK)):
+        named = list(zip(of, chunk, strict=False))
         weak += [name for name, curve in named if curve.at(math.log(top)) < FLOOR]
         if not weak:
             functions += _functions(named, FragilityFunction("", state, measured), levels, top)
@@ -191,7 +191,7 @@ def curves_of(
     names: Sequence[str],
     scatter: float = 0.0,
 ) -> tuple[IntensityType, Iterator[BlockCurve]]:
-    """Return what the levels measure, and the curve of each block over a single component.
+    """Return the intensity measure of the levels, and the single-component curve of each block.
 
     Args:
         scatter: standard deviation of ln of the shaking that is to be integrated: curves reach as
@@ -203,14 +203,14 @@ def curves_of(
 
     def curves() -> Iterator[BlockCurve]:
         for start in range(0, next(iter(columns.values())).size, _CHUNK):
-            some = slice(start, start + _CHUNK)
-            of_blocks = {name: column[some, None] for name, column in columns.items()}
-            yield from _some_curves(of_blocks, measure, model, names[start:] or names, scatter)
+            rows = slice(start, start + _CHUNK)
+            of_blocks = {name: column[rows, None] for name, column in columns.items()}
+            yield from _scan_curves(of_blocks, measure, model, names[start:] or names, scatter)
 
     return IntensityType.of(measure), curves()
 
 
-def _some_curves(
+def _scan_curves(
     blocks: Mapping[str, FloatArray],
     measure: str,
     model: FragilityModel,
@@ -244,12 +244,12 @@ def _some_curves(
     grid = high + (end - high) * (even if scatter else _TOWARDS_THE_FIRST)
     rising = np.maximum.accumulate(probability(grid), axis=1)
     lowest = np.where(p[:, 0] - p.min(axis=1) > FLOOR, np.exp(high[:, 0]), np.nan)
-    for each, row, begins in zip(grid, rising, lowest.tolist(), strict=True):
-        yield BlockCurve(each, row, None if begins != begins else begins)
+    for levels, row, begins in zip(grid, rising, lowest.tolist(), strict=True):
+        yield BlockCurve(levels, row, None if begins != begins else begins)
 
 
 def _mean(curves: Iterable[BlockCurve], top: float) -> BlockCurve:
-    """Return the mean of curves; of those that jump where they begin, the first keep their jump."""
+    """Return the mean of curves; of curves that begin with a jump, the first ones keep it."""
     grid = np.linspace(math.log(_WEAKEST), math.log(top), 16 * _SCANNED)
     total, jumps = np.zeros(grid.size), []
     for curve in curves:
@@ -273,7 +273,7 @@ def _mean(curves: Iterable[BlockCurve], top: float) -> BlockCurve:
 def _functions(
     named: Sequence[tuple[str, BlockCurve]], empty: FragilityFunction, levels: int, top: float
 ) -> Iterator[FragilityFunction]:
-    """Yield the functions of some curves, up to the level `top`."""
+    """Yield the fragility functions of the curves, up to the level `top`."""
     straight = [_lognormal(curve, top) for _, curve in named]
     curved = [c.between(top) for (_, c), line in zip(named, straight, strict=True) if line is None]
     discrete: Iterator[tuple[FloatArray, FloatArray, float]] = iter(())

@@ -1,4 +1,4 @@
-"""Tables of blocks as commands read them: the blocks, and the rows that cannot be used."""
+"""Tables of blocks as read by the commands: the blocks, and the rejected rows."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PORTFOLIO = ("count", "weight", "loss", "loss_sigma")
 
 @dataclass(frozen=True, eq=False)
 class BlockRows:
-    """The blocks of a table that wait for an earthquake, and its rows that cannot be used.
+    """The blocks of a table that are stable at rest, and its rejected rows.
 
     Args:
         columns: columns of all rows; ``block_id`` are texts, numbers from 1 on where there are
@@ -58,20 +58,20 @@ class BlockRows:
 
     @cached_property
     def blocks(self) -> Columns:
-        """The columns of the blocks."""
+        """Columns of the usable blocks."""
         sound = self.reasons == ""
         return {name: column[sound] for name, column in self.columns.items()}
 
     @cached_property
     def refused(self) -> Columns:
-        """The columns of the other rows, and their ``reason``."""
+        """Columns of the rejected rows, with their ``reason``."""
         wrong = self.reasons != ""
         columns = {**self.columns, "reason": self.reasons}
         return {name: column[wrong] for name, column in columns.items()}
 
     @property
-    def places(self) -> list[str]:
-        """Where the rows that cannot be used stand: "line 3 (block A7)"."""
+    def row_labels(self) -> list[str]:
+        """Positions of the rejected rows: "line 3 (block A7)"."""
         lines, names = self.refused["line"].tolist(), self.refused["block_id"].tolist()
         return [
             f"{self.word} {line}" + (f" (block {name})" if self.named and name else "")
@@ -80,11 +80,11 @@ class BlockRows:
 
     @property
     def refused_count(self) -> int:
-        """Number of rows that cannot be used."""
+        """Number of rejected rows."""
         return int(self.refused["row"].size)
 
     def without(self, wrong: NDArray[np.bool_], reason: Callable[[int], str]) -> BlockRows:
-        """Return the table with some more of its rows refused.
+        """Return the table with additional rejected rows.
 
         Args:
             wrong: which of the blocks, shape (m,).
@@ -96,12 +96,12 @@ class BlockRows:
         if not wrong.any():
             return self
         reasons = self.reasons.copy()
-        places = np.flatnonzero(wrong)
-        reasons[self.blocks["row"][places]] = [reason(i) for i in places.tolist()]
+        rows = np.flatnonzero(wrong)
+        reasons[self.blocks["row"][rows]] = [reason(i) for i in rows.tolist()]
         return replace(self, reasons=reasons).checked()
 
     def checked(self) -> BlockRows:
-        """Return the table itself, or refuse one without a block, or of blocks without weight."""
+        """Return the table itself; reject one without usable blocks, or with zero total weight."""
         if not self.reasons.size:
             raise InputError(NO_BLOCK.format(self.source))
         if self.refused_count == self.reasons.size:
@@ -111,8 +111,8 @@ class BlockRows:
             raise InputError(f"{self.source}: the weights of the blocks sum to zero")
         return self
 
-    def whole(self, why: str = "all of them are needed") -> Columns:
-        """Return the blocks of a table whose rows all can be used, or refuse it.
+    def require_all(self, why: str = "all of them are needed") -> Columns:
+        """Return the blocks of a table, or reject it if any row is rejected.
 
         Args:
             why: the reason for which the others do not do.
@@ -122,20 +122,20 @@ class BlockRows:
         return self.blocks
 
     def unusable_in_words(self, effect: str = "") -> tuple[str, ...]:
-        """Return what is to be said of the columns, and of the rows that cannot be used.
+        """Return the warnings about the columns and the rejected rows.
 
         Args:
             effect: what becomes of these rows in numbers of several blocks.
         """
         reasons = self.refused["reason"].tolist()
         total = self.reasons.size
-        unusable = unusable_in_words(self.refused_count, total, self.places, reasons, effect)
+        unusable = unusable_in_words(self.refused_count, total, self.row_labels, reasons, effect)
         return (*self.remarks, *unusable)
 
     def with_refused(
         self, answers: Columns, row: NDArray[np.int_] | None = None
     ) -> dict[str, NDArray[Any]]:
-        """Return a table of answers with the rows that cannot be used, in the order of the table.
+        """Return a table of answers with the rejected rows inserted, in the order of the table.
 
         Args:
             answers: columns, a row for each block; NaN of those that cannot be used.
@@ -153,14 +153,14 @@ class BlockRows:
         return columns
 
     def refused_by_row(self) -> dict[int, dict[str, str]]:
-        """Return ``block_id``, ``site_id`` and ``reason`` of what cannot be used, by its row."""
+        """Return ``block_id``, ``site_id`` and ``reason`` of the rejected rows, by row."""
         names = [name for name in ("block_id", "site_id", "reason") if name in self.refused]
         rows = enumerate(self.refused["row"].tolist())
         return {row: {name: self.refused[name][i] for name in names} for i, row in rows}
 
     def _refuse(self, why: str) -> NoReturn:
         reasons = self.refused["reason"].tolist()
-        refuse(self.source, self.places, reasons, self.reasons.size, why)
+        refuse(self.source, self.row_labels, reasons, self.reasons.size, why)
 
 
 NO_BLOCK = "{}: there is no block in the file"
@@ -182,7 +182,7 @@ def read_blocks(
     crs: str | None = None,
     dry: bool = False,
 ) -> BlockRows:
-    """Return the blocks of a table, and its rows that cannot be used, each with its reason.
+    """Return the blocks of a table, and its rejected rows with their reasons.
 
     Args:
         source: file (.csv, .xlsx, .parquet), GeoJSON, or columns by name: fields of blocks under
@@ -222,7 +222,7 @@ def read_blocks(
         source, (*fields, *reads, *of_place), TEXTS, sheet=sheet, ignore_columns=ignore_columns
     ) as table:
         table.check(for_all, kind)
-        columns, faults, lines = table.whole()
+        columns, faults, lines = table.read_all()
     name, size = table.name, len(lines)
     values: dict[str, Any] = {field: columns.pop(field) for field in fields if field in columns}
     for field in PLANE_TEXTS:
@@ -235,14 +235,14 @@ def read_blocks(
             values[field] = np.where(np.isnan(cells), value, cells)
     if dry:
         values = without_water(values)
-    if of_place and "x" in table.stated.columns:
+    if of_place and "x" in table.header.columns:
         _place_on_map(columns, crs, name)
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{name}: lon and lat are required together: give both columns or neither")
     named = "block_id" in columns
     if not named:
         columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
-    kinds = [each or kind or "" for each in columns.get("kind", [""] * size)]
+    kinds = [cell or kind or "" for cell in columns.get("kind", [""] * size)]
     modes = columns["mode"].tolist() if "mode" in columns else None
     with table.named():
         blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
@@ -251,23 +251,23 @@ def read_blocks(
     if need_kind:
         reasons[np.array([not text for text in kinds], dtype=np.bool_)] = need_kind
     columns |= {
-        column_of(field): each.copy()
-        for field, each in values.items()
+        column_of(field): numbers.copy()
+        for field, numbers in values.items()
         if (field in reads and field not in columns)
         or (field in (*NUMBERS, *blocks.read) and field not in OF_A_SHAPE)
     }
     for group in blocks.groups:
-        for field, each in group.numbers.items():
-            own = columns.setdefault(column_of(field), np.full(size, np.nan))
-            own[group.places] = each
+        for field, numbers in group.numbers.items():
+            column = columns.setdefault(column_of(field), np.full(size, np.nan))
+            column[group.indices] = numbers
     assert blocks.kinds is not None
     columns["kind"] = np.array([*KINDS, ""], dtype=object)[blocks.kinds]
-    usable = columns["kind"][reasons == ""]
-    if one_kind and usable.size:
-        one = kind or Counter(usable.tolist()).most_common(1)[0][0]
-        for i in np.flatnonzero((reasons == "") & (columns["kind"] != one)).tolist():
-            own = columns["kind"][i]
-            reasons[i] = f"the block's kind is {own}, and the answer is for kind {one}"
+    answered_kinds = columns["kind"][reasons == ""]
+    if one_kind and answered_kinds.size:
+        answer_kind = kind or Counter(answered_kinds.tolist()).most_common(1)[0][0]
+        for i in np.flatnonzero((reasons == "") & (columns["kind"] != answer_kind)).tolist():
+            row_kind = columns["kind"][i]
+            reasons[i] = f"the block's kind is {row_kind}, and the answer is for kind {answer_kind}"
     _refuse_columns(columns, reasons)
     for i, fault in faults.items():
         reasons[i] = fault
@@ -317,7 +317,7 @@ def _place_on_map(columns: dict[str, NDArray[Any]], crs: str | None, source: str
 
 
 def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
-    """Say of rows why their place, count, weight or loss cannot be used."""
+    """Enter the reasons of rows whose position, count, weight or loss is invalid."""
 
     def say(wrong: NDArray[np.bool_], text: str, *names: str) -> None:
         for i in np.flatnonzero(wrong & (reasons == "")).tolist():
@@ -328,9 +328,13 @@ def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
         say(~on_map, "lon = {:g}, lat = {:g} is no place on the map", *PLACE)
     for name in PORTFOLIO:
         if name in columns:
-            own = columns[name]
-            say((own < 0.0) | (own == np.inf), name + " = {:g}: give a number not below zero", name)
+            values = columns[name]
+            say(
+                (values < 0.0) | (values == np.inf),
+                name + " = {:g}: give a number not below zero",
+                name,
+            )
     if "count" in columns:
-        own = columns["count"]
-        whole = "give the number of like blocks, a whole number from 1 on, or a weight"
-        say((own < 1.0) | (own != np.rint(own)), f"count = {{:g}}: {whole}", "count")
+        values = columns["count"]
+        hint = "give the number of like blocks, a whole number from 1 on, or a weight"
+        say((values < 1.0) | (values != np.rint(values)), f"count = {{:g}}: {hint}", "count")

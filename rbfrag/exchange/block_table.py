@@ -1,4 +1,4 @@
-"""A table of blocks: what its columns are, and what is wrong with which rows."""
+"""Tables of blocks: meaning of the columns, and invalid cells by row."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ EXAMPLE_NAME = "example"
 
 @dataclass(frozen=True, eq=False)
 class BlockTable:
-    """A table of blocks that is open.
+    """An open table of blocks.
 
     Args:
         name: what messages call it.
         file: what is open.
-        stated: which columns are which fields.
+        header: which columns are which fields.
         texts: fields that are texts.
         filled: fields of numbers that a cell has been read of.
         unused: columns that turned out to hold no kind of failure, with their words.
@@ -72,7 +72,7 @@ class BlockTable:
 
     name: str
     file: TableFile
-    stated: Header
+    header: Header
     texts: Collection[str]
     filled: set[str] = field(default_factory=set)
     unused: dict[str, list[str]] = field(default_factory=dict)
@@ -81,17 +81,17 @@ class BlockTable:
 
     @property
     def numeric(self) -> frozenset[str]:
-        """The columns that hold numbers, as it calls them."""
+        """Names of the numeric columns, as in the table."""
         return frozenset(
             column.header
-            for name, column in self.stated.columns.items()
+            for name, column in self.header.columns.items()
             if name not in (*self.texts, "free_standing", "back_fracture")
         )
 
     @property
     def parts(self) -> Parts:
-        """Its rows, some thousand at a time; the template's example is skipped beside others."""
-        column = self.stated.columns.get("block_id")
+        """The rows, a few thousand at a time, without the template's example."""
+        column = self.header.columns.get("block_id")
         for part in self.file.parts(self.numeric):
             if column is not None:
                 names = cells_of(part.cells[column.header])
@@ -106,19 +106,19 @@ class BlockTable:
             yield part
 
     def numbers(self, part: TablePart) -> tuple[dict[str, NDArray[np.float64]], dict[int, str]]:
-        """Return the numbers of some rows by field, and what is wrong with rows by their index."""
+        """Return the numbers of rows by field, and the invalid rows by index."""
         numbers, faults = {}, dict(part.faults)
-        for name, column in self.stated.columns.items():
+        for name, column in self.header.columns.items():
             if name in (*self.texts, "free_standing"):
                 continue
             if name == "back_fracture":
-                values, others = self._yes_or_no(part, column)
+                values, cell_faults = self._yes_or_no(part, column)
             else:
                 unit = QUANTITIES[name].unit if name in INPUTS else ""
-                values, others = part.numbers(column.header, unit, column.factor)
-            faults = others | faults
+                values, cell_faults = part.numbers(column.header, unit, column.factor)
+            faults = cell_faults | faults
             empty = np.isnan(values)
-            if others or not empty.all():
+            if cell_faults or not empty.all():
                 self.filled.add(name)
             if name in ASSUMED:
                 start = sum(self.read)
@@ -148,20 +148,20 @@ class BlockTable:
         return values, faults
 
     def text(self, part: TablePart, name: str) -> list[str] | None:
-        """Return the texts of some rows; None where the table has no column of that field."""
+        """Return the texts of rows; None where the table has no column of that field."""
         if name == "kind":
             return self._kinds(part)
-        column = self.stated.columns.get(name)
+        column = self.header.columns.get(name)
         if column is None:
             return None
         if name == "drainage":
             return [drainage_named(cell) for cell in self._cells(part, column)]
-        what = f"{self.name}: a cell of {name}"
-        return [checked_name(as_written(cell), what) for cell in self._cells(part, column)]
+        label = f"{self.name}: a cell of {name}"
+        return [checked_name(as_written(cell), label) for cell in self._cells(part, column)]
 
     def _kinds(self, part: TablePart) -> list[str] | None:
-        """Return the kinds that rows give, by a word or as free-standing."""
-        column, free = (self.stated.columns.get(name) for name in ("kind", "free_standing"))
+        """Return the kinds given in rows, by a word or by the column of free-standing blocks."""
+        column, free_column = (self.header.columns.get(name) for name in ("kind", "free_standing"))
         kinds = None
         if column is not None:
             cells = self._cells(part, column)
@@ -177,9 +177,9 @@ class BlockTable:
                 if column.header in self.unused:
                     wrong = f"column {column.header!r}: {self.unused[column.header][0]!r:.42}"
                     raise InputError(f"{self.name}: {wrong} is not a kind of failure")
-        if free is None:
+        if free_column is None:
             return kinds
-        values, faults = self._yes_or_no(part, free)
+        values, faults = self._yes_or_no(part, free_column)
         if faults:
             raise InputError(f"{self.name}: {next(iter(faults.values()))}")
         self.filled.add("free_standing")
@@ -189,14 +189,14 @@ class BlockTable:
         ]
 
     def warnings(self, used: Collection[str]) -> tuple[Diagnostic, ...]:
-        """Return what to know about its columns.
+        """Return the warnings about the columns.
 
         Args:
             used: the fields that the answer depends on, or hands on.
         """
         empty = {
             column.header
-            for name, column in self.stated.columns.items()
+            for name, column in self.header.columns.items()
             if name not in self.filled and name not in self.texts
         }
         used = {*used, "free_standing"} if "kind" in used else used
@@ -222,28 +222,28 @@ class BlockTable:
         return (
             *self.file.remarks,
             *assumed,
-            *self.stated.warnings,
-            *self.stated.ignored(named, used),
+            *self.header.warnings,
+            *self.header.ignored(named, used),
             *(Diagnostic(text, "ignored_columns") for text in kinds),
         )
 
-    def check(self, given: Collection[str] = (), kind: str | None = None) -> None:
-        """Reject a table that describes no blocks, or has a column that may matter unused.
+    def check(self, common_fields: Collection[str] = (), kind: str | None = None) -> None:
+        """Reject a table that describes no blocks, or has a relevant column that is not used.
 
         Args:
-            given: fields that are given for all blocks.
+            common_fields: fields that are given for all blocks.
             kind: how the blocks fail; None for what they are given by.
         """
-        present = {*self.stated.columns, *given}
+        present = {*self.header.columns, *common_fields}
         present |= {angle for plane, angle in ANGLES.items() if plane in present}
-        self.stated.check_unused(self.name, present if kind is None else {*present, "kind"})
+        self.header.check_unused(self.name, present if kind is None else {*present, "kind"})
         if kinds_by_numbers(present) or any(present.issuperset(shape) for shape in SHAPES):
             return
         sides = [name for name in RECTANGLE if name in present]
         if len(sides) == 1:
             missing = next(name for name in RECTANGLE if name not in present)
             word = missing.partition("_")[0]
-            near = next((h for h in self.stated.unknown if sounds_like(h) == missing), None)
+            near = next((h for h in self.header.unknown if sounds_like(h) == missing), None)
             hint = f" (did you mean the column {near!r}?)" if near else ""
             raise InputError(f"{self.name}: {word} is missing{hint}; the columns are {self._have}")
         block = block_of(present, kind)
@@ -251,16 +251,16 @@ class BlockTable:
         sides_too = ", nor height_m and width_m" if "kr" in block.names else ""
         self._reject(f"{column_of(missing)}{sides_too}")
 
-    def check_read(self, given: Collection[str], read: Collection[str]) -> None:
-        """Reject what is given for all blocks, and no answer depends on."""
-        for name in given:
+    def check_read(self, common_fields: Collection[str], read: Collection[str]) -> None:
+        """Reject fields that are given for all blocks and used by no answer."""
+        for name in common_fields:
             if name in BLOCK and name not in read:
                 text = f"{name} cannot be combined with the blocks of {self.name}: omit it"
                 raise InputError(text, fields=(name,))
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Name the table where something is rejected of all of its blocks."""
+        """Add the name of the table to errors that concern all of its blocks."""
         try:
             yield
         except InputError as error:
@@ -269,7 +269,7 @@ class BlockTable:
     def need(self, names: Collection[str]) -> None:
         """Reject a table without some columns."""
         for name in names:
-            if name not in self.stated.columns:
+            if name not in self.header.columns:
                 self._reject(name)
 
     @property
@@ -282,11 +282,11 @@ class BlockTable:
     def _reject(self, missing: str) -> None:
         raise InputError(f"{self.name}: there is no column {missing}; the columns are {self._have}")
 
-    def whole(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:
-        """Return its columns by field, what is wrong with rows, and the numbers of all rows."""
+    def read_all(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:
+        """Return the columns by field, the invalid rows, and the line numbers of all rows."""
         collected: dict[str, list[NDArray[Any]]] = {
             name: [np.empty(0, dtype=object if name in self.texts else np.float64)]
-            for name in self.stated.columns
+            for name in self.header.columns
             if name != "free_standing"
         }
         faults: dict[int, str] = {}
@@ -302,12 +302,12 @@ class BlockTable:
                 collected.setdefault(name, []).append(column)
             faults |= {len(lines) + i: fault for i, fault in wrong.items()}
             lines.extend(part.lines)
-        whole = {n: np.concatenate(arrays) for n, arrays in collected.items()}
-        return {n: c for n, c in whole.items() if c.size == len(lines)}, faults, lines
+        table = {n: np.concatenate(arrays) for n, arrays in collected.items()}
+        return {n: c for n, c in table.items() if c.size == len(lines)}, faults, lines
 
     def _has(self, name: str) -> bool:
-        return name in self.stated.columns or (
-            name == "kind" and "free_standing" in self.stated.columns
+        return name in self.header.columns or (
+            name == "kind" and "free_standing" in self.header.columns
         )
 
 
@@ -343,7 +343,7 @@ def opened_table(
 
 def read_rows(
     source: str | os.PathLike[str],
-    given: Mapping[str, Any],
+    defaults: Mapping[str, Any],
     *,
     sheet: str | None = None,
     ignore_columns: Sequence[str] = (),
@@ -352,7 +352,7 @@ def read_rows(
 
     Args:
         source: the table.
-        given: fields that hold for rows whose cell is empty.
+        defaults: fields that hold for rows whose cell is empty.
         sheet: of a workbook, the name of the sheet; None for the first.
         ignore_columns: columns to ignore.
 
@@ -362,16 +362,16 @@ def read_rows(
     read = (*BLOCK, *SHAKING, *BY_ROW, "count")
     texts = (*TEXTS, *SHAKING_TEXTS)
     with opened_table(source, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table:
-        table.check(given, given.get("kind"))
-        columns, faults, _ = table.whole()
+        table.check(defaults, defaults.get("kind"))
+        columns, faults, _ = table.read_all()
     rows = []
     for i, cells in enumerate(zip(*(column.tolist() for column in columns.values()), strict=True)):
         row = {n: v for n, v in zip(columns, cells, strict=True) if v == v and v != ""}
         if kinds_by_numbers(row):  # which go before a shape
             row = {name: row[name] for name in row if name not in OF_A_SHAPE}
-        elif "beta_deg" in columns and {"beta_deg", "base"}.isdisjoint({*row, *given}):
+        elif "beta_deg" in columns and {"beta_deg", "base"}.isdisjoint({*row, *defaults}):
             faults.setdefault(i, f"{column_of('beta_deg')} is empty: enter 0 for a level base")
         if "back_fracture" in row:
             row["back_fracture"] = bool(row["back_fracture"])
-        rows.append({**given, **row, **({"reason": faults[i]} if i in faults else {})})
+        rows.append({**defaults, **row, **({"reason": faults[i]} if i in faults else {})})
     return rows, table.warnings((*read, *texts))

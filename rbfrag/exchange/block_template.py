@@ -1,4 +1,4 @@
-"""An empty table of blocks that people fill in: columns with their units, and an example."""
+"""Template of a table of blocks: columns with their units, and an example."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXAMPLE = {"block_id": "example", "height_m": 2.4, "width_m": 0.5, "beta_deg": 3
 
 
 def write_template(path: str | os.PathLike[str]) -> Path:
-    """Write a table of one example, whole or not at all, and return its path.
+    """Write a table with one example row, completely or not at all, and return its path.
 
     A workbook has a second sheet that lists all columns.
 
@@ -35,14 +35,14 @@ def write_template(path: str | os.PathLike[str]) -> Path:
         columns = {name: np.array([cell]) for name, cell in zip(names, row, strict=True)}
         return write_block_table(columns, target)
     book = openpyxl().Workbook()
-    sheet, others = book.active, book.create_sheet("columns")
-    sheet.title, sheet.freeze_panes, others.freeze_panes = "blocks", "A2", "A2"
+    sheet, column_sheet = book.active, book.create_sheet("columns")
+    sheet.title, sheet.freeze_panes, column_sheet.freeze_panes = "blocks", "A2", "A2"
     sheet.append([*names])
     sheet.append(row)
-    others.append(["column", "description", "other names"])
+    column_sheet.append(["column", "description", "other names"])
     for name in quantities.COLUMNS:
         help = quantities.QUANTITIES[name].help(quantities.word_of)
-        others.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
+        column_sheet.append([header_of(name), help, ", ".join(quantities.INPUTS[name].aliases)])
     with written_whole(target, "table") as partial:
         book.save(partial)
     return target

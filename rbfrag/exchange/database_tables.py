@@ -1,4 +1,4 @@
-"""The tables of a database as files that other programs read, and as pandas frames."""
+"""Tables of a database as files for other programs, and as pandas frames."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ DICTIONARY = "data_dictionary"
 
 @dataclass(frozen=True, repr=False)
 class ExportReport(Result):
-    """The files that :func:`export_database` wrote.
+    """Files written by :func:`export_database`.
 
     Args:
         folder: the folder.
@@ -187,7 +187,9 @@ def _write_csv(
         for column in columns:
             if column.type == "true/false":
                 frame[column.name] = frame[column.name].map(words)
-        texts = {each.name: list(frame[each.name]) for each in columns if each.type == "text"}
+        texts = {
+            column.name: list(frame[column.name]) for column in columns if column.type == "text"
+        }
         if excel_text:
             for name, cells in changed_texts(texts, as_text).items():
                 frame[name] = cells

@@ -1,4 +1,4 @@
-"""Failures and losses of a table of blocks by the exports of an OpenQuake job: `losses`."""
+"""Failures and losses of a table of blocks under the event set of an OpenQuake job: `losses`."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ from rbfrag.vocabulary.quantities import ANSWERING, BLOCKS
 
 
 class _Lasted(TypedDict, total=False):
-    """How long events took, where no file of ruptures states it."""
+    """Keywords of the duration of the event set, where no file of ruptures specifies it."""
 
     investigation_time: float | None
     ses: int | None
 
 
 class LossKeywords(BlockKeywords[V], AnsweringFields, _Lasted, total=False):
-    """What blocks are asked about under an event set, and by which model."""
+    """Keywords of blocks and models for losses under an event set."""
 
 
 def losses(
@@ -70,7 +70,7 @@ def losses(
     on_progress: Callable[[int, int], None] | None = None,
     **question: Unpack[LossKeywords[ArrayLike | None]],
 ) -> LossAnswer:
-    """Return how many blocks fail a year by an event set of the OpenQuake engine, at what loss.
+    """Return expected failures per year and losses under an event set of the OpenQuake engine.
 
     Each event counts weight(realization)/(investigation time × number of event sets) a year. What
     several blocks of one event do together is sampled by the copula that is stored with the model
@@ -116,8 +116,8 @@ def losses(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, answering, lasted = parts_of((), question, BLOCKS, ANSWERING, _Lasted.__optional_keys__)
-    rows = given_blocks(given, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
+    inputs, answering, lasted = parts_of((), question, BLOCKS, ANSWERING, _Lasted.__optional_keys__)
+    rows = given_blocks(inputs, blocks, reads=(*PLACE, *PORTFOLIO), one_kind=False)
     job = JobFiles.of(folder, files)
     meaning = component_named("rotd50" if component is None else component)
     events = read_events(job, imts=imt or _best(job), **lasted)
@@ -154,7 +154,7 @@ def losses(
 
 
 def _best(job: JobFiles) -> tuple[str, ...]:
-    """Return the measure of a job that answers best."""
+    """Return the best predictor among the measures of a job."""
     present = {requested_measure(name)[0]: name for name in measures_in(job)}
     return (next((present[n] for n in (*PREFERRED, "pga_g") if n in present), "PGV"),)
 
@@ -162,7 +162,7 @@ def _best(job: JobFiles) -> tuple[str, ...]:
 def _by_one_measure(
     events: EventSet, job: JobFiles, meaning: Component, answering: AnsweringFields
 ) -> tuple[EventSet, Component, float | None, tuple[str, ...]]:
-    """Return the events by the measure that answers, what it means, tau, and what is to be said."""
+    """Return the events with the measure of the model, its component, tau, and the warnings."""
     name, *more = events.measures
     if more and answering.get("model") is None:
         raise InputError(
@@ -192,9 +192,9 @@ def _by_one_measure(
 
 
 def _at_sites(rows: BlockRows, events: EventSet, within_km: float) -> BlockRows:
-    """Return the table with the sites of its blocks, without those that stand at none."""
+    """Return the table with the sites of its blocks, without blocks that have no site."""
     blocks, names = rows.blocks, np.array(events.site_ids, dtype=object)
-    join = join_sites(blocks, events.site_ids, events.places, within_km=within_km, of="event")
+    join = join_sites(blocks, events.site_ids, events.coordinates, within_km=within_km, of="event")
     ids = rows.columns.get("site_id", np.full(rows.reasons.size, "", dtype=object)).copy()
     at_one = join.site >= 0
     ids[blocks["row"][at_one]] = names[join.site[at_one]]
@@ -207,20 +207,20 @@ def _at_sites(rows: BlockRows, events: EventSet, within_km: float) -> BlockRows:
 def _with_models(
     rows: BlockRows, measures: Sequence[str], answering: AnsweringFields
 ) -> tuple[BlockRows, dict[str, FragilityModel]]:
-    """Return the table without blocks of kinds that have no model, and the models of the others."""
+    """Return the table without blocks of kinds that lack a model, and the models."""
     kinds, without, models = rows.blocks["kind"], {}, {}
-    for own in dict.fromkeys(kinds.tolist()):
+    for kind in dict.fromkeys(kinds.tolist()):
         try:
-            models[own] = model_for(answering, (*facts_of(own).parameters, *measures), own)
+            models[kind] = model_for(answering, (*facts_of(kind).parameters, *measures), kind)
         except (InputError, UnknownModelError) as error:
-            without[own] = error
+            without[kind] = error
     if not models:
         raise without[kinds[0]]
     return rows.without(np.isin(kinds, [*without]), lambda i: str(without[kinds[i]])), models
 
 
 def _without_loss(rows: BlockRows) -> tuple[str, ...]:
-    """Return what is to be said of blocks whose loss is an empty cell."""
+    """Return the warnings about blocks whose loss is an empty cell."""
     empty = int(np.isnan(rows.blocks.get("loss", np.empty(0))).sum())
     if not empty:
         return ()

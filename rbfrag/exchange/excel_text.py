@@ -1,4 +1,4 @@
-"""Text cells of CSV that a spreadsheet takes for formulas.
+"""Text cells of CSV files that a spreadsheet would interpret as formulas.
 
 Excel, and others like it, compute a cell that begins with = + - or @, whatever program wrote the
 file; a leading apostrophe tells them that it is text. Readers here take such an apostrophe off.
@@ -20,22 +20,22 @@ _SUSPECT = r"^'?[=+\-@]"
 
 
 def is_formula(text: str) -> bool:
-    """Return whether a spreadsheet would compute a cell; a number it reads as what it is."""
+    """Return whether a spreadsheet would evaluate a cell; a number is not a formula."""
     return text[:1] in ("=", "+", "-", "@") and not _NUMBER.fullmatch(text)
 
 
 def as_text(text: str) -> str:
-    """Return a cell as spreadsheets take it for text."""
+    """Return a cell in the form that spreadsheets accept as text."""
     return f"'{text}" if is_formula(text) else text
 
 
 def as_written(text: str) -> str:
-    """Return what :func:`as_text` was given."""
+    """Return the original cell: the inverse of :func:`as_text`."""
     return text[1:] if text[:1] == "'" and is_formula(text[1:]) else text
 
 
 def changed_texts(columns: Mapping[str, Any], change: Callable[[str], str]) -> dict[str, Any]:
-    """Return columns with their texts changed; those without a suspect cell stay as they are.
+    """Return columns with their texts converted; columns without a suspect cell are unchanged.
 
     Args:
         columns: by name; lists, arrays of numpy or of Arrow. Numbers are left alone.
@@ -50,7 +50,7 @@ def changed_texts(columns: Mapping[str, Any], change: Callable[[str], str]) -> d
 
 
 def formula_warnings(columns: Mapping[str, Any]) -> list[Diagnostic]:
-    """Return a warning that names the first cell that spreadsheets compute, or nothing."""
+    """Return a warning that names the first cell that spreadsheets evaluate, or an empty list."""
     for name, column in columns.items():
         for cell in _texts(column) if _suspect(column) else ():
             if is_formula(cell):
@@ -63,7 +63,7 @@ def formula_warnings(columns: Mapping[str, Any]) -> list[Diagnostic]:
 
 
 def _suspect(column: Any) -> bool:
-    """Whether a column is of texts, and one of them may be, or may have been, a formula."""
+    """Return whether a column has texts that may be, or may have been, formulas."""
     if isinstance(column, np.ndarray) and column.dtype.kind not in "OU":
         return False
     if isinstance(column, list | np.ndarray):

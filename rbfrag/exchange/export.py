@@ -37,7 +37,7 @@ EACH_NEEDED = "an exposure model needs a function of each"
 
 @dataclass(frozen=True, repr=False)
 class ExportAnswer(Result):
-    """Fragility functions that were written.
+    """Fragility functions written to a file.
 
     Args:
         file: the file.
@@ -81,12 +81,12 @@ class ExportAnswer(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
-        known = {name: value for name, value in vars(self).items() if value is not None}
-        return {**known, "warnings": list(self.warnings)}
+        values = {name: value for name, value in vars(self).items() if value is not None}
+        return {**values, "warnings": list(self.warnings)}
 
 
 class _Functions(TypedDict, total=False):
-    """What functions are of, and how they are given."""
+    """Keywords of fragility functions: blocks, measure and form."""
 
     blocks: Blocks | None
     imt: str
@@ -98,7 +98,7 @@ class _Functions(TypedDict, total=False):
 
 
 class FunctionKeywords(BlockKeywords[V], AnsweringFields, _Functions, total=False):
-    """What functions are of, which blocks they are of, and by which model."""
+    """Keywords of blocks, models and the form of fragility functions."""
 
 
 def nrml(
@@ -152,7 +152,7 @@ def pelicun(
     *numbers: ArrayLike | None,
     **question: Unpack[FunctionKeywords[ArrayLike | None]],
 ) -> ExportAnswer:
-    """Write a fragility table of pelicun and SimCenter, and its description beside it.
+    """Write a fragility table of pelicun and SimCenter, and its JSON description.
 
     PGV is in m/s there. The description has the table's name and ends in .json.
 
@@ -191,7 +191,7 @@ _FAILING = {
 
 
 class _Request(NamedTuple):
-    """Blocks of one kind, and the functions that are asked for.
+    """Blocks of one kind, and the requested fragility functions.
 
     Args:
         facts: their kind.
@@ -217,15 +217,15 @@ class _Request(NamedTuple):
 
     @classmethod
     def of(cls, numbers: Sequence[Any], question: Mapping[str, Any]) -> _Request:
-        given, answering, request = parts_of(
+        inputs, answering, request = parts_of(
             numbers, question, BLOCKS, ANSWERING, _Functions.__optional_keys__
         )
         blocks, one_class = request.get("blocks"), request.get("one_class", False)
-        rows = given_blocks(given, blocks)
-        table = rows.whole(EACH_NEEDED)
+        rows = given_blocks(inputs, blocks)
+        table = rows.require_all(EACH_NEEDED)
         measure, _ = requested_measure(request.get("imt", "PGV"), alone=True)
         kind, read, medians = read_by_models(rows)
-        names = [str(each) for each in table["block_id"]]
+        names = [str(block_id) for block_id in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):
             names = [request.get("name", "block")]
         meaning = component_named(request.get("component", SINGLE_COMPONENT))
@@ -235,7 +235,7 @@ class _Request(NamedTuple):
         return cls(facts_of(kind), read, names, measure, one_class, shares, meaning, how, remarks)
 
     def functions(self, refused: tuple[str, str, str]) -> tuple[BlockFunctions, list[Diagnostic]]:
-        """Return the function of each block, their mean or their shares, and names that changed."""
+        """Return the functions of the blocks, and the renamed identifiers."""
         if self.shares is None:
             of = self.names, self.numbers, self.measure, self.facts.kind
             result = block_functions(*of, one_class=self.one_class, **self.how)
@@ -253,35 +253,47 @@ class _Request(NamedTuple):
 
     @property
     def failing(self) -> str:
-        """How the blocks fail, before what they are."""
+        """Failure of the blocks, as the beginning of a description."""
         if self.facts.free_standing:
             return "Overturning of free-standing"
         return _FAILING.get(self.facts.mode or "", "Failure of")
 
     def descriptions(self) -> list[str]:
         """Return a sentence on each block, or on all of a class."""
-        free, topples = self.facts.free_standing, self.facts.mode == "topple"
+        is_free_standing, topples = self.facts.free_standing, self.facts.mode == "topple"
         if self.one_class or self.shares is not None:
             size = next(iter(self.numbers.values())).size
             backed = "toppling blocks of a rock mass, backed by a slope"
-            mean = "free-standing blocks" if free else backed if topples else "blocks of a slope"
+            mean = (
+                "free-standing blocks"
+                if is_free_standing
+                else backed
+                if topples
+                else "blocks of a slope"
+            )
             of = "Mean over" if self.shares is None else "Shares of"
             return [f"{of} {size} stable {mean}."]
-        stands = "that stands free" if free else "backed by a slope" if topples else "on a slope"
+        stands = (
+            "that stands free"
+            if is_free_standing
+            else "backed by a slope"
+            if topples
+            else "on a slope"
+        )
         rows = zip(*(values.tolist() for values in self.numbers.values()), strict=True)
         return [
-            f"Rock block {stands}, {describe.labelled_values(known, 6)}."
+            f"Rock block {stands}, {describe.labelled_values(parameters, 6)}."
             for row in rows
-            for known in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
+            for parameters in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
         ]
 
     def answer(
         self, file: str, description: str | None, result: BlockFunctions, renames: list[Diagnostic]
     ) -> ExportAnswer:
-        """Return the answer on what was written."""
+        """Return the answer on the functions written."""
         functions = result.functions
-        errors = [each.grid_error for each in functions if each.grid_error is not None]
-        lognormal = sum(each.is_lognormal for each in functions)
+        errors = [function.grid_error for function in functions if function.grid_error is not None]
+        lognormal = sum(function.is_lognormal for function in functions)
         meant = [] if self.component.sigma == 0.0 else [self.component.in_words("shaking is")]
         return ExportAnswer(
             file, description, len(functions), lognormal, max(errors, default=0.0),

@@ -1,4 +1,4 @@
-"""A fragility as other tools write it: lognormal, or probabilities at levels of a measure."""
+"""Fragility functions of other tools: lognormal, or probabilities at levels of a measure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROUNDS, _TRIED = 4, 12
 
 @dataclass(frozen=True, eq=False)
 class FragilityFunction:
-    """One limit state of one asset.
+    """Fragility function of one limit state of one asset.
 
     Levels are in the unit of `kind.measure`: g or m/s.
 
@@ -52,11 +52,11 @@ class FragilityFunction:
 
     @property
     def is_lognormal(self) -> bool:
-        """Whether the function is a lognormal distribution."""
+        """True if the function is a lognormal distribution."""
         return self.median is not None
 
     def at(self, level: ArrayLike) -> FloatArray:
-        """Return probabilities at levels, as the other tool would.
+        """Return probabilities at levels, interpolated as the other tool does.
 
         Discrete functions are interpolated linearly; beyond their ends the probability stays,
         and below `no_damage_limit` it is zero.
@@ -110,9 +110,9 @@ def lognormal_function(
     no_damage_limit: float | None = None,
 ) -> FragilityFunction:
     """Return a checked lognormal function."""
-    for value, what in ((median, "median"), (beta, "standard deviation of the logarithm")):
+    for value, label in ((median, "median"), (beta, "standard deviation of the logarithm")):
         if not (np.isfinite(value) and value > 0.0):
-            raise InputError(f"{where}: the {what} is {value:g}: it must be above zero")
+            raise InputError(f"{where}: the {label} is {value:g}: it must be above zero")
     return FragilityFunction(name, limit_state, kind, median, beta, no_damage_limit=no_damage_limit)
 
 
@@ -136,20 +136,20 @@ def chords(
     low, high = np.full(len(x), 1e-7), np.full(len(x), 1.0 / floor)
     for _ in range(_ROUNDS):
         error = np.geomspace(low, high, _TRIED, axis=1)
-        kept = _longest(x, p, error, floor)
+        starts = _longest(x, p, error, floor)
         # with the last level and the one where P is still 0
-        enough = np.argmax(kept.sum(axis=0) + 2 <= levels, axis=1)
+        enough = np.argmax(starts.sum(axis=0) + 2 <= levels, axis=1)
         low, high = error[every, np.maximum(enough - 1, 0)], error[every, enough]
     for i in every:
-        at = np.append(np.flatnonzero(kept[:, i, enough[i]]), x.shape[1] - 1)
+        at = np.append(np.flatnonzero(starts[:, i, enough[i]]), x.shape[1] - 1)
         shown = np.concatenate([x[i, :1] * (1.0 - JUMP), x[i, at]])
         yield shown, np.pad(p[i][:, at], ((0, 0), (1, 0))), float(high[i])
 
 
 def _longest(x: FloatArray, p: FloatArray, error: FloatArray, floor: float) -> NDArray[np.bool_]:
-    """Return which levels begin a chord, shape (n - 1, m, e), for errors of shape (m, e)."""
-    kept = np.zeros((x.shape[1] - 1, *error.shape), dtype=bool)
-    kept[0] = True
+    """Return the levels at which chords begin, shape (n - 1, m, e), for errors of shape (m, e)."""
+    starts = np.zeros((x.shape[1] - 1, *error.shape), dtype=bool)
+    starts[0] = True
     steepest = np.full(p.shape[:2] + error.shape[1:], np.inf)
     gentlest = -steepest
     x0, p0 = x[:, 0, None], p[:, :, 0, None]
@@ -157,20 +157,20 @@ def _longest(x: FloatArray, p: FloatArray, error: FloatArray, floor: float) -> N
         at, value = x[:, k, None], p[:, :, k, None]
         slope = (value - p0) / (at - x0)[:, None]
         ends = ((slope > steepest) | (slope < gentlest)).any(axis=1)
-        kept[k - 1] |= ends
+        starts[k - 1] |= ends
         x0, off = np.where(ends, x[:, k - 1, None], x0), np.expand_dims(ends, 1)
         p0 = np.where(off, p[:, :, k - 1, None], p0)
         run = (at - x0)[:, None]
         slope, play = (value - p0) / run, error[:, None] * np.maximum(value, floor) / run
         steepest = np.minimum(np.where(off, np.inf, steepest), slope + play)
         gentlest = np.maximum(np.where(off, -np.inf, gentlest), slope - play)
-    return kept
+    return starts
 
 
 def renamed(
     functions: Sequence[FragilityFunction], refused: str, by: str, why: str
 ) -> tuple[list[FragilityFunction], list[Diagnostic]]:
-    """Return the functions with other characters in their names, and a warning where it is so.
+    """Return the functions with invalid characters of their names replaced, and a warning.
 
     Args:
         refused: characters that a name cannot have.
@@ -178,8 +178,8 @@ def renamed(
         why: what is wrong with them.
     """
     to = str.maketrans(dict.fromkeys(refused, by))
-    named = [replace(each, name=each.name.strip().translate(to)) for each in functions]
-    before = list(dict.fromkeys(each.name for each in functions))
+    named = [replace(function, name=function.name.strip().translate(to)) for function in functions]
+    before = list(dict.fromkeys(function.name for function in functions))
     changed = [name for name in before if name.strip() != name.strip().translate(to)]
     if not changed:
         return named, []
@@ -191,17 +191,22 @@ def renamed(
 
 
 def assets_of(functions: Sequence[FragilityFunction]) -> dict[str, list[FragilityFunction]]:
-    """Return the functions of each asset, which stand one after the other; refuse what is amiss."""
+    """Return the functions grouped by asset; reject duplicate or inconsistent limit states."""
     if not functions:
         raise InputError("no fragility function to write")
     assets: dict[str, list[FragilityFunction]] = {}
-    for name, group in groupby(functions, key=lambda each: each.name):
+    for name, group in groupby(functions, key=lambda function: function.name):
         limit_states = list(group)
-        if name in assets or len({each.limit_state for each in limit_states}) < len(limit_states):
+        if name in assets or len({function.limit_state for function in limit_states}) < len(
+            limit_states
+        ):
             raise InputError(f"block {name!r} occurs twice: give every block its own block_id")
         assets[name] = limit_states
-    first, states = functions[0].name, [each.limit_state for each in assets[functions[0].name]]
+    first, states = (
+        functions[0].name,
+        [function.limit_state for function in assets[functions[0].name]],
+    )
     for name, limit_states in assets.items():
-        if [each.limit_state for each in limit_states] != states:
+        if [function.limit_state for function in limit_states] != states:
             raise InputError(f"block {name!r} has other limit states than {first!r}")
     return assets

@@ -1,4 +1,4 @@
-"""The blocks of an answer, by their fields or as a table, and what a model reads of them."""
+"""Blocks of a question, given by fields or as a table, and the inputs that models use."""
 
 from __future__ import annotations
 
@@ -25,45 +25,45 @@ from rbfrag.vocabulary.quantities import BLOCK, column_of
 
 
 def given_blocks(
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     blocks: Blocks | None,
     *,
     reads: Sequence[str] = (),
     one_kind: bool = True,
 ) -> BlockRows:
-    """Return the blocks of a question.
+    """Return the blocks of a question, given by fields or as a table.
 
     Raises:
         InputError: blocks given in no way or in two, or none that waits for an earthquake.
     """
-    known = dict(given)
-    kind = known.pop("kind", None)
+    fields = dict(inputs)
+    kind = fields.pop("kind", None)
     if blocks is not None:
-        if known:
-            raise InputError(f"blocks describes the blocks: omit {' and '.join(known)}")
+        if fields:
+            raise InputError(f"blocks describes the blocks: omit {' and '.join(fields)}")
         return read_blocks(blocks, kind, reads=reads, one_kind=one_kind)
-    if not has_shape(known) and not kinds_by_numbers(known):
-        missing = next((name for name in TOPPLING_BLOCK.names if name not in known), "p2")
+    if not has_shape(fields) and not kinds_by_numbers(fields):
+        missing = next((name for name in TOPPLING_BLOCK.names if name not in fields), "p2")
         raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
-    if {"block", "back_fracture"} & {*known}:
-        described = one_block(known, kind)
+    if {"block", "back_fracture"} & {*fields}:
+        described = one_block(fields, kind)
         (group,) = described.groups
         rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
         return replace(rows, remarks=described.remarks)
-    reasons = block_reasons_of(*blocks_of_arrays(given))
+    reasons = block_reasons_of(*blocks_of_arrays(inputs))
     refuse_elements(reasons, fields=BLOCK)
     try:
-        arrays = np.broadcast_arrays(*map(np.atleast_1d, known.values()))
+        arrays = np.broadcast_arrays(*map(np.atleast_1d, fields.values()))
     except ValueError:
-        raise InputError(f"{', '.join(known)} differ in length") from None
-    columns = {column_of(name): each for name, each in zip(known, arrays, strict=True)}
+        raise InputError(f"{', '.join(fields)} differ in length") from None
+    columns = {column_of(name): array for name, array in zip(fields, arrays, strict=True)}
     return read_blocks(columns, kind, reads=reads, one_kind=one_kind)
 
 
 def read_by_models(rows: BlockRows) -> tuple[str, dict[str, Any], tuple[str, ...]]:
-    """Return the kind of blocks of one kind, the numbers that its models read, and what is said."""
+    """Return the kind of blocks of one kind, the inputs of its models, and the warnings."""
     kind = str(rows.blocks["kind"][0])
-    stated, remarks = taken_as_medians(numbers_in(rows.blocks))
-    known = {name: values for name, values in stated.items() if not np.isnan(values).all()}
-    block = block_of(known, kind)
-    return kind, {n: known[n] for n in known if n in (*block.names, *block.options)}, remarks
+    numbers, remarks = taken_as_medians(numbers_in(rows.blocks))
+    fields = {name: values for name, values in numbers.items() if not np.isnan(values).all()}
+    block = block_of(fields, kind)
+    return kind, {n: fields[n] for n in fields if n in (*block.names, *block.options)}, remarks

@@ -1,4 +1,4 @@
-"""Where blocks topple in one earthquake: `shakemap`."""
+"""Failure probabilities of blocks across a ShakeMap: `shakemap`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, Blocks
 from rbfrag.exchange.given_blocks import given_blocks, read_by_models
-from rbfrag.exchange.shakemap import at_places, known_places, read_shakemap
+from rbfrag.exchange.shakemap import at_places, has_all_fields, read_shakemap
 from rbfrag.fragility import describe
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
-from rbfrag.hazards.maps.map_failures import MapFailures, Places, map_failures
+from rbfrag.hazards.maps.map_failures import MapFailures, SiteLocations, map_failures
 from rbfrag.hazards.maps.site_probability import site_probability
 from rbfrag.question.blocks import numbers_in
 from rbfrag.question.components import component_named
@@ -74,7 +74,7 @@ class ShakeMapAnswer(Result):
         return int(np.nanargmax(self.columns["probability"]))
 
     def _extremes(self) -> dict[str, Any]:
-        """Return the largest probability, its place, and the number of places above 1 %."""
+        """Return the largest probability, its location, and the number of locations above 1 %."""
         probability, lon, lat = (self.columns[name] for name in ("probability", "lon", "lat"))
         best = self._largest()
         return {
@@ -87,20 +87,20 @@ class ShakeMapAnswer(Result):
 
     @property
     def has_block_places(self) -> bool:
-        """Whether blocks have places of their own, and do not stand at every node."""
+        """True if blocks have coordinates; otherwise they are assumed at every node."""
         return "block_id" in self.columns
 
     def sentences(self) -> Iterator[str]:
-        """Yield the largest probability and its place, and the number of failures."""
+        """Yield the largest probability and its location, and the number of failures."""
         extremes, row = self._extremes(), self._largest()
-        largest, places = extremes["largest_probability"], extremes["places"]
+        largest, count = extremes["largest_probability"], extremes["places"]
         where = place(extremes["largest_at_lon"], extremes["largest_at_lat"])
         ends = interval(self.columns["ci_low"][row], self.columns["ci_high"][row])
         with_level = confidence(self.about["level"], ends)
         yield f"Maximum P(failure) = {percent(largest)} at {where}   ({with_level})"
         yield (
             f"P exceeds 1 % at {extremes['places_above_1_percent']:,} of "
-            f"{count_of(places, 'block' if self.has_block_places else 'node')}"
+            f"{count_of(count, 'block' if self.has_block_places else 'node')}"
         )
         if self.has_block_places:
             p_any = self.about["probability_any"]
@@ -127,7 +127,7 @@ class ShakeMapAnswer(Result):
 
 
 class MapKeywords(BlockKeywords[V], AnsweringFields, total=False):
-    """What blocks are asked about across a map, and by which model."""
+    """Keywords of blocks and models for a map."""
 
 
 def shakemap(
@@ -170,16 +170,16 @@ def shakemap(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
-    rows = given_blocks(given, blocks, reads=(*PLACE, "weight", "count"))
+    inputs, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
+    rows = given_blocks(inputs, blocks, reads=(*PLACE, "weight", "count"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
-    own = "lon" in rows.blocks
-    if own:
+    has_coordinates = "lon" in rows.blocks
+    if has_coordinates:
         measures, std_ln, on_map = at_places(shaken, rows.blocks["lon"], rows.blocks["lat"])
-        known = on_map & known_places(measures, std_ln)
+        is_complete = on_map & has_all_fields(measures, std_ln)
         rows = rows.without(
-            ~known,
+            ~is_complete,
             lambda i: (
                 "the map has no number around the block"
                 if on_map[i]
@@ -188,25 +188,29 @@ def shakemap(
         )
         lon, lat = rows.blocks["lon"], rows.blocks["lat"]
     else:
-        measures, std_ln, known = shaken.measures, shaken.std_ln, shaken.known
-        if not known.any():
+        measures, std_ln, is_complete = shaken.measures, shaken.std_ln, shaken.is_complete
+        if not is_complete.any():
             raise InputError(f"{grid}: no node has values in all required fields")
-        lon, lat = shaken.lon[known], shaken.lat[known]
+        lon, lat = shaken.lon[is_complete], shaken.lat[is_complete]
     measures, std_ln = (
-        {name: values[known] for name, values in each.items()} for each in (measures, std_ln)
+        {name: values[is_complete] for name, values in fields.items()}
+        for fields in (measures, std_ln)
     )
     table = rows.blocks
-    warnings = [*rows.unusable_in_words(FROM_SUMS if own else FROM_MEAN), *shaken.warnings]
+    warnings = [
+        *rows.unusable_in_words(FROM_SUMS if has_coordinates else FROM_MEAN),
+        *shaken.warnings,
+    ]
     warnings += doubts_about(measures)
     warnings.append(meaning.in_words("the map's measures are"))
     kind, read, medians = read_by_models(rows)
     warnings = [*medians, *warnings]
     weight, count = table.get("weight"), table.get("count")
-    if count is not None and not own:  # a mean over all blocks
+    if count is not None and not has_coordinates:  # a mean over all blocks
         weight = count if weight is None else weight * count
     answer = site_probability(
-        measures, component=meaning, weight=None if own else weight, own_block=own, std_ln=std_ln,
-        kind=kind, **read, **answering,
+        measures, component=meaning, weight=None if has_coordinates else weight, own_block=has_coordinates,
+        std_ln=std_ln, kind=kind, **read, **answering,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     warnings += chosen.notes
@@ -221,14 +225,19 @@ def shakemap(
             "assumed to be certain; uncertainty.xml has it"
         )
         warnings.append(Diagnostic(text, "shaking_certain"))
-    places = Places.of(lon, lat, table.get("site_id") if own else None)
-    if count is not None and own:  # identical blocks of a row have azimuths of their own
+    locations = SiteLocations.of(lon, lat, table.get("site_id") if has_coordinates else None)
+    if (
+        count is not None and has_coordinates
+    ):  # identical blocks of a row have azimuths of their own
         pairs = np.repeat(np.arange(answer.block.size), count[answer.block].astype(np.intp))
         answer = replace(
-            answer, site=answer.site[pairs], block=answer.block[pairs], each=answer.each[pairs]
+            answer,
+            site=answer.site[pairs],
+            block=answer.block[pairs],
+            pair_probability=answer.pair_probability[pairs],
         )
     failures = map_failures(
-        answer, read, places, weight=weight, draws=draws, seed=seed, on_progress=on_progress
+        answer, read, locations, weight=weight, draws=draws, seed=seed, on_progress=on_progress
     )
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
@@ -239,7 +248,7 @@ def shakemap(
         )
         warnings.append(Diagnostic(text, "extrapolation"))
 
-    columns: dict[str, NDArray[Any]] = {"block_id": table["block_id"]} if own else {}
+    columns: dict[str, NDArray[Any]] = {"block_id": table["block_id"]} if has_coordinates else {}
     columns |= {
         "lon": lon,
         "lat": lat,
@@ -254,7 +263,7 @@ def shakemap(
         **dict.fromkeys(("event_low", "event_high"), np.full(lon.shape, np.nan)),
         "in_domain": answer.in_domain,
     }
-    if own:
+    if has_coordinates:
         if count is not None:
             columns["count"] = count
         columns["warnings"] = codes_by_row(rows.remarks, rows.reasons.size)[table["row"]]
@@ -283,18 +292,19 @@ def shakemap(
             "seed": seed,
         },
         warnings=tuple(warnings),
-        title=f"{name}\n{_what(table, own)}; model {describe.stored_model(chosen.row)}"
+        title=f"{name}\n{_describe_blocks(table, has_coordinates)}; model "
+        f"{describe.stored_model(chosen.row)}"
         + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
         shape=(shaken.rows, shaken.columns)
-        if shaken.is_whole and known.all() and not own
+        if shaken.is_whole and is_complete.all() and not has_coordinates
         else None,
     )
 
 
-def _what(blocks: Mapping[str, Any], own: bool) -> str:
+def _describe_blocks(blocks: Mapping[str, Any], has_coordinates: bool) -> str:
     size = blocks["kind"].size
-    if own:
+    if has_coordinates:
         return f"{size} blocks at their places"
     if size == 1:
         numbers = {name: values[0] for name, values in numbers_in(blocks).items()}

@@ -1,4 +1,4 @@
-"""Closed surfaces of blocks as photogrammetry and laser scanning give them: OBJ, PLY, STL."""
+"""Closed surface meshes of blocks from photogrammetry and laser scanning: OBJ, PLY, STL."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def block_from_mesh(
 
 
 def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[str]]:
-    """Return a closed surface about its own middle, that middle [m], and what was mended."""
+    """Return a closed surface relative to its centre, that centre [m], and the repairs."""
     mesh = _triangles(source)
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     if not np.all(np.abs(vertices) < _BEYOND_ARITHMETIC_M):
@@ -111,7 +111,7 @@ def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[st
 
 
 def _triangles(source: Path) -> Trimesh:
-    """Return the triangles of a file as they are written there."""
+    """Return the triangles of a file, as stored."""
     if source.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"{source}: unsupported mesh: use {', '.join(SUFFIXES)}, not {source.suffix!r}"
@@ -160,7 +160,7 @@ def _coarse_numbers(vertices: NDArray[np.float64]) -> list[str]:
 
 
 def _without_double_faces(mesh: Trimesh, notes: list[str]) -> None:
-    """Drop triangles that are a line or a point, and those that are there twice."""
+    """Remove degenerate and duplicate triangles."""
     faces = np.sort(np.asarray(mesh.faces), axis=1)
     mesh.update_faces((faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]))
     before = len(mesh.faces)
@@ -210,7 +210,7 @@ def _turn_outwards(source: Path, mesh: Trimesh, notes: list[str]) -> None:
 
 
 def _turned_over(mesh: Trimesh) -> NDArray[np.bool_]:
-    """Return the faces to turn over for all to agree with the first one, shape (n,).
+    """Return the faces to reverse so that all are consistent with the first one, shape (n,).
 
     Two neighbours agree if they run along their edge in opposite senses. trimesh's own
     fix_winding walks from face to face in Python, 19 s for 80,000 of them.

@@ -40,12 +40,12 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
     assets = [] if model is None else list(model.of("fragilityFunction", "ffs"))
     if model is None or not assets:
         raise InputError(f"{source}: there is no fragility function in the file")
-    stated = next(model.of("limitStates"), None)
-    if stated is None:
+    limit_states = next(model.of("limitStates"), None)
+    if limit_states is None:
         raise InputError(f"{source}: limitStates is missing")
-    states = stated.text.split()
+    states = limit_states.text.split()
     if not states:
-        raise InputError(f"{source}, line {stated.line}: there is no limit state")
+        raise InputError(f"{source}, line {limit_states.line}: there is no limit state")
     functions = []
     for asset in assets:
         name, form = _name_and_format(asset, model, source)
@@ -80,7 +80,7 @@ def _name_and_format(asset: Node, model: Node, source: str) -> tuple[str, str]:
 
 
 def _curves(asset: Node, source: str) -> dict[str, Node]:
-    """The element with the numbers of each limit state."""
+    """Return the XML element with the numbers of each limit state."""
     curves: dict[str, Node] = {}
     for part in asset.children:
         if part.name not in ("ffc", "ffd", "params", "poes"):
@@ -137,7 +137,7 @@ _FAR = 8.0
 
 
 def nrml_text(functions: Sequence[FragilityFunction], *, description: str = "") -> str:
-    """Return the document. PGV is in cm/s, PGA and SA in g, as OpenQuake wants them.
+    """Return the document; PGV is in cm/s, PGA and SA in g, as OpenQuake requires.
 
     A lognormal function is written as ``continuous`` with mean and standard deviation of the
     variable itself; any other as ``discrete`` on its levels.

@@ -1,4 +1,4 @@
-"""Fragilities of other tools, to be drawn beside ours."""
+"""Fragility functions of other tools, for comparison in figures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST = 12
 def of_measure(
     path: str | os.PathLike[str], measure: str
 ) -> dict[str, Callable[[FloatArray], FloatArray]]:
-    """Return the fragilities of one measure by asset and limit state.
+    """Return the fragility functions of one measure by asset and limit state.
 
     Args:
         path: NRML (.xml) or a pelicun table (.csv).

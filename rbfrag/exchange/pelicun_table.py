@@ -70,7 +70,7 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
             if function.is_lognormal:
                 row += ["lognormal", _text(function.median), _text(function.beta), ""]
             else:
-                levels, probability = _whole(function)
+                levels, probability = _extend_to_limits(function)
                 row += ["multilinear_CDF", f"{_list(levels)}|{_list(probability)}", "", ""]
         table.writerow(row)
     return out.getvalue()
@@ -82,7 +82,7 @@ def metadata_text(
     about: tuple[str, ...],
     shaking: str,
 ) -> str:
-    """Return what goes beside the table as ``fragility.json``, as simcenter-dlml 3 has it."""
+    """Return the metadata of the table, ``fragility.json``, by simcenter-dlml 3."""
     model, term, method = about
     document: dict[str, object] = {
         "_GeneralInformation": {
@@ -154,7 +154,7 @@ def read_pelicun(path: str | os.PathLike[str]) -> list[FragilityFunction]:
 
 
 def _kind(demand: str, unit: str, where: str) -> IntensityType | None:
-    """Return what a demand measures; None for what is no measure of the ground."""
+    """Return the intensity measure of a demand; None if it is not a ground-motion measure."""
     name, _, period = (
         demand.removeprefix("Peak ").partition("|") if "Spectral" in demand else (demand, "", "")
     )
@@ -198,8 +198,8 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-def _whole(function: FragilityFunction) -> tuple[list[float], list[float]]:
-    """Return levels and probabilities from 0 to 1, strictly rising as pelicun wants them."""
+def _extend_to_limits(function: FragilityFunction) -> tuple[list[float], list[float]]:
+    """Return levels and probabilities from 0 to 1, strictly increasing as pelicun requires."""
     assert function.levels is not None
     assert function.probability is not None
     x: NDArray[np.float64] = function.levels

@@ -36,15 +36,15 @@ def read_points(path: str | os.PathLike[str]) -> TablePart:
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list) or document.get("type") != "FeatureCollection":
         raise InputError(f"{path}: not a GeoJSON FeatureCollection")
-    lon, lat = places = np.full((2, len(features)), np.nan)
+    lon, lat = coordinates = np.full((2, len(features)), np.nan)
     rows: list[Mapping[str, Any]] = []
     for i, feature in enumerate(features):
-        known = _object(feature)
-        geometry = _object(known.get("geometry"))
+        members = _object(feature)
+        geometry = _object(members.get("geometry"))
         place = geometry.get("coordinates") if geometry.get("type") == "Point" else None
         if isinstance(place, list) and len(place) >= 2 and all(map(is_number, place[:2])):
-            places[:, i] = place[:2]
-        rows.append(_object(known.get("properties")))
+            coordinates[:, i] = place[:2]
+        rows.append(_object(members.get("properties")))
     names = dict.fromkeys(name for row in rows for name in row)
     cells: dict[str, Any] = {name: [row.get(name) for row in rows] for name in names}
     return TablePart(range(1, len(rows) + 1), {**cells, "lon": lon, "lat": lat})
@@ -75,9 +75,9 @@ def write_points(
     ):
         file.write(head + ', "features": [\n')
         for start in range(0, size, _ROWS):
-            some = slice(start, start + _ROWS)
-            lists = [_finite_or_null(columns[name][some]) for name in names]
-            places = _places(columns, some)
+            rows = slice(start, start + _ROWS)
+            lists = [_finite_or_null(columns[name][rows]) for name in names]
+            coordinates = _lon_lat(columns, rows)
             lines = [
                 json.dumps(
                     {
@@ -88,7 +88,7 @@ def write_points(
                     ensure_ascii=False,
                     allow_nan=False,
                 )
-                for place, row in zip(places, zip(*lists, strict=True), strict=True)
+                for place, row in zip(coordinates, zip(*lists, strict=True), strict=True)
             ]
             file.write((",\n" if start else "") + ",\n".join(lines))
         file.write("\n]}\n")
@@ -101,15 +101,15 @@ def _finite_or_null(column: NDArray[Any]) -> list[Any]:
     return values
 
 
-def _places(columns: Mapping[str, NDArray[Any]], some: slice) -> list[list[float] | None]:
-    """Return longitude and latitude of some rows; None for what has no place on the map."""
-    pairs = np.column_stack([columns["lon"][some], columns["lat"][some]])
+def _lon_lat(columns: Mapping[str, NDArray[Any]], rows: slice) -> list[list[float] | None]:
+    """Return longitude and latitude of rows; None where they are outside the map."""
+    pairs = np.column_stack([columns["lon"][rows], columns["lat"][rows]])
     on_map = (np.abs(pairs) <= (180.0, 90.0)).all(axis=1)
-    return [p if known else None for p, known in zip(pairs.tolist(), on_map, strict=True)]
+    return [p if valid else None for p, valid in zip(pairs.tolist(), on_map, strict=True)]
 
 
 def pyogrio() -> Any:
-    """Return pyogrio's array interface, or say which extra brings it."""
+    """Return pyogrio's array interface, or name the extra that installs it."""
     try:
         from pyogrio import raw
     except ImportError:
@@ -134,7 +134,7 @@ def write_geopackage(
     points = np.array(
         [
             None if place is None else struct.pack("<BIdd", 1, 1, *place)
-            for place in _places(columns, slice(None))
+            for place in _lon_lat(columns, slice(None))
         ],
         dtype=object,
     )
@@ -153,7 +153,7 @@ def write_geopackage(
             if notes:
                 documents = as_documents(notes)
                 texts = [
-                    np.array([each[name] for each in documents], dtype=object)
+                    np.array([document[name] for document in documents], dtype=object)
                     for name in ("code", "text")
                 ]
                 raw.write(

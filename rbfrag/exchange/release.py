@@ -1,4 +1,4 @@
-"""Annual rates of release as a table for tools that follow falling rocks to where they stop.
+"""Annual rates of release as a table for rockfall propagation tools.
 
 A row is a block at its place, with its size and how often per year it comes loose. Such tools read
 places, masses or sizes, and none a rate: what they answer is joined to it by ``release_id``.
@@ -35,7 +35,7 @@ LON_LAT = "EPSG:4326"
 
 
 def write_release_rates(answer: HazardAnswer, blocks: Blocks, path: str | os.PathLike[str]) -> Path:
-    """Write annual rates of blocks as a table of release for tools of rockfall propagation.
+    """Write annual rates of blocks as a release table for rockfall propagation tools.
 
     The columns are ``release_id, x, y, z, crs, volume_m3, mass_kg, density_kg_m3, annual_rate,
     rate_low, rate_high, kind, d1_m, d2_m, d3_m``: the dimensions are those normal to the base,
@@ -58,7 +58,7 @@ def write_release_rates(answer: HazardAnswer, blocks: Blocks, path: str | os.Pat
 
 
 def release_columns(answer: HazardAnswer, columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return the columns of that table.
+    """Return the columns of the release table.
 
     Args:
         columns: what there is of :data:`RELEASE`, ``block_id`` and ``crs``, each of the blocks of
@@ -80,7 +80,7 @@ def release_columns(answer: HazardAnswer, columns: Mapping[str, Any]) -> dict[st
     names = [str(name or i + 1) for i, name in enumerate(columns["block_id"])]
     if len({*names}) < size:  # a row is one place of a block
         names = [f"{name}-{i + 1}" for i, name in enumerate(names)]
-    x, y, crs = _places(columns, of)
+    x, y, crs = _coordinates(columns, of)
     height, base = _sides(columns, size)
     length, density = of("strike_length_m"), of("density_kg_m3")
     for name, values in (("strike_length_m", length), ("density_kg_m3", density)):
@@ -93,36 +93,36 @@ def release_columns(answer: HazardAnswer, columns: Mapping[str, Any]) -> dict[st
         "annual_rate": answer.annual_rate, "rate_low": answer.ci_low, "rate_high": answer.ci_high,
         "kind": answer.kinds, "d1_m": height, "d2_m": base, "d3_m": length,
     }  # fmt: skip
-    known = ~np.isnan(answer.annual_rate)
-    return {name: values[known] for name, values in table.items()}
+    has_rate = ~np.isnan(answer.annual_rate)
+    return {name: values[has_rate] for name, values in table.items()}
 
 
-def _places(columns: Mapping[str, Any], of: Any) -> tuple[FloatArray, FloatArray, Any]:
-    """Return x and y of blocks, or else their lon and lat, and the system these are in."""
+def _coordinates(columns: Mapping[str, Any], of: Any) -> tuple[FloatArray, FloatArray, Any]:
+    """Return x and y of blocks, or else their lon and lat, and the coordinate reference system."""
     x, y, lon, lat = (of(name) for name in ("x", "y", *PLACE))
     crs = np.asarray(columns.get("crs", [""] * x.size), dtype=object)
-    own = ~np.isnan(x) & ~np.isnan(y)
-    if (own & (crs == "")).any():
+    is_projected = ~np.isnan(x) & ~np.isnan(y)
+    if (is_projected & (crs == "")).any():
         raise InputError("x and y require crs, such as EPSG:2056")
-    on_map = ~own & ~np.isnan(lon) & ~np.isnan(lat)
+    on_map = ~is_projected & ~np.isnan(lon) & ~np.isnan(lat)
     return (
-        np.where(own, x, np.where(on_map, lon, np.nan)),
-        np.where(own, y, np.where(on_map, lat, np.nan)),
-        np.where(own, crs, np.where(on_map, LON_LAT, "")),
+        np.where(is_projected, x, np.where(on_map, lon, np.nan)),
+        np.where(is_projected, y, np.where(on_map, lat, np.nan)),
+        np.where(is_projected, crs, np.where(on_map, LON_LAT, "")),
     )
 
 
 def _sides(columns: Mapping[str, Any], size: int) -> tuple[FloatArray, FloatArray]:
-    """Return the thickness of blocks normal to the base and its length [m], NaN if not stated."""
-    given = {name: np.asarray(columns[name]) for name in SIDES if name in columns}
-    if given.keys() & {*SPACE}:
-        given, _, _ = in_sections(given, size)
+    """Return block thickness normal to the base, and base length [m]; NaN where unknown."""
+    sides = {name: np.asarray(columns[name]) for name in SIDES if name in columns}
+    if sides.keys() & {*SPACE}:
+        sides, _, _ = in_sections(sides, size)
     height, base = np.full((2, size), np.nan)
     for names, way in SHAPES.items():
-        if not given.keys() >= {*names}:
+        if not sides.keys() >= {*names}:
             continue
-        block = getattr(BlockArray, way)(*(given[name] for name in names))
+        block = getattr(BlockArray, way)(*(sides[name] for name in names))
         height = np.where(np.isnan(height), 2.0 * block.half_s1_m, height)
-        own = block.half_s1_m * (block.tan_alpha3 - block.tan_alpha1)
-        base = np.where(np.isnan(base), own, base)
+        base_length = block.half_s1_m * (block.tan_alpha3 - block.tan_alpha1)
+        base = np.where(np.isnan(base), base_length, base)
     return height, base

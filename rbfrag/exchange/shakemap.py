@@ -48,7 +48,7 @@ _MOST_STD = 5.0
 
 @dataclass(frozen=True)
 class ShakeMapEvent:
-    """The earthquake of a ShakeMap, degrees of its epicentre; None where the file does not say."""
+    """The earthquake of a ShakeMap, epicentre in degrees; None where the file has no value."""
 
     event_id: str
     magnitude: float | None
@@ -62,7 +62,7 @@ class ShakeMapEvent:
 
 @dataclass
 class GridReading:
-    """A ShakeMap grid while its XML is read.
+    """State of reading a ShakeMap grid from XML.
 
     Args:
         source: path of the file.
@@ -74,7 +74,7 @@ class GridReading:
     root: Mapping[str, str] = field(default_factory=dict)
     event: Mapping[str, str] = field(default_factory=dict)
     size: Mapping[str, str] = field(default_factory=dict)
-    places: dict[str, tuple[int, str, int]] = field(default_factory=dict)
+    grid_fields: dict[str, tuple[int, str, int]] = field(default_factory=dict)
     blocks: list[FloatArray] = field(default_factory=list)
     rest: str = ""
     in_data: bool = False
@@ -83,7 +83,7 @@ class GridReading:
     values: int = 0
 
     def start(self, name: str, attributes: Mapping[str, str], line: int) -> None:
-        """Take a start tag."""
+        """Process a start tag."""
         if name == "shakemap_grid":
             self.is_grid, self.root = True, attributes
         elif name == "event":
@@ -95,31 +95,31 @@ class GridReading:
             index, title = attributes.get("index", ""), attributes.get("name", "").strip()
             if not index.isdigit() or int(index) < 1:
                 raise InputError(f"{where}: grid_field index {index!r} is not a number from 1 on")
-            if title in self.places:
+            if title in self.grid_fields:
                 raise InputError(f"{where}: field {title} occurs twice")
-            self.places[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
+            self.grid_fields[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
         elif name == "grid_data":
             self.in_data, self.data_line = True, line
-            for wanted in (("LON",), ("LAT",), self.needed):
-                if not set(wanted) & set(self.places):
-                    have = ", ".join(self.places) or "none"
+            for titles in (("LON",), ("LAT",), self.needed):
+                if not set(titles) & set(self.grid_fields):
+                    have = ", ".join(self.grid_fields) or "none"
                     raise InputError(
-                        f"{self.source}, line {line}: there is no field {' or '.join(wanted)}; the "
+                        f"{self.source}, line {line}: there is no field {' or '.join(titles)}; the "
                         f"fields are {have}"
                     )
 
     def text(self, part: str) -> None:
-        """Take a part of the text."""
+        """Process a piece of text."""
         if not self.in_data:
             return
         # a number may be cut where the parser's buffer ends
-        whole = self.rest + part
-        cut = max(whole.rfind(" "), whole.rfind("\n"), whole.rfind("\t"), whole.rfind("\r"))
-        self.rest = whole[cut + 1 :]
-        self._take(whole[: cut + 1])
+        buffer = self.rest + part
+        cut = max(buffer.rfind(" "), buffer.rfind("\n"), buffer.rfind("\t"), buffer.rfind("\r"))
+        self.rest = buffer[cut + 1 :]
+        self._take(buffer[: cut + 1])
 
     def end(self, name: str, _line: int) -> None:
-        """Take an end tag."""
+        """Process an end tag."""
         if name == "grid_data":
             self._take(self.rest)
             self.rest, self.in_data = "", False
@@ -133,7 +133,7 @@ class GridReading:
         except ValueError:
             raise InputError(self._bad_word(words)) from None
         self.values += block.size
-        if self.values > MOST_NODES * max(len(self.places), 1):
+        if self.values > MOST_NODES * max(len(self.grid_fields), 1):
             raise InputError(f"{self.source}: the grid has more than {MOST_NODES} nodes")
         self.blocks.append(block)
 
@@ -142,7 +142,7 @@ class GridReading:
             try:
                 float(word)
             except ValueError:
-                row = (self.values + i) // max(len(self.places), 1) + 1
+                row = (self.values + i) // max(len(self.grid_fields), 1) + 1
                 return f"{self.source}, node {row} of grid_data: {word[:40]!r} is not a number"
         raise AssertionError("every word is a number")
 
@@ -156,8 +156,8 @@ class GridReading:
         if not self.blocks:
             raise InputError(f"{self.source}: there is no grid_data")
         warnings: list[str] = []
-        width = len(self.places)
-        highest = max(place for place, _, _ in self.places.values()) + 1
+        width = len(self.grid_fields)
+        highest = max(place for place, _, _ in self.grid_fields.values()) + 1
         if highest != width:
             raise InputError(
                 f"{self.source}: the fields have indices up to {highest} but there are {width}"
@@ -184,7 +184,7 @@ class GridReading:
             "lat": self._degrees(table, "LAT", 90.0),
         }
         for title in _FIELDS:
-            if title in self.places:
+            if title in self.grid_fields:
                 fields[_FIELDS[title][0]] = self._field(table, title, warnings)
         unknown = int(np.isnan(np.sum([*fields.values()], axis=0)).sum())
         if unknown:
@@ -202,7 +202,7 @@ class GridReading:
         return int(text)
 
     def _degrees(self, table: FloatArray, title: str, limit: float) -> FloatArray:
-        values = table[:, self.places[title][0]].copy()
+        values = table[:, self.grid_fields[title][0]].copy()
         off = ~(np.abs(values) <= limit)
         if off.any():
             node = int(np.flatnonzero(off)[0])
@@ -213,7 +213,7 @@ class GridReading:
         return values
 
     def _field(self, table: FloatArray, title: str, warnings: list[str]) -> FloatArray:
-        place, unit, line = self.places[title]
+        place, unit, line = self.grid_fields[title]
         name, units = _FIELDS[title]
         if not unit:
             usual = next(iter(units))
@@ -286,13 +286,13 @@ class ShakeMapGrid:
 
     @property
     def is_whole(self) -> bool:
-        """Whether there are as many nodes as declared."""
+        """True if the number of nodes is the declared one."""
         return self.lon.size == self.columns * self.rows
 
     @property
-    def known(self) -> NDArray[np.bool_]:
-        """Which nodes have a number in every field that was read, shape (n,)."""
-        return known_places(self.measures, self.std_ln)
+    def is_complete(self) -> NDArray[np.bool_]:
+        """Mask of the nodes with a number in every field that is read, shape (n,)."""
+        return has_all_fields(self.measures, self.std_ln)
 
 
 def read_shakemap(
@@ -365,18 +365,18 @@ def _with_uncertainty(
     )
 
 
-def known_places(*fields: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
-    """Return which places have a number of every field, shape (n,)."""
-    known: NDArray[np.bool_] = np.isfinite(
-        np.sum([values for each in fields for values in each.values()], axis=0)
+def has_all_fields(*fields: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Return the mask of the locations with a number in every field, shape (n,)."""
+    is_complete: NDArray[np.bool_] = np.isfinite(
+        np.sum([values for group in fields for values in group.values()], axis=0)
     )
-    return known
+    return is_complete
 
 
 def at_places(
     grid: ShakeMapGrid, lon: FloatArray, lat: FloatArray
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray], NDArray[np.bool_]]:
-    """Return measures and deviations of a grid at places, and which places lie on the map.
+    """Return measures and deviations of a grid at locations, and the mask of locations on the map.
 
     Bilinear between the four nodes around a place, in the logarithm of the measures; off the map
     NaN.

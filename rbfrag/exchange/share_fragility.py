@@ -1,4 +1,4 @@
-"""The fragility of a rock mass with several limit states: shares of its blocks that fail."""
+"""Fragility of a rock mass with several limit states: fractions of its blocks that fail."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def share_functions(
     component: str = "single",
     **answering: Unpack[AnsweringFields],
 ) -> BlockFunctions:
-    """Return the probabilities that at least some shares of a rock mass's blocks fail.
+    """Return the probabilities that at least given fractions of the blocks of a rock mass fail.
 
     The blocks of a rock mass stand at one site and face one way. In each draw of what they have in
     common (the copula of :mod:`rbfrag.fragility.dependence`) block i fails from the level on at
@@ -90,12 +90,12 @@ def share_functions(
     at_once = max(1, _VALUES_AT_ONCE // p2.size)
     for start in range(0, DRAWS, at_once):
         z = sampler.normals(min(at_once, DRAWS - start), generator)
-        own = np.stack(
-            [np.interp(z[:, i], *each, right=np.inf) for i, each in enumerate(curve_of_each)],
+        thresholds = np.stack(
+            [np.interp(z[:, i], *curve, right=np.inf) for i, curve in enumerate(curve_of_each)],
             axis=1,
         )
-        own.partition([count - 1 for count in counts], axis=1)
-        reached[:, start : start + at_once] = own[:, [count - 1 for count in counts]].T
+        thresholds.partition([count - 1 for count in counts], axis=1)
+        reached[:, start : start + at_once] = thresholds[:, [count - 1 for count in counts]].T
     ends = reached[np.isfinite(reached)]
     top = math.log(TOP[measure])
     if ends.size == 0 or ends.min() >= top:
@@ -108,7 +108,7 @@ def share_functions(
     ]
     covered = of_shares[0].u
     covered = covered[(covered <= top) & (of_shares[0].p >= 0.5 / DRAWS)]
-    p = np.array([np.interp(covered, *each[:2]) for each in of_shares])
+    p = np.array([np.interp(covered, *curve[:2]) for curve in of_shares])
     ((x, rows, error),) = chords(np.exp(covered)[None], p[None], levels, _FLOOR)
     functions = [
         FragilityFunction(

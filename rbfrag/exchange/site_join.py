@@ -1,4 +1,4 @@
-"""Which block stands at which site of hazard curves or events: by name, or by place."""
+"""Assignment of blocks to the sites of hazard curves or events: by name, or by coordinates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NEARLY = 1.1
 
 @dataclass(frozen=True, eq=False)
 class SiteJoin:
-    """The sites of some blocks.
+    """Assignment of blocks to sites.
 
     Args:
         site: index of each block's site, -1 of one that stands at none, shape (n,).
@@ -39,12 +39,12 @@ class SiteJoin:
 def join_sites(
     columns: Mapping[str, Any],
     names: Sequence[str],
-    places: ArrayLike | None,
+    coordinates: ArrayLike | None,
     *,
     within_km: float = WITHIN_KM,
     of: str = "curve",
 ) -> SiteJoin:
-    """Return at which site each block of a table stands.
+    """Return the site of each block of a table.
 
     A block that states ``site_id`` stands at the site of that name, where the sites have names; any
     other at the nearest site by ``lon`` and ``lat``; blocks of which neither is known at the one
@@ -54,7 +54,7 @@ def join_sites(
         columns: ``block_id`` of n blocks, and, if there are, ``site_id``, and ``lon`` and ``lat``
             [deg].
         names: names of the s sites, empty texts where they have none.
-        places: longitudes and latitudes of the sites [deg], shape (s, 2); NaN or None: not known.
+        coordinates: longitudes and latitudes of the sites [deg], shape (s, 2); NaN or None: unknown.
         within_km: farthest distance from a block to its site [km].
         of: what there is of the sites, for messages.
 
@@ -66,15 +66,15 @@ def join_sites(
         raise InputError(f"within_km = {within_km:g}: give km above zero", fields=("within_km",))
     n, count = len(columns["block_id"]), len(names)
     ids = np.asarray(columns.get("site_id", [""] * n), dtype=object)
-    stated = np.array([bool(one) for one in ids.tolist()], dtype=np.bool_)
-    by_name = stated if all(names) else np.zeros(n, dtype=np.bool_)
+    has_site_id = np.array([bool(site_id) for site_id in ids.tolist()], dtype=np.bool_)
+    by_name = has_site_id if all(names) else np.zeros(n, dtype=np.bool_)
     site, reasons, remarks = np.zeros(n, dtype=np.intp), {}, []
-    if stated.any() and not all(names):
+    if has_site_id.any() and not all(names):
         text = f"the {of}s do not name their sites: site_id of the blocks is not used"
         remarks.append(Diagnostic(text, "site_join"))
     if by_name.any():
         index = {name: i for i, name in enumerate(names)}
-        site[by_name] = [index.get(str(one), -1) for one in ids[by_name].tolist()]
+        site[by_name] = [index.get(str(site_id), -1) for site_id in ids[by_name].tolist()]
         shown = f"{', '.join(map(repr, names[:5]))}{' …' if count > 5 else ''}"
         for i in np.flatnonzero(site < 0).tolist():
             reasons[i] = (
@@ -84,18 +84,20 @@ def join_sites(
         text = f"blocks stand at the sites of the {of}s by their site_id"
         remarks.append(Diagnostic(text, "site_join"))
     rest = np.flatnonzero(~by_name)
-    known = None if places is None else np.asarray(places, dtype=np.float64).reshape(count, 2)
+    lon_lat = (
+        None if coordinates is None else np.asarray(coordinates, dtype=np.float64).reshape(count, 2)
+    )
     if not rest.size:
         return SiteJoin(site, reasons, tuple(remarks))
-    if "lon" in columns and known is not None and np.isfinite(known).all():
-        own = np.column_stack([np.asarray(columns[name])[rest] for name in ("lon", "lat")])
-        nearest, distance = _nearest(own, known)
+    if "lon" in columns and lon_lat is not None and np.isfinite(lon_lat).all():
+        points = np.column_stack([np.asarray(columns[name])[rest] for name in ("lon", "lat")])
+        nearest, distance = _nearest(points, lon_lat)
         far = distance[:, 0] > within_km
         site[rest] = np.where(far, -1, nearest)
         for k in np.flatnonzero(far).tolist():
             i = nearest[k]
             reasons[int(rest[k])] = (
-                f"the nearest site, {_in_words(names[i], known[i])}, is {distance[k, 0]:.3g} km "
+                f"the nearest site, {_in_words(names[i], lon_lat[i])}, is {distance[k, 0]:.3g} km "
                 f"away: within_km is {within_km:g}"
             )
         remarks += _of_distances(columns["block_id"], rest[~far], distance[~far])
@@ -108,14 +110,14 @@ def join_sites(
     return SiteJoin(site, reasons, tuple(remarks))
 
 
-def _nearest(own: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the nearest site of each place, and the distances of it and of the second [km].
+def _nearest(points: FloatArray, sites: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the nearest site of each point, and the distances to it and to the second [km].
 
     Chords order as arcs do, and know neither the date line nor the poles.
     """
     from scipy.spatial import cKDTree
 
-    chords, nearest = cKDTree(on_sphere(*sites.T)).query(on_sphere(*own.T), k=[1, 2])
+    chords, nearest = cKDTree(on_sphere(*sites.T)).query(on_sphere(*points.T), k=[1, 2])
     arcs = 2.0 * EARTH_RADIUS_KM * np.arcsin(np.minimum(0.5 * chords / EARTH_RADIUS_KM, 1.0))
     # of one site there is no second
     return np.asarray(nearest)[:, 0], np.where(np.isfinite(chords), arcs, np.inf)
@@ -127,7 +129,7 @@ def _in_words(name: str, place: FloatArray) -> str:
 
 
 def _of_distances(block_ids: Any, used: NDArray[np.intp], distance: FloatArray) -> list[Diagnostic]:
-    """Return how far blocks stand from their sites, and of which another is nearly as near."""
+    """Return warnings about distances of blocks from their sites, and about ambiguous sites."""
     if not used.size:
         return []
     texts = [

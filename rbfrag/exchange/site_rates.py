@@ -1,4 +1,4 @@
-"""Which blocks stand at which sites of hazard curves, and annual rates as a table."""
+"""Assignment of blocks to the sites of hazard curves, and annual rates as a table."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rbfrag.vocabulary.quantities import column_of
 
 @dataclass(frozen=True, eq=False)
 class SitedBlocks:
-    """Blocks at the sites of some hazard curves.
+    """Blocks at the sites of hazard curves.
 
     Args:
         sites: curves of each site at which a block stands, one from each file.
@@ -41,8 +41,8 @@ class SitedBlocks:
     missing: Mapping[int, str] = field(default_factory=dict)
 
     @property
-    def given(self) -> dict[str, Any]:
-        """What answers read of the blocks, by field, and their kinds."""
+    def inputs(self) -> dict[str, Any]:
+        """Inputs of the blocks, by field, and their kinds."""
         return {**numbers_in(self.columns), "kind": [str(kind) for kind in self.columns["kind"]]}
 
     @property
@@ -58,7 +58,7 @@ def blocks_at_sites(
     site_chosen: bool = False,
     within_km: float = WITHIN_KM,
 ) -> SitedBlocks:
-    """Return which blocks stand at which sites of hazard curves.
+    """Return the blocks assigned to the sites of hazard curves.
 
     Blocks are joined as :func:`join_sites` does; a single one without a place is asked about at
     each site.
@@ -94,29 +94,29 @@ def blocks_at_sites(
         if size == 1:
             everywhere = {name: np.repeat(np.asarray(v), len(sites)) for name, v in columns.items()}
             return SitedBlocks(sites, everywhere, np.arange(len(sites)))
-    places = [
+    coordinates = [
         (np.nan if c.lon is None else c.lon, np.nan if c.lat is None else c.lat) for c in first
     ]
-    join = join_sites(columns, [c.site for c in first], places, within_km=within_km)
-    missing, own = join.reasons, np.flatnonzero(join.site >= 0)
-    if not own.size and site_chosen:
+    join = join_sites(columns, [c.site for c in first], coordinates, within_km=within_km)
+    missing, indices = join.reasons, np.flatnonzero(join.site >= 0)
+    if not indices.size and site_chosen:
         raise InputError(f"no block is at site {', '.join(c.place for c in first)}")
-    if not own.size:
+    if not indices.size:
         raise InputError(f"no block can be used: {next(iter(missing.values()))}")
     remarks = [*join.remarks]
     if missing and site_chosen:
         text = f"{len(missing)} blocks of other sites are left out"
         remarks.append(Diagnostic(text, "site_join"))
-    used, site = np.unique(join.site[own], return_inverse=True)
-    here = {name: np.asarray(values)[own] for name, values in columns.items()}
+    used, site = np.unique(join.site[indices], return_inverse=True)
+    block_columns = {name: np.asarray(values)[indices] for name, values in columns.items()}
     return SitedBlocks(
-        [sites[i] for i in used.tolist()], here, site, tuple(remarks),
+        [sites[i] for i in used.tolist()], block_columns, site, tuple(remarks),
         {} if site_chosen else missing,
     )  # fmt: skip
 
 
 def numbers_of_dry(dry: Mapping[str, Any], at: SitedBlocks) -> dict[str, Any]:
-    """Return what answers read of blocks without water, by field, and their kinds.
+    """Return the inputs of the blocks without water, by field, and their kinds.
 
     Args:
         dry: columns of the blocks, of which rows may be missing: those have NaN.
@@ -124,9 +124,9 @@ def numbers_of_dry(dry: Mapping[str, Any], at: SitedBlocks) -> dict[str, Any]:
     """
     size = at.site.size
     if "row" in dry:
-        own, rows = np.asarray(dry["row"]), np.asarray(at.columns["row"])
-        rows_of_dry = np.minimum(np.searchsorted(own, rows), own.size - 1)
-        lost = own[rows_of_dry] != rows
+        dry_rows, rows = np.asarray(dry["row"]), np.asarray(at.columns["row"])
+        rows_of_dry = np.minimum(np.searchsorted(dry_rows, rows), dry_rows.size - 1)
+        lost = dry_rows[rows_of_dry] != rows
     else:  # one block at each site
         rows_of_dry, lost = np.zeros((2, size), dtype=np.intp)
     numbers = {
@@ -136,11 +136,11 @@ def numbers_of_dry(dry: Mapping[str, Any], at: SitedBlocks) -> dict[str, Any]:
 
 
 def _numbers(columns: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:
-    """Return p² and k_r, and what else describes blocks of other kinds; NaN of a class."""
-    known = numbers_in(columns)
-    others = (name for facts in KINDS.values() for name in facts.parameters if name in known)
-    names = dict.fromkeys((*TOPPLING_BLOCK.names, *others))
-    return {column_of(n): known.get(n, math.nan) if alone else math.nan for n in names}
+    """Return p² and k_r, and the parameters of other kinds; NaN for a class."""
+    numbers = numbers_in(columns)
+    parameters = (name for facts in KINDS.values() for name in facts.parameters if name in numbers)
+    names = dict.fromkeys((*TOPPLING_BLOCK.names, *parameters))
+    return {column_of(n): numbers.get(n, math.nan) if alone else math.nan for n in names}
 
 
 def rate_columns(
@@ -157,10 +157,10 @@ def rate_columns(
     numbers = _numbers(columns, alone=len(columns["kind"]) == size)
     place = np.array([curve.place for curve in curves], dtype=object)[answer.site]
     lon, lat = (
-        np.array([nothing if value is None else value for value in each])[answer.site]
-        for each in ([curve.lon for curve in curves], [curve.lat for curve in curves])
+        np.array([nothing if value is None else value for value in values])[answer.site]
+        for values in ([curve.lon for curve in curves], [curve.lat for curve in curves])
     )
-    own: dict[str, Any] = {
+    number_columns: dict[str, Any] = {
         "lon": lon,
         "lat": lat,
         **numbers,
@@ -173,7 +173,7 @@ def rate_columns(
             ["" if name is None else str(name) for name in columns["block_id"]][:size], dtype=object
         ),
     }
-    for name, values in own.items():
+    for name, values in number_columns.items():
         result[name] = np.broadcast_to(np.asarray(values, dtype=np.float64), (size,))
     if rows is not None:
         if "count" in columns:

@@ -1,4 +1,4 @@
-"""Predictions for a table of blocks: the table again with the answers appended, or their list."""
+"""Predictions for a table of blocks: the table with appended answers, or the list of answers."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class TableAnswer(Result):
 
 
 def _row_in_short(row: Mapping[str, Any]) -> dict[str, object]:
-    """Return the cells that a terminal shows of the answer for a row."""
+    """Return the cells of a row's answer that are shown on a terminal."""
     ends = row["ci_low"], row["ci_high"]
     columns = {"probability": "probability", "drained_probability": "drained"}
     shown = {
@@ -163,7 +163,7 @@ def predict_table(
     source: str | PathLike[str],
     target: str | PathLike[str] | None = None,
     *,
-    given: Mapping[str, float],
+    inputs: Mapping[str, float],
     kind: str | None = None,
     sheet: str | None = None,
     ignore_columns: Sequence[str] = (),
@@ -171,7 +171,7 @@ def predict_table(
     remarks: Sequence[str] = (),
     **question: Any,
 ) -> TableAnswer:
-    """Answer every block of a table, and write the table with the answers or list these.
+    """Answer every block of a table, and write the table with the answers or list them.
 
     A row without an answer, such as one with an invalid number, has an empty probability and a
     reason; a row whose `mode` is another than that of the model's kind is not answered.
@@ -181,7 +181,7 @@ def predict_table(
             blocks, and measures; CSV also with semicolons and decimal commas.
         target: table to write, ``.csv``, ``.xlsx`` or ``.parquet``, whole or not at all; CSV is
             written as the CSV that was read. None lists the answers.
-        given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
+        inputs: what is the same for all rows, by the names of :func:`rbfrag.predict`.
         kind: how the blocks fail; None for what they are given by.
         sheet: of a workbook, the name of the sheet; None for the first.
         ignore_columns: columns to ignore, whatever they are called.
@@ -219,23 +219,23 @@ def predict_table(
         opened_table(origin, read, texts, sheet=sheet, ignore_columns=ignore_columns) as table,
         ExitStack() as stack,
     ):
-        table.check(given, kind)
-        uncertain = not _SCATTER.isdisjoint((*table.stated.columns, *given))
+        table.check(inputs, kind)
+        uncertain = not _SCATTER.isdisjoint((*table.header.columns, *inputs))
         columns: tuple[str, ...] = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
-        columns += OF_DRAINED if "water_m" in (*table.stated.columns, *given) else ()
+        columns += OF_DRAINED if "water_m" in (*table.header.columns, *inputs) else ()
         if goal is None:
             write = _listed(table, columns, rows)
         else:
             partial = stack.enter_context(written_whole(goal))
             write = _written(table, columns, partial, stack, formulas, notes, excel_text=excel_text)
         for part in table.parts:
-            predicted, answer, count = _answer(table, part, given, kind, question, empty)
+            predicted, answer, count = _answer(table, part, inputs, kind, question, empty)
             by_row += _in_table(predicted.warnings, int(counts[0]))
             write(part, answer)
             for name, words in chosen.items():
-                own = getattr(predicted, name)
-                own = own.split(", ") if isinstance(own, str) else own
-                words.update(dict.fromkeys(filter(None, own)))
+                names = getattr(predicted, name)
+                names = names.split(", ") if isinstance(names, str) else names
+                words.update(dict.fromkeys(filter(None, names)))
             finite = np.isfinite(answer["probability"])
             site = np.array(table.text(part, "site_id") or [""] * finite.size, dtype=object)
             together.append(
@@ -250,7 +250,7 @@ def predict_table(
             raise InputError(NO_BLOCK.format(origin))
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
-        table.check_read(given, chosen["read"])
+        table.check_read(inputs, chosen["read"])
         used = {*chosen.pop("read"), *_SHAKING, *texts, *PLACE, *ROW}
         missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
         notes += diagnostics(
@@ -314,10 +314,10 @@ def _total_failures(
         alone = float(count @ (p * (1.0 - p)))
         # some blocks drawn without replacement, of which a row with a count holds several
         drawn = np.random.default_rng(0).choice(total, min(total, MOST_PAIRED), replace=False)
-        some = np.searchsorted(np.cumsum(count), drawn, side="right")
-        shared = count_moments(p[some], blocks.only(some), law)[1]
-        shared -= float((p[some] * (1.0 - p[some])).sum())
-        shared *= total * (total - 1.0) / max(some.size * (some.size - 1.0), 1.0)
+        indices = np.searchsorted(np.cumsum(count), drawn, side="right")
+        shared = count_moments(p[indices], blocks.only(indices), law)[1]
+        shared -= float((p[indices] * (1.0 - p[indices])).sum())
+        shared *= total * (total - 1.0) / max(indices.size * (indices.size - 1.0), 1.0)
         tail = 0.5 - 0.5 * question.get("level", LEVEL)
         levels = tail, 1.0 - tail
         counts = count_quantiles(total, expected, alone + shared, levels)
@@ -328,20 +328,20 @@ def _total_failures(
 def _answer(
     table: BlockTable,
     part: TablePart,
-    given: Mapping[str, float],
+    common_fields: Mapping[str, float],
     kind: str | None,
     question: Mapping[str, Any],
     empty: set[str],
 ) -> tuple[PredictionArray, dict[str, NDArray[Any]], FloatArray]:
-    """Return the answers for some rows, their columns, and how many blocks each row is."""
+    """Return the answers for rows, their columns, and the number of blocks of each row."""
     values, faults = table.numbers(part)
     count = values.pop("count", np.ones(len(part.lines)))
-    whole = (count >= 1.0) & (count == np.rint(count))
-    for i in np.flatnonzero(~whole).tolist():
+    is_integer = (count >= 1.0) & (count == np.rint(count))
+    for i in np.flatnonzero(~is_integer).tolist():
         faults.setdefault(i, f"count = {count[i]:g}: give a whole number of blocks, 1 or more")
-    inputs: dict[str, Any] = dict(given)
+    inputs: dict[str, Any] = dict(common_fields)
     for name, column in values.items():
-        if name not in table.filled and (name in given or name in _SHAKING):
+        if name not in table.filled and (name in common_fields or name in _SHAKING):
             empty.add(name)  # an empty column gives nothing
         elif name in empty:
             raise InputError(
@@ -350,10 +350,12 @@ def _answer(
             )
         else:
             # an option holds for the rows whose cell is empty
-            inputs[name] = np.where(np.isnan(column), given.get(name, np.nan), column)
+            inputs[name] = np.where(np.isnan(column), common_fields.get(name, np.nan), column)
     for name in PLANE_TEXTS:
         if (cells := table.text(part, name)) is not None:
-            inputs[name] = np.array([cell or given.get(name, "") for cell in cells], dtype=object)
+            inputs[name] = np.array(
+                [cell or common_fields.get(name, "") for cell in cells], dtype=object
+            )
     for name in SHAKING_TEXTS:
         if (cells := table.text(part, name)) is not None and any(cells):
             if name == "component":
@@ -362,7 +364,7 @@ def _answer(
             filled = ["" if i in faults else cell or of_all for i, cell in enumerate(cells)]
             question = {**question, name: filled}
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
-    requested = kind if kinds is None else [each or kind for each in kinds]
+    requested = kind if kinds is None else [row_kind or kind for row_kind in kinds]
     with table.named():
         predicted = with_drained_bound(
             lambda rows: ask(rows, kind=requested, mode=modes, rows=True, **question), inputs
@@ -371,12 +373,12 @@ def _answer(
     answer: dict[str, NDArray[Any]] = {
         name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "how", "reason")
     }
-    for name, stated, own in (
+    for name, input_texts, predicted_texts in (
         ("kind", kinds, predicted.kinds),
         ("mode", modes, predicted.modes),
     ):
-        texts = np.array(stated or [""], dtype=object)
-        answer[name] = np.where(texts == "", own, texts)
+        texts = np.array(input_texts or [""], dtype=object)
+        answer[name] = np.where(texts == "", predicted_texts, texts)
     sd = predicted.block_sd
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape) if sd is None else sd
     bound = predicted.drained or {}
@@ -388,11 +390,11 @@ def _answer(
     answer["how"][bad] = ""
     answer["reason"][bad] = [*faults.values()]
     answer["warnings"] = codes_by_row(predicted.warnings, count.size)
-    return predicted, answer, np.where(whole, count, 1.0)
+    return predicted, answer, np.where(is_integer, count, 1.0)
 
 
 def _wrong_components(components: Sequence[str]) -> dict[int, str]:
-    """Return why rows cannot be used whose horizontal component is unknown, by their index."""
+    """Return the errors of rows whose horizontal component is unknown, by index."""
     faults = {}
     for i, name in enumerate(components):
         try:
@@ -412,20 +414,20 @@ def _written(
     *,
     excel_text: bool,
 ) -> Write:
-    """Return what writes parts and their answers to a file; enters what is to be said of it."""
+    """Return a function that writes parts and answers to a file; collects the warnings."""
     doubled = next((name for name in table.file.header if table.file.header.count(name) > 1), None)
     if doubled is not None:
         raise InputError(f"{table.name}: the column {doubled} occurs twice")
     written = (*ANSWERS, OF_UNCERTAIN, *OF_DRAINED)
-    kept = [name for name in table.file.header if name not in written]
+    header = [name for name in table.file.header if name not in written]
     write = table_writer(
-        partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
+        partial, header, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
         fast=True, notes=notes,
     )  # fmt: skip
     is_csv = partial.suffix.lower() == ".csv"
 
     def write_part(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
-        cells = changed_texts({name: part.cells[name] for name in kept}, as_written)
+        cells = changed_texts({name: part.cells[name] for name in header}, as_written)
         if is_csv and excel_text:
             cells = changed_texts(cells, as_text)
         elif is_csv and not formulas:
@@ -436,7 +438,7 @@ def _written(
 
 
 def _listed(table: BlockTable, answers: Sequence[str], rows: list[dict[str, Any]]) -> Write:
-    """Return what enters the answers for parts into a list, up to :data:`MOST_LISTED`."""
+    """Return a function that appends the answers for parts to a list, up to :data:`MOST_LISTED`."""
 
     def list_part(part: TablePart, answer: Mapping[str, NDArray[Any]]) -> None:
         first, most = len(rows), MOST_LISTED - len(rows)
@@ -445,7 +447,7 @@ def _listed(table: BlockTable, answers: Sequence[str], rows: list[dict[str, Any]
         names = table.text(part, "block_id") or map(str, range(first + 1, MOST_LISTED + 1))
         columns = [answer[name].tolist() for name in answers]
         for name, *row in islice(zip(names, *columns, strict=False), most):
-            known = (None if value != value else value for value in row)
-            rows.append({"block_id": name, **dict(zip(answers, known, strict=True))})
+            cells = (None if value != value else value for value in row)
+            rows.append({"block_id": name, **dict(zip(answers, cells, strict=True))})
 
     return list_part

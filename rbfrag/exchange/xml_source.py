@@ -1,4 +1,4 @@
-"""XML that another tool wrote, read so that no document can do harm.
+"""Safe reading of XML files from other tools.
 
 Document type definitions are refused: entity bombs and references to other files need one, and
 none of the formats here has one.
@@ -27,12 +27,12 @@ DEEPEST = 100
 
 
 def parse_xml(
-    path: str | os.PathLike[str], what: str, *, start: Start, end: End, text: Text
+    path: str | os.PathLike[str], description: str, *, start: Start, end: End, text: Text
 ) -> None:
-    """Call back for every element of a file, in one pass and bounded memory.
+    """Call back for every element of a file, in a single pass and bounded memory.
 
     `start` gets local name, attributes and line of a start tag, `end` local name and line of an
-    end tag, `text` parts of the text between tags. `what` is what messages call the file.
+    end tag, `text` parts of the text between tags. `description` is what messages call the file.
     """
     source = Path(path)
     parser = expat.ParserCreate(namespace_separator=" ")
@@ -45,7 +45,7 @@ def parse_xml(
     def refuse(*_: object) -> None:
         raise InputError(
             f"{source}, line {line()}: the file has a document type definition, which is not "
-            f"supported in {what}"
+            f"supported in {description}"
         )
 
     parser.StartDoctypeDeclHandler = refuse
@@ -54,12 +54,14 @@ def parse_xml(
     parser.EndElementHandler = lambda name: end(_local(name), line())
     parser.CharacterDataHandler = text
     try:
-        with reading(source, what), source.open("rb") as file:
+        with reading(source, description), source.open("rb") as file:
             size = source.stat().st_size
             if size == 0:
-                raise InputError(f"{source} is empty: give {what}")
+                raise InputError(f"{source} is empty: give {description}")
             if size > MOST_BYTES:
-                raise InputError(f"{source} has {size} bytes, more than {MOST_BYTES}: not {what}")
+                raise InputError(
+                    f"{source} has {size} bytes, more than {MOST_BYTES}: not {description}"
+                )
             parser.ParseFile(file)
     except expat.ExpatError as error:
         raise InputError(
@@ -89,14 +91,14 @@ class Node:
             yield from child.of(*names)
 
 
-def read_xml(path: str | os.PathLike[str], what: str) -> Node:
-    """Return a whole document as one node above its root."""
+def read_xml(path: str | os.PathLike[str], description: str) -> Node:
+    """Return a complete document as one node above its root."""
     document = Node("", {}, 0)
     open_nodes, texts = [document], [[""]]
 
     def start(name: str, attributes: Mapping[str, str], line: int) -> None:
         if len(open_nodes) > DEEPEST:
-            raise InputError(f"{path}, line {line}: elements nested too deeply: not {what}")
+            raise InputError(f"{path}, line {line}: elements nested too deeply: not {description}")
         node = Node(name, attributes, line)
         open_nodes[-1].children.append(node)
         open_nodes.append(node)
@@ -106,7 +108,7 @@ def read_xml(path: str | os.PathLike[str], what: str) -> Node:
         # joined at once: text between a million comments comes in as many parts
         open_nodes.pop().text = "".join(texts.pop())
 
-    parse_xml(path, what, start=start, end=end, text=lambda part: texts[-1].append(part))
+    parse_xml(path, description, start=start, end=end, text=lambda part: texts[-1].append(part))
     return document
 
 

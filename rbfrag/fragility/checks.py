@@ -1,4 +1,4 @@
-"""What can be wrong or doubtful about a question, and the answer where there is something to say.
+"""Validation of the inputs of a prediction, and the prediction where warnings apply.
 
 Every check is written once and looks at single numbers or at arrays. No sentence holds a
 semicolon, which separates the reasons of an array's element.
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from rbfrag.fragility.domain import RATIOS, Ratio
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import AMPLIFIED, CREDIBLE, HIGHEST, LOWEST
-from rbfrag.fragility.method import Numbers
+from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 from rbfrag.results.numbers import exact_percent
 from rbfrag.solver.kinds import BY_MECHANICS
@@ -47,7 +47,7 @@ _ABOVE_ZERO = {
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing found about a question.
+    """Diagnostic about one input of a prediction.
 
     Args:
         holds: whether (where) it is so.
@@ -79,7 +79,7 @@ class Remark:
 
 @dataclass(frozen=True, kw_only=True)
 class Contradiction(Remark):
-    """Measures that do not go together in any fitted motion.
+    """Intensity measures that are inconsistent: their combination occurs in no fitted motion.
 
     Args:
         ratio: what is out of its range.
@@ -116,24 +116,26 @@ NO_SHAKING = "no shaking"
 def refusals(
     values: Mapping[str, Any], needed: Collection[str], signed: Collection[str] = ()
 ) -> Iterator[Remark]:
-    """Yield what makes an answer impossible; `signed` names the values that may be negative."""
+    """Yield the reasons that make a prediction impossible; `signed` names values that may be
+    negative.
+    """
     for name in needed:
         value = values[name]
-        wanted = _prompt(name)
-        yield Remark(value != value, name, value, f"is not a number: give {wanted}")
+        prompt = _prompt(name)
+        yield Remark(value != value, name, value, f"is not a number: give {prompt}")
         if name in _ABOVE_ZERO:
-            yield Remark(value <= 0.0, name, value, f"is not above zero: give {wanted}")
+            yield Remark(value <= 0.0, name, value, f"is not above zero: give {prompt}")
             low = (value > 0.0) & (value < LOWEST)
             of = _ABOVE_ZERO[name]
-            yield Remark(low, name, value, f"is too small for any {of}: give {wanted}")
+            yield Remark(low, name, value, f"is too small for any {of}: give {prompt}")
         elif name not in signed:
-            yield Remark(value < 0.0, name, value, f"is negative: give {wanted}")
+            yield Remark(value < 0.0, name, value, f"is negative: give {prompt}")
         large = (value > HIGHEST) | (value == -math.inf)
-        yield Remark(large, name, value, f"is beyond any block or earthquake: give {wanted}")
+        yield Remark(large, name, value, f"is beyond any block or earthquake: give {prompt}")
 
 
 class Judgement(NamedTuple):
-    """An answer with what was found about the question.
+    """Prediction with the diagnostics of its inputs.
 
     Args:
         answer: what the model says.
@@ -154,20 +156,20 @@ class Judgement(NamedTuple):
 
 def answer_with_findings(
     model: FragilityModel,
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     needed: Collection[str],
     quantiles: Quantiles | None,
-    ns: Numbers,
+    ns: ArrayNamespace,
     *,
     say: Callable[[Any, Remark], None],
     refuse: Callable[[Any, Remark], None],
     unstable: Callable[[Any, Remark], None],
     nothing: Any,
 ) -> Judgement:
-    """Answer a question of which there may be something to say.
+    """Return the prediction for inputs that may need warnings.
 
     Args:
-        given: what is given, by name: numbers, or arrays of one shape.
+        inputs: what is given, by name: numbers, or arrays of one shape.
         needed: names of the values without which there is no answer.
         quantiles: of the confidence level; None for no interval.
         say: called with where a sentence holds, and the finding.
@@ -177,16 +179,16 @@ def answer_with_findings(
     """
     block, term = model.method.block, model.term
     missing = nothing
-    for finding in refusals(given, needed, (block.strength, *block.options)):
+    for finding in refusals(inputs, needed, (block.strength, *block.options)):
         refuse(finding.holds, finding)
         missing = missing | finding.holds
-    strength = given[block.strength]
-    wanted = _prompt(block.strength)
+    strength = inputs[block.strength]
+    prompt = _prompt(block.strength)
     at_rest = (strength <= 0.0) & _not(missing)
     unstable(
-        at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
+        at_rest, Remark(at_rest, block.strength, strength, f"is not above zero: give {prompt}")
     )
-    floored = dict(given)
+    floored = dict(inputs)
     for name in (block.strength, *_FLOORED):
         if name in floored:
             floored[name] = ns.maximum(floored[name], LEAST)
@@ -201,11 +203,11 @@ def answer_with_findings(
             values[name] = ns.maximum(values[name], LEAST)
     above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
     model.with_ratios(values, above_zero)
-    no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
+    no_shaking = (inputs[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
     say(no_shaking, Remark(no_shaking, "", 0.0, NO_SHAKING, BY_MECHANICS, "no_shaking"))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
-    for bound in model.bounds(given):
+    for bound in model.bounds(inputs):
         holds = bound.holds(values) & _not(ruled)
         # of many values one text, which names none
         text = bound.reason(values if nothing is False else {})
@@ -232,7 +234,7 @@ def answer_with_findings(
 
 
 def _never(model: FragilityModel) -> Answer:
-    """Return the answer where a single number is ruled: P = 0."""
+    """Return P = 0 where mechanics rules out the failure of a single block."""
     of_block = (0.0, 0.0) if model.uncertain else (None, None)
     return Answer(0.0, 0.0, 0.0, None, None, *of_block)
 
@@ -242,7 +244,7 @@ def _not(condition: Any) -> Any:
 
 
 def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Remark]:
-    """Yield the variables that lie outside their fitted range, and measures that contradict."""
+    """Yield the variables outside their fitted range, and inconsistent intensity measures."""
     for ratio in model.ratios_of(values):
         low, high = ratio.limits(model.row.domain)
         value = values[ratio.name]
@@ -269,8 +271,10 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
             )
 
 
-def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Iterator[Remark]:
-    """Yield where the model stops making sense, and suspicious values."""
+def doubts(
+    model: FragilityModel, values: Mapping[str, Any], ns: ArrayNamespace
+) -> Iterator[Remark]:
+    """Yield where the model becomes unphysical, and suspicious values."""
     if model.method.doubts is not None:
         for holds, name, text in model.method.doubts(model.parameters, values, ns):
             yield Remark(holds, name, values[name], text, code="extrapolation")

@@ -1,5 +1,6 @@
-"""Conditional fragility: what a second shock does to blocks that survived a first, by the state
-they were left in, beside what it does to the same blocks in their first place."""
+"""Conditional fragility: failure in a second shock of blocks that survived a first, by damage
+state, compared with intact blocks.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ Measure = Literal["", "displacement_m", "peak_rad"]
 
 
 class FailureShare(NamedTuple):
-    """A share of blocks that fail, with what the finite number of earthquakes leaves open.
+    """Fraction of blocks that fail, with its confidence interval for a finite number of
+    earthquakes.
 
     Args:
         ci_low: lower end of the interval, clustered by the earthquake of the second shock.
@@ -44,7 +46,7 @@ class FailureShare(NamedTuple):
 
 @dataclass(frozen=True)
 class ConditionalShare:
-    """The blocks of one class that survived the first shock, in the second.
+    """Blocks of one class that survived the first shock, under the second.
 
     Args:
         displacement_m: displacement that counts as failure [m]; None of kinds that rotate.
@@ -92,7 +94,8 @@ class ConditionalShare:
 def conditional_shares(
     rows: Sequence[StoredShockPair], measure: Measure, limits: Iterable[float | None]
 ) -> tuple[ConditionalShare, ...]:
-    """Return what a second shock does to survivors of a first, by limit, state and shaking.
+    """Return the fraction of survivors of a first shock that fail in a second, by limit, state and
+    shaking.
 
     A block fails when its measure reaches the limit, counted from its first place, or when it is
     past recovery. It survived the first shock if it then came to rest within the limit.
@@ -111,14 +114,14 @@ def conditional_shares(
 def _of_limit(
     rows: Sequence[StoredShockPair], measure: Measure, limit: float | None
 ) -> Iterable[ConditionalShare]:
-    left = "displacement_m" if measure == "displacement_m" else "rotation_rad"
+    attribute = "displacement_m" if measure == "displacement_m" else "rotation_rad"
     classes: dict[tuple[int, int], list[tuple[StoredShockPair, bool, bool]]] = {}
     unknown: Counter[tuple[int, int]] = Counter()
     for row in rows:
         pair = row.record
         if _fails(pair.first, measure, limit) is not False:
             continue
-        state = (getattr(pair.first, left) or 0.0) / (limit or pair.critical_rad or math.inf)
+        state = (getattr(pair.first, attribute) or 0.0) / (limit or pair.critical_rad or math.inf)
         # one that leans on its back plane may rest beyond the rotation at which it would balance
         cell = _class(STATES, min(state, STATES[-1])), _class(SHAKING, row.pga_g / pair.yield_g)
         after, intact = (_fails(end, measure, limit) for end in (pair.second, pair.intact))
@@ -157,7 +160,7 @@ def _class(ends: Sequence[float], value: float) -> int:
 
 
 def _fails(end: ShockEnd, measure: Measure, limit: float | None) -> bool | None:
-    """Return whether a block fails; None where that is not known."""
+    """Return whether a block fails; None if unknown."""
     value = getattr(end, measure)
     if end.outcome == Outcome.TOPPLED or (None not in (limit, value) and value >= limit):
         return True
@@ -165,7 +168,7 @@ def _fails(end: ShockEnd, measure: Measure, limit: float | None) -> bool | None:
 
 
 def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) -> FailureShare:
-    """Return a share with its interval, clustered by earthquake.
+    """Return a fraction of failures with its confidence interval, clustered by earthquake.
 
     The interval is that of a logistic model of one constant: F(eta ± t(ν) se) with the covariance
     of leaving earthquakes out, as that of every fit here. Where none or all fail it is the exact

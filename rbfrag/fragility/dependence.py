@@ -1,4 +1,4 @@
-"""How strongly the failures of blocks in one earthquake go together: the copula's parameters.
+"""Dependence of the failures of blocks in one earthquake: the parameters of the Gaussian copula.
 
 Block i fails if Z_i ≤ Φ⁻¹(P_i) with Z_i standard normal, so that every P stays as it is. What two
 blocks of one earthquake share is the correlation of their Z; blocks of different earthquakes share
@@ -24,7 +24,7 @@ _ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 @dataclass(frozen=True)
 class Dependence:
-    """Correlation of Z of two blocks of one earthquake.
+    """Correlation of the latent variables Z of two blocks in one earthquake.
 
         R = ρ_e exp(-D/λ_e)                                    any two blocks
           + ρ_s exp(-D/λ_e)                                    of the same site
@@ -77,7 +77,7 @@ class Dependence:
         same_component: NDArray[np.bool_],
         sign: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return R of pairs of blocks of one earthquake.
+        """Return the correlation R of pairs of blocks in one earthquake.
 
         Args:
             distance_l: D, any shape.
@@ -91,8 +91,8 @@ class Dependence:
         shared = self.rho_e + self.rho_s * same_site
         symmetric = self.rho_v * np.exp(-distance_l / self.l_v)
         antisymmetric = sign * self.rho_o * np.exp(-distance_l / self.l_o)
-        own = same_component * (symmetric + antisymmetric) * np.exp(-distance_y / self.l_y)
-        return np.asarray(shared * np.exp(-distance_l / self.l_e) + own)
+        component = same_component * (symmetric + antisymmetric) * np.exp(-distance_y / self.l_y)
+        return np.asarray(shared * np.exp(-distance_l / self.l_e) + component)
 
     def correlation(
         self,
@@ -103,7 +103,7 @@ class Dependence:
         component: ArrayLike,
         polarity: ArrayLike,
     ) -> NDArray[np.float64]:
-        """Return R of every two blocks, shape (n, n), with 1 on the diagonal.
+        """Return the correlation matrix R of the blocks, shape (n, n), with 1 on the diagonal.
 
         Args:
             l: ln of the frequency parameter p [1/s], shape (n,).
@@ -125,12 +125,12 @@ class Dependence:
             )
 
         def equal(labels: ArrayLike) -> NDArray[np.bool_]:
-            one = np.asarray(labels)
-            return np.asarray(one[:, None] == one[None, :])
+            array = np.asarray(labels)
+            return np.asarray(array[:, None] == array[None, :])
 
         def apart(values: ArrayLike) -> NDArray[np.float64]:
-            one = np.asarray(values, dtype=np.float64)
-            return np.abs(one[:, None] - one[None, :])
+            array = np.asarray(values, dtype=np.float64)
+            return np.abs(array[:, None] - array[None, :])
 
         together = equal(earthquake)
         at_site = together & equal(site)
@@ -152,7 +152,7 @@ def normal_share(z: float) -> float:
 
 
 def normal_quantile(probability: float) -> float:
-    """Return Φ⁻¹ of a probability from 0 to 1, to the last digits of a double.
+    """Return the standard normal quantile Φ⁻¹ of a probability from 0 to 1, to double precision.
 
     Halley's steps on ln Φ, from 26.2.23 of Abramowitz and Stegun (1964), which is right to 4.5e-4.
     """

@@ -1,4 +1,4 @@
-"""Blocks, shaking, models and their data in words, as the lines of answers print them."""
+"""Descriptions of blocks, shaking, models and data, as the lines of answers print them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ _LONGEST_LABEL = 30
 
 
 def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
-    """Return the measures of a question: "PGV 0.9 m/s, PGA 0.6 g"; medians where they scatter."""
+    """Describe the intensity measures: "PGV 0.9 m/s, PGA 0.6 g"; medians where they have a
+    dispersion.
+    """
     parts = [
         f"{_measure(name)} {inputs[name]:.4g} {QUANTITIES[name].unit}".rstrip()
         for name in (*INTENSITY, "rjb_km", "vs30_m_s")
@@ -41,7 +43,7 @@ def shaking(uncertain: Mapping[str, Any], inputs: Mapping[str, Any]) -> str:
 
 
 def drained_bound(bound: Mapping[str, float | None]) -> str:
-    """Return the answer without water pressure: "k_r = 0.3, P = 8.4 % (6.4–11 %), without …"."""
+    """Describe the drained prediction: "k_r = 0.3, P = 8.4 % (6.4–11 %), without …"."""
     yields = [
         f"{QUANTITIES[name].symbol} = {value:.3g}, "
         for name, value in bound.items()
@@ -52,12 +54,12 @@ def drained_bound(bound: Mapping[str, float | None]) -> str:
 
 
 def at_sites(number: float) -> str:
-    """Return what the range of one earthquake is of."""
+    """Describe what the prediction interval of a single earthquake refers to."""
     return f"{number:,g} site{'s' if number > 1 else ''} of one earthquake"
 
 
 def block(method: str, inputs: Mapping[str, Any]) -> str:
-    """Return the numbers of a block and how it stands: "p² = 7.21 s⁻², k_r = 0.2; rock …".
+    """Describe the parameters and the support of a block: "p² = 7.21 s⁻², k_r = 0.2; rock …".
 
     Args:
         method: the one that the model which answers is fitted by.
@@ -85,7 +87,9 @@ def block(method: str, inputs: Mapping[str, Any]) -> str:
 
 
 def _shape(inputs: Mapping[str, Any]) -> str:
-    """Return dimensions and planes, "rectangle 2 m × 0.4 m, dip of the base 5°"; or nothing."""
+    """Describe dimensions and planes: "rectangle 2 m × 0.4 m, dip of the base 5°"; empty if none
+    are given.
+    """
     values = {name: value for name, value in inputs.items() if isinstance(value, int | float)}
     parts = [f"{name} {inputs[name]}" for name in SPACE if inputs.get(name)]
     if values.keys() >= {"height_m", "width_m"}:
@@ -106,13 +110,13 @@ def labelled_value(name: str, value: float, digits: int = 4) -> tuple[str, str]:
 
 
 def labelled_values(numbers: Mapping[str, float], digits: int) -> str:
-    """Return the numbers of a block with their names and units: "p² = 3 1/s², k_r = 0.1"."""
+    """Describe the parameters of a block with their names and units: "p² = 3 1/s², k_r = 0.1"."""
     pairs = (labelled_value(name, value, digits) for name, value in numbers.items())
     return ", ".join(f"{label} = {value}" for label, value in pairs)
 
 
 def model(document: Mapping[str, Any]) -> str:
-    """Return what people call the model of an answer: what it reads, and what tells it apart."""
+    """Describe the model of a prediction: its predictors, and what distinguishes it."""
     from rbfrag.fragility.measures import TERMS
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.fragility.methods import method_named
@@ -122,26 +126,26 @@ def model(document: Mapping[str, Any]) -> str:
     read = map(_measure, term.inputs)
     method = method_named(document["method"])
     kind = "" if method.block is TOPPLING_BLOCK else method.block.kind.replace("_", " ")
-    own = "" if method.forms[term.name].rank == 0 else method.name
+    method_name = "" if method.forms[term.name].rank == 0 else method.name
     sized = "size-dependent" if "block's" in term.title else ""
-    return ", ".join(filter(None, (*read, sized, kind, own)))
+    return ", ".join(filter(None, (*read, sized, kind, method_name)))
 
 
 def named_model(document: Mapping[str, Any]) -> str:
-    """Return the name of a model and what people call it: "bounded-pgv_kr (PGV, …)"."""
+    """Return the name of a model and its description: "bounded-pgv_kr (PGV, …)"."""
     title = model(document)
     return title if title == document["model"] else f"{document['model']} ({title})"
 
 
 def stored_model(row: ModelRow) -> str:
-    """Return what people call a stored model."""
+    """Describe a stored model."""
     return model({"model": row.name, "term": row.term, "method": row.method})
 
 
 def measures(names: Sequence[str]) -> str:
-    """Return measures as people call them: "PGV and SA(1 s)"."""
-    *others, last = map(_measure, names)
-    return " and ".join(filter(None, (", ".join(others), last)))
+    """Describe intensity measures: "PGV and SA(1 s)"."""
+    *leading, last = map(_measure, names)
+    return " and ".join(filter(None, (", ".join(leading), last)))
 
 
 def _measure(name: str) -> str:
@@ -150,11 +154,11 @@ def _measure(name: str) -> str:
 
 
 def fitted_data(diagnostics: Mapping[str, Any]) -> str:
-    """Return what a model is fitted on: outcomes, or critical values; empty where not stored."""
+    """Describe the data of a fit: outcomes or critical values; empty if not stored."""
     outcomes, events = diagnostics.get("n_outcomes"), diagnostics.get("events")
     if not ((number := outcomes or diagnostics.get("n")) and events):
         return ""
-    what = "outcomes" if outcomes else "critical values"
+    data = "outcomes" if outcomes else "critical values"
     recorded = diagnostics.get("recorded_events") != 0
     of = "earthquakes" if recorded else "synthetic pulses, which are not earthquakes"
-    return f"fitted on {number:,} {what} of {events:,} {of}"
+    return f"fitted on {number:,} {data} of {events:,} {of}"

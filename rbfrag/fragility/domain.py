@@ -1,4 +1,5 @@
-"""Where a model's answers rest on data, jointly: ratios of measures, and the distance from the fit.
+"""Joint range of the fitted data: ratios of intensity measures, and the distance from the fitted
+points.
 
 A range of each variable by itself says nothing of values that do not go together. The ratios here
 do not change when a motion is scaled and name what contradicts what; the distance of Mahalanobis
@@ -14,7 +15,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
-from rbfrag.fragility.method import Numbers
+from rbfrag.fragility.method import ArrayNamespace
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.results.numbers import exact_percent
 from rbfrag.vocabulary.quantities import MEASURES, QUANTITIES, SPECTRAL
@@ -27,7 +28,7 @@ MARGIN = 2.0
 
 
 def _name_of(value: str) -> str:
-    """Return what a value of a ratio is called: a measure, or p of the block."""
+    """Return the name of a quantity in a ratio: an intensity measure, or p of the block."""
     if value not in MEASURES:
         return "block's p"
     return MEASURES[value].imt or MEASURES[value].title or QUANTITIES[value].symbol
@@ -41,7 +42,7 @@ def _with_unit(value: str, number: float) -> str:
 
 @dataclass(frozen=True)
 class Ratio:
-    """A ratio of measures that does not change when the motion is scaled.
+    """Ratio of intensity measures that does not change when the motion is scaled.
 
     Args:
         name: its name in the stored domain.
@@ -60,7 +61,7 @@ class Ratio:
     shipped: tuple[float, float] | None = None
 
     def limits(self, domain: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-        """Return the range within which nothing is to be said.
+        """Return the range within which no warning is given.
 
         Args:
             domain: fitted ranges of a model by name.
@@ -70,7 +71,7 @@ class Ratio:
         return self.shipped[0] / MARGIN, self.shipped[1] * MARGIN
 
     def _ranges(self, fitted: tuple[float, float] | None) -> tuple[str, str]:
-        """Return whose range it is, in numbers, and what lying outside means."""
+        """Describe the range: its source, its ends, and what lying outside means."""
         if fitted is None and self.shipped is not None:
             return (
                 f"more than a factor of {MARGIN:g} outside the {self.shipped[0]:.3g} to "
@@ -91,19 +92,19 @@ class Ratio:
         Args:
             fitted: range of the fitted motions; None where the shipped ones judge.
         """
-        first, *others = (_with_unit(name, values[name]) for name in self.of)
-        where, what = self._ranges(fitted)
+        first, *rest = (_with_unit(name, values[name]) for name in self.of)
+        where, effect = self._ranges(fitted)
         return (
-            f"{first} is inconsistent with {' and '.join(others)}: {self.symbol} is "
-            f"{ratio:.2g}{self.unit}, {where}: {what}"
+            f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} is "
+            f"{ratio:.2g}{self.unit}, {where}: {effect}"
         )
 
     def in_general(self, fitted: tuple[float, float] | None) -> str:
         """Return the sentence for many values; `fitted` as for :meth:`contradiction`."""
-        first, *others = map(_name_of, self.of)
-        where, what = self._ranges(fitted)
+        first, *rest = map(_name_of, self.of)
+        where, effect = self._ranges(fitted)
         return (
-            f"{first} is inconsistent with {' and '.join(others)}: {self.symbol} is {where}: {what}"
+            f"{first} is inconsistent with {' and '.join(rest)}: {self.symbol} is {where}: {effect}"
         )
 
 
@@ -181,13 +182,14 @@ periods than accelerations, which Tm is the mean of.
 """
 
 
-def ratios_of(known: Collection[str]) -> tuple[Ratio, ...]:
-    """Return the ratios that some values suffice for."""
-    return tuple(ratio for ratio in RATIOS if all(name in known for name in ratio.of))
+def ratios_of(names: Collection[str]) -> tuple[Ratio, ...]:
+    """Return the ratios that can be computed from the named values."""
+    return tuple(ratio for ratio in RATIOS if all(name in names for name in ratio.of))
 
 
 class Spread(NamedTuple):
-    """How the fitted points scatter: an ellipsoid in the logarithms of block and measures.
+    """Scatter of the fitted points: an ellipsoid in the logarithms of block parameters and
+    intensity measures.
 
     Args:
         names: the values that the model reads.
@@ -202,37 +204,37 @@ class Spread(NamedTuple):
     packed: tuple[float, ...]
     radius2: float
 
-    def holds(self, values: Mapping[str, Any], ns: Numbers) -> Any:
+    def holds(self, values: Mapping[str, Any], ns: ArrayNamespace) -> Any:
         """Return whether (where) values above zero lie within the fitted distance."""
         return self.distance2(values, ns) <= self.radius2
 
-    def distance2(self, values: Mapping[str, Any], ns: Numbers) -> Any:
-        """Return the squared distance of Mahalanobis from the centre of the fitted points."""
+    def distance2(self, values: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+        """Return the squared Mahalanobis distance from the centre of the fitted points."""
         log, packed = ns.log, self.packed
         before: list[Any] = []
         total, k = 0.0, 0
         for name, middle in zip(self.names, self.centre):  # noqa: B905  (strict takes longer)
-            own = log(values[name]) - middle
-            before.append(own)
+            deviation = log(values[name]) - middle
+            before.append(deviation)
             inner = 0.0
-            for each in before:
-                inner = inner + packed[k] * each
+            for previous in before:
+                inner = inner + packed[k] * previous
                 k += 1
-            total = total + inner * own
+            total = total + inner * deviation
         return total
 
     @property
     def sentence(self) -> str:
-        """What is said outside of it."""
-        *others, last = self.names
+        """Warning for points outside the ellipsoid."""
+        *leading, last = self.names
         return (
-            f"the combination of {', '.join(others)} and {last} is farther from the centre of the "
+            f"the combination of {', '.join(leading)} and {last} is farther from the centre of the "
             f"fitted data than {exact_percent(INSIDE)} of them: the answer is an extrapolation"
         )
 
 
 def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
-    """Return the scatter of the points that a stored model was fitted to; None if it has none.
+    """Return the scatter of the fitted points of a stored model; None if not stored.
 
     Args:
         name: the model's name.

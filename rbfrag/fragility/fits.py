@@ -1,4 +1,4 @@
-"""How models are fitted; numpy and statsmodels are loaded by the first call of one of these."""
+"""Fitting methods; numpy and statsmodels are loaded on the first call."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def outcomes(*data: Any, **options: Any) -> MethodResult:
-    """Fit what blocks of the grid did, by maximum likelihood."""
+    """Fit outcomes of the grid by maximum likelihood."""
     from rbfrag.fragility.fit.outcomes import fit_outcomes
 
     return fit_outcomes(*data, **options)
@@ -23,14 +23,14 @@ def line(*data: Any, **options: Any) -> MethodResult:
 
 
 def log_line(*data: Any, **options: Any) -> MethodResult:
-    """Fit logarithms of critical values by a line, censored ones by their limits."""
+    """Fit a line to the logarithms of critical values, with censoring."""
     from rbfrag.fragility.fit.critical import fit_lognormal
 
     return fit_lognormal(*data, **options)
 
 
 def censored(*data: Any, **options: Any) -> MethodResult:
-    """Fit points of failure by a formula with normal scatter, censored ones by their limits."""
+    """Fit a formula with normal dispersion to critical values, with censoring."""
     from rbfrag.fragility.fit.critical import fit_censored
 
     return fit_censored(*data, **options)

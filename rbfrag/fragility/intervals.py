@@ -1,4 +1,4 @@
-"""How well parameters are known, for one block: standard error and Student's quantile of eta.
+"""Parameter uncertainty for one block: standard error and Student t quantile of eta.
 
 The interval of P is F(eta ± t(ν) se): se² = xᵀ V x with the slopes x of eta, and V the covariance
 of the fits that each leave an earthquake out. Nothing else widens it. No library is loaded here.
@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import normal_quantile
-from rbfrag.fragility.method import Numbers
+from rbfrag.fragility.method import ArrayNamespace
 
 FEWEST_FREEDOMS = 2.0
 """No quantile is taken with fewer degrees of freedom."""
 
 
 class Quantiles(NamedTuple):
-    """What an interval of one confidence level reaches to.
+    """Quantiles of one confidence level.
 
     Args:
         normal: quantile of the normal distribution.
@@ -34,7 +34,7 @@ class Quantiles(NamedTuple):
     student: tuple[float, ...]
 
     def student_at(self, per_freedom: Any) -> Any:
-        """Return Student's quantile of 1/ν, from 0 to 1/2 (error below 1e-6 to level .9999)."""
+        """Return the Student t quantile at 1/ν, 0 to 1/2 (error below 1e-6 up to level .9999)."""
         w = 4.0 * per_freedom - 1.0
         value = self.student[0]
         for coefficient in self.student[1:]:
@@ -44,7 +44,7 @@ class Quantiles(NamedTuple):
 
 @dataclass(frozen=True)
 class ParameterErrors:
-    """What leaving each earthquake out says of the parameters.
+    """Parameter uncertainty from leave-one-earthquake-out fits.
 
     Args:
         packed_covariance: V on and below its diagonal, row by row, those off it doubled.
@@ -55,8 +55,8 @@ class ParameterErrors:
     packed_covariance: tuple[float, ...]
     steps: tuple[tuple[float, ...], ...]
 
-    def half_width(self, x: Sequence[Any], quantiles: Quantiles, ns: Numbers) -> Any:
-        """Return t(ν) se, what the interval of eta reaches to on either side.
+    def half_width(self, x: Sequence[Any], quantiles: Quantiles, ns: ArrayNamespace) -> Any:
+        """Return t(ν) se, the half width of the confidence interval of eta.
 
         With c_e = (x·d_e)², se² = (G-1)/G Σ c scatters like a chi-square number of
         ν = 2 (Σc)²/(Σc² - (Σc)²/G) degrees of freedom (Satterthwaite 1946, Biometrics Bulletin
@@ -76,7 +76,7 @@ class ParameterErrors:
         per_freedom = ns.minimum(ns.maximum(per_freedom, 1.0 / (g - 1.0)), 1.0 / FEWEST_FREEDOMS)
         return quantiles.student_at(per_freedom) * ns.sqrt(total * ((g - 1.0) / g))
 
-    def _variance(self, x: Sequence[Any], ns: Numbers) -> Any:
+    def _variance(self, x: Sequence[Any], ns: ArrayNamespace) -> Any:
         total, k = 0.0, 0
         for i, slope in enumerate(x):
             inner = self.packed_covariance[k + i] * slope
@@ -88,7 +88,7 @@ class ParameterErrors:
 
     @cached_property
     def step_sums(self) -> Callable[..., tuple[float, float]]:
-        """Σ (x·d)² and Σ (x·d)⁴ as a function of the single slopes x.
+        """Return Σ (x·d)² and Σ (x·d)⁴ as a function of the slopes x.
 
         Polynomials of C(k+1, 2) and C(k+3, 4) terms, written out by Horner's rule as one
         expression: for six parameters and 47 earthquakes that takes 3 µs, a loop over the
@@ -114,7 +114,7 @@ class ParameterErrors:
 
 
 def packed(covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """Return a covariance as :class:`ParameterErrors` reads it."""
+    """Return a covariance in the packed form of :class:`ParameterErrors`."""
     return tuple(
         float(covariance[i][j]) * (1.0 if i == j else 2.0)
         for i in range(len(covariance))
@@ -130,7 +130,7 @@ _DEGREE = 12
 
 
 def checked_level(level: object) -> float:
-    """Return a confidence level, or refuse what is none."""
+    """Return a valid confidence level; reject others."""
     if not isinstance(level, int | float) or not 0.0 < level < 1.0:
         raise InputError(
             f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95"
@@ -170,7 +170,7 @@ def quantiles_of(level: float) -> Quantiles:
 
 @lru_cache(maxsize=256)
 def student_half_width(level: float, degrees_of_freedom: float) -> float:
-    """Return t such that a Student number lies within ±t with probability `level`.
+    """Return t such that a Student t variable lies within ±t with probability `level`.
 
     Args:
         level: confidence level, between 0 and 1.
@@ -190,7 +190,7 @@ def student_half_width(level: float, degrees_of_freedom: float) -> float:
 
 
 def _upper_tail(t: float, nu: float) -> tuple[float, float]:
-    """Return the probability of more than t, and the density there.
+    """Return the upper-tail probability beyond t, and the density there.
 
     The tail is I_x(ν/2, 1/2)/2 with x = ν/(ν + t²) (NIST DLMF 8.17.2 and 26.7.1 of Abramowitz and
     Stegun).
@@ -206,7 +206,7 @@ def _upper_tail(t: float, nu: float) -> tuple[float, float]:
 
 
 def _incomplete_beta(a: float, b: float, x: float, rest: float, log_beta: float) -> float:
-    """Return I_x(a, b) by its continued fraction (NIST DLMF 8.17.22), Lentz's way.
+    """Return I_x(a, b) by its continued fraction (NIST DLMF 8.17.22), with Lentz's algorithm.
 
     Args:
         a: first parameter.

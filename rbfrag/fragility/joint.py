@@ -1,4 +1,5 @@
-"""Several blocks in one earthquake, in closed form: how many fail, and whether any does.
+"""Joint failure of several blocks in one earthquake, in closed form: number of failures, and P of
+any.
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
 are exact; the beta-binomial law of both stands for that of the count. Samples are drawn in
@@ -43,7 +44,7 @@ _PAIRS_AT_ONCE = 2**18
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Blocks, and what they share with one another.
+    """Blocks, and the earthquakes, sites and components that they share.
 
     Args:
         l: ln of the frequency parameter p [1/s], shape (n,).
@@ -76,13 +77,13 @@ class Placement:
         component: ArrayLike = 0,
         polarity: ArrayLike = 1,
     ) -> Placement:
-        """Return a placement of values that are broadcast: by default one side of one site."""
+        """Return a placement from broadcast values; by default one side of one site."""
         real = (np.asarray(part, dtype=np.float64) for part in (l, ln_y))
-        whole = (
+        integers = (
             np.asarray(part, dtype=np.int64) for part in (earthquake, site, component, polarity)
         )
         try:
-            parts = np.broadcast_arrays(*(np.atleast_1d(part) for part in (*real, *whole)))
+            parts = np.broadcast_arrays(*(np.atleast_1d(part) for part in (*real, *integers)))
         except ValueError as error:
             raise InputError(
                 f"blocks of a portfolio must have columns of one length: {error}"
@@ -93,7 +94,7 @@ class Placement:
     def of_numbers(
         cls, block: BlockParameters, numbers: Mapping[str, FloatArray], **labels: ArrayLike
     ) -> Placement | None:
-        """Return a placement of blocks by what models read of them; None of ones without a size."""
+        """Return a placement of blocks from their model inputs; None for blocks without a size."""
         if block.size is None:
             return None
         p = np.sqrt(numbers[block.size])
@@ -119,20 +120,20 @@ class Placement:
 
     @property
     def drawn(self) -> NDArray[np.bool_]:
-        """Which blocks have no known azimuth, shape (n,)."""
+        """Blocks of unknown azimuth, shape (n,)."""
         return np.asarray(self.polarity == UNKNOWN)
 
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Placement:
-        """Return some of the blocks."""
+        """Return a subset of the blocks."""
         return Placement(*(part[chosen] for part in vars(self).values()))
 
     def correlation(self, dependence: Dependence) -> FloatArray:
-        """Return R of every two blocks, shape (n, n); azimuths must be known."""
+        """Return the correlation matrix R of the blocks, shape (n, n); azimuths must be known."""
         return dependence.correlation(*vars(self).values())
 
 
 def any_fails(probability: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return P that any block fails under full dependence and if independent, tables x nodes each.
+    """Return P that any block fails, fully dependent and independent, tables x nodes each.
 
     Args:
         probability: P, tables x blocks x nodes.
@@ -194,7 +195,8 @@ def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
 def share_range(
     probability: ArrayLike, law: Dependence, sites: int, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Return between which shares of like blocks fail at some sites of one future earthquake.
+    """Return the prediction interval of the fraction of identical blocks that fail at several sites
+    in one earthquake.
 
     The blocks face all sides: two components times two polarities at each site, m = 4 sites in all.
     Their number is beta-binomial of mean m P and of the variance that Φ₂ gives pairs: of opposite
@@ -212,18 +214,18 @@ def share_range(
 
 
 def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
-    """Return the mean correlation of the failures of two blocks of :func:`share_range`, from 0 on.
+    """Return the mean correlation of the failures of two blocks of :func:`share_range`, at least 0.
 
     Args:
         p: P of one block, any shape.
     """
-    others, site, excess = SIDES * sites - 1.0, law.rho_e + law.rho_s, np.zeros(p.shape)
+    other_blocks, site, excess = SIDES * sites - 1.0, law.rho_e + law.rho_s, np.zeros(p.shape)
     a = ndtri(p)
     for number, r in (
-        (1.0, site + law.rho_v - law.rho_o), (2.0, site), (others - 3.0, law.rho_e)
+        (1.0, site + law.rho_v - law.rho_o), (2.0, site), (other_blocks - 3.0, law.rho_e)
     ):  # fmt: skip
         if number:
-            excess += number / others * joint_excess(a, a, r)
+            excess += number / other_blocks * joint_excess(a, a, r)
     alone = p * (1.0 - p)
     rho = np.divide(excess, alone, out=np.zeros(p.shape), where=alone > 0.0)
     return np.clip(rho, _LEAST_RHO, _MOST_RHO)
@@ -232,7 +234,7 @@ def overdispersion(p: FloatArray, law: Dependence, sites: int) -> FloatArray:
 def beta_binomial_quantiles(
     n: int, share: FloatArray, rho: FloatArray, q: FloatArray
 ) -> FloatArray:
-    """Return the smallest numbers of n that are not exceeded with probabilities q, shape (q, …).
+    """Return quantiles q of the beta-binomial number of failures among n, shape (q, …).
 
     Args:
         share: mean over n, any shape.
@@ -243,13 +245,13 @@ def beta_binomial_quantiles(
     ways = -np.log(n + 1.0) - betaln(n - k + 1.0, k + 1.0)
     at_once = max(1, _PAIRS_AT_ONCE // (n + 1))
     for start in range(0, flat.size, at_once):
-        some = slice(start, start + at_once)
-        alpha = (flat[some] * more[some])[:, None]
-        beta = more[some, None] - alpha
+        chunk = slice(start, start + at_once)
+        alpha = (flat[chunk] * more[chunk])[:, None]
+        beta = more[chunk, None] - alpha
         with np.errstate(invalid="ignore"):
             chance = np.exp(ways + betaln(k + alpha, n - k + beta) - betaln(alpha, beta))
         below = np.cumsum(chance, axis=1)
-        result[:, some] = [(below < each).sum(axis=1) for each in q]
+        result[:, chunk] = [(below < level).sum(axis=1) for level in q]
     result = np.where((flat > 0.0) & (flat < 1.0), np.minimum(result, n), n * flat)
     return result.reshape(q.shape + share.shape)
 
@@ -260,7 +262,7 @@ def count_moments(
     dependence: Dependence,
     weights: ArrayLike | None = None,
 ) -> tuple[float, float]:
-    """Return mean and variance of the weighted number of failures, exactly.
+    """Return the exact mean and variance of the weighted number of failures.
 
         E = Σ w_i P_i,   Var = Σ w_i² P_i (1-P_i) + 2 Σ_{i<j} w_i w_j [Φ₂(a_i, a_j; R_ij) - P_i P_j]
 
@@ -273,13 +275,13 @@ def count_moments(
     p, w = checked(probability, blocks, weights)
     variance = float((w * w * p * (1.0 - p)).sum())
     for number in np.unique(blocks.earthquake):
-        some = np.flatnonzero(blocks.earthquake == number)
-        variance += 2.0 * _shared_variance(p[some], w[some], blocks.only(some), dependence)
+        rows = np.flatnonzero(blocks.earthquake == number)
+        variance += 2.0 * _shared_variance(p[rows], w[rows], blocks.only(rows), dependence)
     return float(p @ w), variance
 
 
 def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
-    """Return the sum of covariances over all pairs of blocks of one earthquake."""
+    """Return the sum of covariances over all pairs of blocks in one earthquake."""
     a, n, total = ndtri(p), blocks.size, 0.0
     rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
     for start in range(0, n, rows):
@@ -292,7 +294,7 @@ def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Depen
 def pair_excess(
     a: FloatArray, b: FloatArray, blocks: Placement, i: Indices, j: Indices, law: Dependence
 ) -> FloatArray:
-    """Return the covariance of the failures of pairs of one earthquake, shape (pairs,).
+    """Return the covariance of the failures of pairs in one earthquake, shape (pairs,).
 
     Of a block with unknown azimuth it is the mean over the azimuths: another component in half of
     the cases, else the same or the opposite side.
@@ -306,13 +308,13 @@ def pair_excess(
     r, either, sides = pair_correlations(blocks, i, j, law)
     excess = joint_excess(a, b, r)
     if either.any():
-        own = sum(joint_excess(a[either], b[either], side) for side in sides)
-        excess[either] = 0.5 * excess[either] + 0.25 * own
+        by_side = sum(joint_excess(a[either], b[either], side) for side in sides)
+        excess[either] = 0.5 * excess[either] + 0.25 * by_side
     return excess
 
 
 def least_and_greatest(blocks: Placement, law: Dependence) -> tuple[float, float]:
-    """Return the least and the greatest R that two of some blocks of one earthquake may have."""
+    """Return the minimum and maximum R of two blocks in one earthquake."""
     r, _, sides = pair_correlations(blocks, *np.triu_indices(blocks.size, 1), law)
     ways = np.concatenate([r, *sides])
     return float(ways.min(initial=1.0)), float(ways.max(initial=-1.0))
@@ -321,7 +323,7 @@ def least_and_greatest(blocks: Placement, law: Dependence) -> tuple[float, float
 def pair_correlations(
     blocks: Placement, i: Indices, j: Indices, law: Dependence
 ) -> tuple[FloatArray, NDArray[np.bool_], list[FloatArray]]:
-    """Return R of pairs, which of them may face either way, and their R on both ways.
+    """Return R of pairs, the pairs that may face either way, and their R for both ways.
 
     The first R of these is that of different components.
     """
@@ -330,9 +332,9 @@ def pair_correlations(
     sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
     either = site & (sign == UNKNOWN)
     component = site & ~either & (blocks.component[i] == blocks.component[j])
-    here = np.ones(int(either.sum()), dtype=np.bool_)
+    is_same = np.ones(int(either.sum()), dtype=np.bool_)
     sides = [
-        law.of_pairs(d_l[either], d_y[either], here, here, np.full(here.size, side))
+        law.of_pairs(d_l[either], d_y[either], is_same, is_same, np.full(is_same.size, side))
         for side in (-1.0, 1.0)
     ]
     return law.of_pairs(d_l, d_y, site, component, sign), either, sides
@@ -341,7 +343,7 @@ def pair_correlations(
 def checked(
     probability: ArrayLike, blocks: Placement, weights: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return P and weights of the blocks, each of shape (n,).
+    """Return P and weights of the blocks, each of shape (n,); reject invalid ones.
 
     Raises:
         InputError: their numbers are not that of the blocks, or a value makes no sense.
@@ -359,7 +361,7 @@ def checked(
 
 
 def count_quantiles(n: int, mean: float, variance: float, q: ArrayLike) -> IntArray:
-    """Return numbers of failures among n blocks that are not exceeded with probabilities q.
+    """Return quantiles q of the number of failures among n blocks.
 
     The law is beta-binomial, of this mean and variance: ρ = 1/(α + β + 1) solves
     Var = n π(1-π)(1 + (n-1)ρ), π = mean/n. Blocks of unlike P that are nearly independent scatter
@@ -378,6 +380,6 @@ def count_quantiles(n: int, mean: float, variance: float, q: ArrayLike) -> IntAr
         counts = beta_binomial_quantiles(n, *law, levels.ravel()).reshape(levels.shape)
     else:  # of whole blocks: the mean stays
         p = 1.0 - variance / mean
-        whole = int(np.clip(np.ceil(mean / p if p > 0.0 else n), np.ceil(mean), n))
-        counts = binom.ppf(levels, whole, mean / whole)
+        trials = int(np.clip(np.ceil(mean / p if p > 0.0 else n), np.ceil(mean), n))
+        counts = binom.ppf(levels, trials, mean / trials)
     return np.asarray(np.rint(counts), dtype=np.int64)

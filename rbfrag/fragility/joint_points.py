@@ -1,4 +1,5 @@
-"""Z of the copula at points of low discrepancy: quadrature over what blocks share.
+"""Quasi-Monte Carlo points of the latent variables Z of the copula: quadrature over what blocks
+share.
 
 A sample of `rbfrag.fragility.joint_sampling` scatters by the root of its size. The same normals on
 scrambled Sobol points (Owen 1998), the principal components of what blocks share first, cover their
@@ -34,7 +35,7 @@ _LEAST_SHARE = 1e-13
 
 @lru_cache(maxsize=4)
 def _even_normals(power: int, seed: int) -> FloatArray:
-    """Return normals of low discrepancy, `MOST_EVEN` x points of all scrambles: one set for all."""
+    """Return low-discrepancy normals, `MOST_EVEN` x points of all scrambles: one set for all."""
     from scipy.stats.qmc import Sobol
 
     drawn = [
@@ -47,14 +48,15 @@ def _even_normals(power: int, seed: int) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _first_sides(power: int, seed: int, rows: int) -> NDArray[np.int8]:
-    """Return the side that each of some blocks faces first, rows x points."""
+    """Return the first side that each block faces, rows x points."""
     generator = np.random.default_rng([seed, rows])
     return generator.integers(SIDES, size=(rows, REPLICATES << power), dtype=np.int8)
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One Gaussian field of a group of blocks: what an earthquake, site or component adds to Z.
+    """One Gaussian field of a group of blocks: the contribution of an earthquake, site or component
+    to Z.
 
     Args:
         kind: row of the values that it adds to: common, symmetric, antisymmetric.
@@ -69,7 +71,7 @@ class _Part:
 
 
 class LatentPoints:
-    """Z of some blocks at points of low discrepancy, the same whenever asked.
+    """Z of blocks at low-discrepancy points, reproducible.
 
     A block of unknown azimuth has a Z for each of the four sides that it may face, all equally
     likely; one of known azimuth has the same in all four.
@@ -96,7 +98,7 @@ class LatentPoints:
         return REPLICATES << self._power
 
     def sides(self) -> tuple[FloatArray, NDArray[np.int8]]:
-        """Return Z on each side that blocks may face, and the side that each faces first.
+        """Return Z on each side that blocks may face, and the first side of each.
 
         Sides are four where an azimuth is not known, else one; turned by one after another, each
         block faces each of its sides once.
@@ -116,13 +118,17 @@ class LatentPoints:
         common, symmetric, antisymmetric = field
         symmetric += common[0]
         z = np.stack([symmetric[k // 2] + q * antisymmetric[k // 2] for k, q in _SIDES[:ways]])
-        known = ~drawn
-        z[:, known] = (symmetric[0] + blocks.polarity[:, None] * antisymmetric[0])[known]
+        has_azimuth = ~drawn
+        z[:, has_azimuth] = (symmetric[0] + blocks.polarity[:, None] * antisymmetric[0])[
+            has_azimuth
+        ]
         rows = max(n, MOST_EVEN)  # one set for all but large sites
         return z, _first_sides(self._power, self._seed, rows)[:n]
 
     def _normals(self) -> FloatArray:
-        """Return independent normals, the most important of low discrepancy, rank x points."""
+        """Return independent normals, low-discrepancy for the most important coordinates, rank x
+        points.
+        """
         normal, more = _even_normals(self._power, self._seed), self._coordinate.size - MOST_EVEN
         if more <= 0:
             return normal
@@ -135,7 +141,7 @@ _SIDES = tuple(enumerate((1, -1) * COMPONENTS))
 
 
 def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:
-    """Yield the fields that Z is the sum of."""
+    """Yield the fields whose sum is Z."""
     everyone = np.arange(blocks.size)
     for earthquake in np.unique(blocks.earthquake):
         shaken = everyone[blocks.earthquake == earthquake]
@@ -144,23 +150,25 @@ def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:
         share = law.rho_e + (law.rho_s if single else 0.0)
         yield from _part(blocks, 0, shaken, [np.zeros_like(shaken)], share, law.l_e)
         for site in sites:
-            here = shaken[blocks.site[shaken] == site]
+            members = shaken[blocks.site[shaken] == site]
             if not single:
-                yield from _part(blocks, 0, here, [np.zeros_like(here)], law.rho_s, law.l_e)
-            yield from _of_components(law, blocks, here)
+                yield from _part(blocks, 0, members, [np.zeros_like(members)], law.rho_s, law.l_e)
+            yield from _of_components(law, blocks, members)
 
 
-def _of_components(law: Dependence, blocks: Placement, here: Indices) -> Iterator[_Part]:
-    """Yield what the components of a site add; blocks of unknown azimuth are of both."""
-    drawn, known = blocks.drawn[here], blocks.component[here]
+def _of_components(law: Dependence, blocks: Placement, members: Indices) -> Iterator[_Part]:
+    """Yield the contributions of the components of a site; blocks of unknown azimuth belong to
+    both.
+    """
+    drawn, components = blocks.drawn[members], blocks.component[members]
     slots: dict[bytes, tuple[Indices, list[Indices]]] = {}
-    for number, name in enumerate(range(COMPONENTS) if drawn.any() else np.unique(known)):
-        own = here[drawn | (known == name)]
-        slot = np.where(blocks.drawn[own], number, 0)
-        slots.setdefault(own.tobytes(), (own, []))[1].append(slot)
-    for own, several in slots.values():
+    for number, name in enumerate(range(COMPONENTS) if drawn.any() else np.unique(components)):
+        rows = members[drawn | (components == name)]
+        slot = np.where(blocks.drawn[rows], number, 0)
+        slots.setdefault(rows.tobytes(), (rows, []))[1].append(slot)
+    for rows, several in slots.values():
         for kind, share, length in ((1, law.rho_v, law.l_v), (2, law.rho_o, law.l_o)):
-            yield from _part(blocks, kind, own, several, share, length, law.l_y)
+            yield from _part(blocks, kind, rows, several, share, length, law.l_y)
 
 
 def _part(
@@ -172,7 +180,7 @@ def _part(
     length: float,
     length_y: float = np.inf,
 ) -> Iterator[_Part]:
-    """Yield independent fields of one law, one for each of some rows of slots."""
+    """Yield independent fields of one covariance, one for each row of slots."""
     if share > 0.0 and member.size:
         x, y = blocks.l[member] / length, blocks.ln_y[member] / length_y
         loading = np.sqrt(share) * _loading(x, y)
@@ -198,15 +206,15 @@ def _loading(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _pivoted_root(kernel: Callable[[Indices], FloatArray], size: int) -> FloatArray:
-    """Return `MOST_RANK` columns of the Cholesky factor, greatest remaining variance first.
+    """Return `MOST_RANK` columns of the pivoted Cholesky factor.
 
     The pivoted factorization of Harbrecht, Peters and Schneider (2012).
     """
-    root, left = np.zeros((size, MOST_RANK)), np.ones(size)
+    root, variance = np.zeros((size, MOST_RANK)), np.ones(size)
     for k in range(MOST_RANK):
-        pivot = int(left.argmax())
+        pivot = int(variance.argmax())
         column = kernel(np.array([pivot]))[:, 0] - root[:, :k] @ root[pivot, :k]
-        root[:, k] = column / np.sqrt(left[pivot])
-        left = np.maximum(left - root[:, k] ** 2, 0.0)
-        left[pivot] = 0.0
+        root[:, k] = column / np.sqrt(variance[pivot])
+        variance = np.maximum(variance - root[:, k] ** 2, 0.0)
+        variance[pivot] = 0.0
     return root

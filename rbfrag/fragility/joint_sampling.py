@@ -1,4 +1,5 @@
-"""Samples of which blocks fail in one earthquake, by the copula of `rbfrag.fragility.dependence`.
+"""Random samples of joint failures in one earthquake, by the copula of
+`rbfrag.fragility.dependence`.
 
 The parts of Z are drawn one by one: what an earthquake and a site share are Ornstein-Uhlenbeck
 processes in l = ln p, what a component shares is a product of two, in l and ln y. Cost and memory
@@ -31,7 +32,7 @@ _VALUES_AT_ONCE = 2**21
 
 
 class JointSampler:
-    """Draws which of some blocks fail, as often as asked.
+    """Random generator of joint failures of blocks in one earthquake.
 
     Blocks that are equal in all that a placement says have the same Z: they fail together if P is
     the same.
@@ -66,11 +67,11 @@ class JointSampler:
         antisymmetric = np.sqrt(law.rho_o) * self._antisymmetric.draw(draws, generator)
         z = np.empty((SIDES if second.size else 1, draws, n))
         for k in range(z.shape[0]):
-            own = np.arange(n)
+            columns = np.arange(n)
             if k >= SIDES // COMPONENTS:
-                own[second] = np.arange(n, n + second.size)
+                columns[second] = np.arange(n, n + second.size)
             facing = np.where(self._blocks.drawn, 1 - 2 * (k % 2), self._blocks.polarity)
-            z[k] = common + symmetric[:, own] + facing * antisymmetric[:, own]
+            z[k] = common + symmetric[:, columns] + facing * antisymmetric[:, columns]
         return z
 
     def normals(self, draws: int, generator: np.random.Generator) -> FloatArray:
@@ -98,7 +99,9 @@ def _cholesky(r: FloatArray) -> FloatArray:
 
 
 def _unlike(*columns: NDArray[np.generic]) -> tuple[Indices, Indices]:
-    """Return where unlike rows stand, sorted by the columns, and which of them each row is."""
+    """Return the indices of distinct rows, sorted by the columns, and the inverse index of each
+    row.
+    """
     order = np.lexsort(columns[::-1])
     new = np.zeros(order.size, dtype=np.bool_)
     new[:1] = True
@@ -123,18 +126,18 @@ class _Line:
 
     def draw(self, draws: int, generator: np.random.Generator) -> FloatArray:
         """Return the values at x, shape (draws, n)."""
-        value = generator.standard_normal((self._steps.kept.size, draws))
+        value = generator.standard_normal((self._steps.correlation.size, draws))
         for at in self._ranks[1:]:
             value[at] *= self._steps.new[at, None]
-            value[at] += self._steps.kept[at, None] * value[at - 1]
+            value[at] += self._steps.correlation[at, None] * value[at - 1]
         return np.asarray(value.T[:, self._node])
 
 
 @dataclass(frozen=True, eq=False)
 class _Transitions:
-    """From node to node of an Ornstein-Uhlenbeck process: what is kept, and what is new."""
+    """Transitions between nodes of an Ornstein-Uhlenbeck process: correlation and innovation."""
 
-    kept: FloatArray
+    correlation: FloatArray
     new: FloatArray
 
     @classmethod
@@ -144,7 +147,7 @@ class _Transitions:
 
 
 def _by_rank(starts: NDArray[np.bool_]) -> list[Indices]:
-    """Return the rows that stand first in their groups, those that stand second, and so on."""
+    """Return the first rows of all groups, then the second rows, and so on."""
     row = np.arange(starts.size)
     rank = row - np.maximum.accumulate(np.where(starts, row, 0))
     order = np.argsort(rank, kind="stable")
@@ -195,19 +198,19 @@ class _Surface:
         for rows, factor in self._factors:
             noise = generator.standard_normal((*rows.shape, draws))
             value[:, rows] = np.moveaxis(factor @ noise, -1, 0)
-        for rows, one, other in self._grids:
-            shape = one.kept.size, other.kept.size
+        for rows, first, other in self._grids:
+            shape = first.correlation.size, other.correlation.size
             at_once = max(1, _VALUES_AT_ONCE // (shape[0] * shape[1]))
             for start in range(0, draws, at_once):
                 field = generator.standard_normal((*shape, min(at_once, draws - start)))
-                one.run(field)
+                first.run(field)
                 other.run(field.swapaxes(0, 1))
-                value[start : start + at_once, rows] = field[one.node, other.node].T
+                value[start : start + at_once, rows] = field[first.node, other.node].T
         return value[:, self._node]
 
 
 def _portions(rows: Indices) -> Iterator[Indices]:
-    """Yield groups in numbers whose matrices together stay within memory."""
+    """Yield groups in batches whose matrices stay within memory."""
     at_once = max(1, _VALUES_AT_ONCE // rows.shape[1] ** 2)
     for start in range(0, rows.shape[0], at_once):
         yield rows[start : start + at_once]
@@ -215,7 +218,7 @@ def _portions(rows: Indices) -> Iterator[Indices]:
 
 @dataclass(frozen=True, eq=False)
 class _Axis(_Transitions):
-    """Nodes of one variable of a grid, and at which each point stands."""
+    """Nodes of one variable of a grid, and the node of each point."""
 
     node: Indices
 
@@ -228,10 +231,10 @@ class _Axis(_Transitions):
             nodes = np.linspace(nodes[0], nodes[-1], enough)
             node = np.rint((x - nodes[0]) / max(span, 1e-300) * (enough - 1)).astype(np.intp)
         steps = _Transitions.of(np.diff(nodes, prepend=0.0), length)
-        return cls(steps.kept, steps.new, node)
+        return cls(steps.correlation, steps.new, node)
 
     def run(self, noise: FloatArray) -> None:
-        """Make independent normals, first axis along the nodes, a process along them."""
-        for k in range(1, self.kept.size):
+        """Transform independent normals, first axis along the nodes, into the process."""
+        for k in range(1, self.correlation.size):
             noise[k] *= self.new[k]
-            noise[k] += self.kept[k] * noise[k - 1]
+            noise[k] += self.correlation[k] * noise[k - 1]

@@ -1,4 +1,4 @@
-"""How many of very many blocks fail in one earthquake, without a draw of each.
+"""Number of failures among very many blocks in one earthquake, without simulating each block.
 
 Given what an earthquake shares, E(l), failures of different sites are independent: their number has
 the mean Σ Φ((a - √ρ E)/√(1-ρ)) and a variance to which pairs of one site add. Drawn is E, and then
@@ -30,7 +30,7 @@ _LEAST, _LITTLE = 1e-12, 1e-7
 
 
 class LatentEvent(NamedTuple):
-    """What samples of an earthquake share.
+    """Latent variables shared by all blocks of an earthquake.
 
     Args:
         value: E at the nodes, draws x nodes.
@@ -42,7 +42,7 @@ class LatentEvent(NamedTuple):
 
 
 class LargeCounts:
-    """Draws how many of many blocks of one earthquake fail.
+    """Random generator of the number of failures among many blocks in one earthquake.
 
     Args:
         blocks: rows of like blocks of unknown azimuths, those of one site together.
@@ -63,7 +63,7 @@ class LargeCounts:
         self._of_site = np.repeat(np.add.reduceat(count, starts), number)
 
     def latent(self, draws: int, generator: np.random.Generator) -> LatentEvent:
-        """Return what samples of one earthquake share."""
+        """Return the shared latent variables of the samples of one earthquake."""
         value = generator.standard_normal((draws, NODES)) @ self._factor.T
         return LatentEvent(value, int(generator.integers(1 << 62)))
 
@@ -74,7 +74,7 @@ class LargeCounts:
         latent: LatentEvent,
         marks: Sequence[tuple[FloatArray, FloatArray]],
     ) -> tuple[FloatArray, float]:
-        """Return sums of marks over the blocks that fail in each sample, and P that any fails.
+        """Return sums of marks over the failed blocks of each sample, and P that any fails.
 
         Args:
             bound: Φ⁻¹ of P of a block of each row, shape (m,).
@@ -99,13 +99,13 @@ class LargeCounts:
         many, mean, node = summed(self._count)[used], mean[used], used % NODES
         a = ndtri(mean / many)
 
-        def given(value: FloatArray) -> FloatArray:
+        def conditional_p(value: FloatArray) -> FloatArray:
             return np.asarray(ndtr((a - np.sqrt(rho) * value) / np.sqrt(1.0 - rho)))
 
-        at_levels = given(_LEVELS[:, None])
+        at_levels = conditional_p(_LEVELS[:, None])
         alone = (at_levels * (1.0 - at_levels)) @ many
         more = self._of_pairs(bound, number, common, rho) / np.maximum(alone, _LEAST)
-        q = given(latent.value[:, node])
+        q = conditional_p(latent.value[:, node])
         mean_of = q @ many
         order = np.argsort(at_levels @ many)
         shared = np.interp(mean_of, (at_levels @ many)[order], more[order])
@@ -114,20 +114,21 @@ class LargeCounts:
         failures, none = _number(mean_of, variance, generator)
         result = np.empty((len(marks), failures.size))
         for row, (mark, square) in zip(result, marks, strict=True):
-            one, squares = (
-                q @ (many * summed(number * each)[used] / mean) / mean_of for each in (mark, square)
+            mean_mark, squares = (
+                q @ (many * summed(number * moment)[used] / mean) / mean_of
+                for moment in (mark, square)
             )
-            row[:] = failures * one
-            scatter = np.maximum(squares - one * one, 0.0)
-            some = (failures > 0) & (scatter > _LEAST * one * one)
-            shape = failures[some] * one[some] ** 2 / scatter[some]
-            row[some] *= generator.standard_gamma(shape) / shape
+            row[:] = failures * mean_mark
+            scatter = np.maximum(squares - mean_mark * mean_mark, 0.0)
+            is_random = (failures > 0) & (scatter > _LEAST * mean_mark * mean_mark)
+            shape = failures[is_random] * mean_mark[is_random] ** 2 / scatter[is_random]
+            row[is_random] *= generator.standard_gamma(shape) / shape
         return result, float(1.0 - none.mean())
 
     def _of_pairs(
         self, bound: FloatArray, number: FloatArray, common: float, rho: float
     ) -> FloatArray:
-        """Return what pairs of one site add to the variance at the levels of E, shape (levels,).
+        """Return the variance from pairs at one site at the levels of E, shape (levels,).
 
         Each of some blocks, the more likely the more it fails, stands for all, with one other of
         its site for all others.
@@ -135,11 +136,15 @@ class LargeCounts:
         law, blocks, generator = self._law, self._blocks, np.random.default_rng(0)
         below = np.cumsum(number)
         i = np.searchsorted(below, below[-1] * (np.arange(_PAIRS) + 0.5) / _PAIRS)
-        others = self._of_site[i] - 1
-        own = self._last[i] - 1 - self._from[i]
-        other = np.floor((generator.permutation(_PAIRS) + 0.5) / _PAIRS * others).astype(np.int64)
-        other += other >= own
-        j = np.searchsorted(self._last, self._from[i] + np.minimum(other, others), side="right")
+        other_blocks = self._of_site[i] - 1
+        position = self._last[i] - 1 - self._from[i]
+        other = np.floor((generator.permutation(_PAIRS) + 0.5) / _PAIRS * other_blocks).astype(
+            np.int64
+        )
+        other += other >= position
+        j = np.searchsorted(
+            self._last, self._from[i] + np.minimum(other, other_blocks), side="right"
+        )
         apart, _, (opposite, same) = pair_correlations(blocks, i, j, law)
         event = law.rho_e * np.exp(-np.abs(blocks.l[i] - blocks.l[j]) / law.l_e)
         total = np.zeros(_LEVELS.size)
@@ -149,14 +154,14 @@ class LargeCounts:
                 (bound[k] - np.sqrt(rho) * _LEVELS[:, None]) / np.sqrt(1.0 - rho) for k in (i, j)
             )
             excess = joint_excess(a, b, np.clip(within, -1.0, 1.0))
-            total += weight * (excess * others / ndtr(bound[i])).sum(axis=1)
+            total += weight * (excess * other_blocks / ndtr(bound[i])).sum(axis=1)
         return np.asarray(total * below[-1] / _PAIRS)
 
 
 def _number(
     mean: FloatArray, variance: FloatArray, generator: np.random.Generator
 ) -> tuple[IntArray, FloatArray]:
-    """Return numbers of these means and variances, and the probability that each is 0."""
+    """Return random counts with these means and variances, and the probability of zero."""
     wide = variance > mean * (1.0 + 1e-9)
     mean = np.maximum(mean, _LEAST)
     size = np.where(wide, mean * mean / np.where(wide, variance - mean, 1.0), 1.0)

@@ -1,4 +1,4 @@
-"""Which fragility model answers."""
+"""Selection of the fragility model for a prediction."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ _Stamp = tuple[int, ...]
 
 
 def data_name(place: str) -> str:
-    """Return what answers call a database: its name, without folder, server or password."""
+    """Return the display name of a database, without folder, server or password."""
     return place if place == SHIPPED else place.partition("?")[0].rpartition("/")[2]
 
 
 @dataclass(frozen=True, eq=False)
 class _Store:
-    """The models of one place.
+    """Models of one database.
 
     Args:
         place: its name in messages.
@@ -60,15 +60,15 @@ class _Store:
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
     def row(self, name: str) -> ModelRow:
-        """Return one of its models as it is stored."""
+        """Return a stored model by name."""
         for row in self.rows:
             if row.name == name:
                 return row
-        known = sorted(row.name for row in self.rows)
-        raise UnknownModelError(unknown_model(name, known, self.place))
+        names = sorted(row.name for row in self.rows)
+        raise UnknownModelError(unknown_model(name, names, self.place))
 
     def model(self, row: ModelRow) -> FragilityModel:
-        """Return one of its models, ready to answer."""
+        """Return a model ready for predictions."""
         model = self.models.get(row.name)
         if model is None:
             model = self.models[row.name] = FragilityModel.from_row(row, data_name(self.place))
@@ -81,21 +81,21 @@ _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
 
-def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters:
-    """Return what a question describes its block by; toppling where that does not tell.
+def block_of(names: Collection[str], kind: str | None = None) -> BlockParameters:
+    """Return the block parameters that the input names describe; toppling if ambiguous.
 
     Args:
-        given: names of what it gives.
+        names: names of what it gives.
         kind: how the block is asked to fail, if the question says so.
     """
-    described = {name for name in given if name not in MEASURES}
+    described = {name for name in names if name not in MEASURES}
     toppling = kind is None or kind == TOPPLING_BLOCK.kind
     if toppling and described <= {*TOPPLING_BLOCK.names, *TOPPLING_BLOCK.sigmas}:
         return TOPPLING_BLOCK  # without loading the methods
     blocks = dict.fromkeys((TOPPLING_BLOCK, *(method.block for method in methods())))
 
     def read(block: BlockParameters) -> int:
-        return len({*block.names, *block.options}.intersection(given))
+        return len({*block.names, *block.options}.intersection(names))
 
     of_kind = [block for block in blocks if block.kind == kind and read(block)]
     # the first of those that read most of what is said
@@ -104,20 +104,20 @@ def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters
 
 def find_model(
     model: Model | None,
-    given: Collection[str],
+    names: Collection[str],
     db: str | PathLike[str] | None = None,
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
 ) -> FragilityModel:
-    """Return the model that answers for a block and the given measures of the motion.
+    """Return the model for a block and the given intensity measures.
 
     Of the stored models that the measures suffice for, one on X(p) answers if there is one, then
     the database's default, else the one of the least log loss on earthquakes left out.
 
     Args:
         model: a model, the name of a stored one, or None.
-        given: names of what is known of block and motion (``p2``, ``kr``, ``pgv_m_s``, …).
+        names: names of what is known of block and motion (``p2``, ``kr``, ``pgv_m_s``, …).
         db: database; None for ``RBFRAG_DB``, or else ``rbfrag.db`` in the current folder, or
             else the built-in data set.
         kind: how the block fails; None for what it is given by, or what the model is of.
@@ -131,7 +131,7 @@ def find_model(
     if type(model) is FragilityModel:
         chosen = model
     elif model is None:
-        return suited_models(given, db, kind=kind, rotation_deg=rotation_deg)[0]
+        return suited_models(names, db, kind=kind, rotation_deg=rotation_deg)[0]
     elif isinstance(model, str):
         store = _store(db)
         chosen = store.model(store.row(model))
@@ -144,8 +144,8 @@ def find_model(
     if kind is not None and chosen.row.kind != kind:
         raise InputError(f"model {chosen.name!r} is of kind {chosen.kind}, not {kind}")
     block = chosen.method.block
-    if not MEASURES.issuperset(given):  # of measures alone the caller has the block
-        check_numbers(chosen.kind, block, given, chosen)
+    if not MEASURES.issuperset(names):  # of measures alone the caller has the block
+        check_numbers(chosen.kind, block, names, chosen)
     if block.criterion is not None or rotation_deg is not None:
         _check_criterion(chosen.kind, block, rotation_deg)
         if chosen.criterion != rotation_deg:
@@ -154,10 +154,10 @@ def find_model(
                 f"{_failure(rotation_deg)}"
             )
     for name in chosen.term.inputs:
-        if name not in given:
+        if name not in names:
             raise InputError(
                 f"model {chosen.name!r} requires {' and '.join(chosen.term.inputs)} "
-                f"({chosen.term.title}); given: {_measures(given)}. Add it, or choose a model of "
+                f"({chosen.term.title}); given: {_measures(names)}. Add it, or choose a model of "
                 "another term",
                 fields=INTENSITY,
             )
@@ -165,46 +165,46 @@ def find_model(
 
 
 def suited_models(
-    given: Collection[str],
+    names: Collection[str],
     db: str | PathLike[str] | None = None,
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
 ) -> list[FragilityModel]:
-    """Return one stored model for each term that the measures suffice for, the recommended first.
+    """Return one stored model for each suitable set of intensity measures, the recommended first.
 
     Arguments as for :func:`find_model`.
     """
-    store, key = _store(db), (tuple(given), kind, rotation_deg)
+    store, key = _store(db), (tuple(names), kind, rotation_deg)
     if key not in store.suited:
         store.suited[key] = _suited_in(store, *key)
     return [*store.suited[key]]
 
 
-def unused_measures(model: FragilityModel, given: Collection[str]) -> tuple[Diagnostic, ...]:
-    """Return warnings about measures that are given and that a model does not use."""
+def unused_measures(model: FragilityModel, names: Collection[str]) -> tuple[Diagnostic, ...]:
+    """Return warnings about intensity measures that a model does not use."""
     read = model.term.inputs
     return tuple(
         Diagnostic(
             f"{name} was not used: model {model.name} reads {' and '.join(read)}",
             "unused_measures",
         )
-        for name in given
+        for name in names
         if name in MEASURES and name not in read
         if name not in ABOUT_SCATTER or SCATTERED.get(name, read[0]) not in read
     )
 
 
 def _suited_in(
-    store: _Store, given: tuple[str, ...], kind: str | None, rotation_deg: float | None
+    store: _Store, names: tuple[str, ...], kind: str | None, rotation_deg: float | None
 ) -> list[FragilityModel]:
-    possible = terms_from(given)
+    possible = terms_from(names)
     if not possible:
         raise InputError(
-            f"{_measures(given)} is given: a prediction requires {_enough(TERMS)}, or a motion",
+            f"{_measures(names)} is given: a prediction requires {_enough(TERMS)}, or a motion",
             fields=INTENSITY,
         )
-    block_of_question = block_of(given)
+    block_of_question = block_of(names)
     kind = block_of_question.kind if kind is None else kind
     if not store.rows:
         raise UnknownModelError(unknown_model(None, [], store.place))
@@ -215,8 +215,8 @@ def _suited_in(
     of_kind = [row for row in of_kind if row.name not in named]
     suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
     block = store.model(suited[0]).method.block if suited else block_of_question
-    if not MEASURES.issuperset(given):
-        check_numbers(kind, block, given)
+    if not MEASURES.issuperset(names):
+        check_numbers(kind, block, names)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
     for row in suited:
@@ -234,10 +234,10 @@ def _suited_in(
             )
             raise UnknownModelError(
                 f"no stored {kind} model of {_failure(rotation_deg)} works with "
-                f"{_measures(given)}; the stored models are for {have}"
+                f"{_measures(names)}; the stored models are for {have}"
             )
         raise InputError(
-            f"no stored {kind} model works with {_measures(given)}: give "
+            f"no stored {kind} model works with {_measures(names)}: give "
             f"{_enough(row.term for row in of_kind)}{_or_fit(kind, possible)}"
             + (f"; {' and '.join(named)}: by name alone" if named else ""),
         )
@@ -258,12 +258,12 @@ def _suited_in(
 
 def _or_fit(kind: str, terms: Iterable[str]) -> str:
     fitted = {name for method in methods() if method.block.kind == kind for name in method.forms}
-    known = [name for name in terms if name in fitted and not TERMS[name].by_name]
-    return f", or fit a model of {' or '.join(known)}" if known else ""
+    suitable = [name for name in terms if name in fitted and not TERMS[name].by_name]
+    return f", or fit a model of {' or '.join(suitable)}" if suitable else ""
 
 
 def _enough(terms: Iterable[str]) -> str:
-    """Return in words what suffices for one of some terms."""
+    """Describe the intensity measures that suffice for any of the terms."""
     return ", or ".join(" and ".join(inputs) for inputs in least_inputs(terms))
 
 
@@ -277,7 +277,7 @@ def _how_to_make(kind: str) -> str:
 
 
 def _merit(row: ModelRow) -> tuple[bool, float]:
-    """Return what sorts models of one term, the best first, as far as their rows tell."""
+    """Return the sort key of models of one term, the best first."""
     return not row.is_default, held_out_loss(row)
 
 
@@ -285,24 +285,24 @@ SIDES = ("height_m", "width_m")
 
 
 def check_numbers(
-    kind: str, block: BlockParameters, given: Collection[str], model: FragilityModel | None = None
+    kind: str, block: BlockParameters, names: Collection[str], model: FragilityModel | None = None
 ) -> None:
-    """Refuse a question that describes its block in another way than a kind needs it.
+    """Reject inputs that do not describe a block of this kind.
 
     Args:
         kind: how the block fails.
         block: what describes such a block.
-        given: names of what is given of block and shaking.
+        names: names of what is given of block and shaking.
         model: the model that is asked for, if it decides about the kind.
     """
-    missing = [name for name in block.names if name not in given]
-    own = {*block.names, *block.options, *block.sigmas}
-    others = [name for name in given if name not in MEASURES and name not in own]
-    if others and len(missing) == len(block.names):
-        who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
+    missing = [name for name in block.names if name not in names]
+    accepted = {*block.names, *block.options, *block.sigmas}
+    unexpected = [name for name in names if name not in MEASURES and name not in accepted]
+    if unexpected and len(missing) == len(block.names):
+        subject = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
         raise InputError(
-            f"{who} uses {' and '.join(block.names)}, not {' and '.join(others)}",
-            fields=(*block.names, *others),
+            f"{subject} uses {' and '.join(block.names)}, not {' and '.join(unexpected)}",
+            fields=(*block.names, *unexpected),
         )
     if missing:
         raise InputError(
@@ -310,14 +310,14 @@ def check_numbers(
             f"{' and '.join(block.names)}, or by its shape, such as {' and '.join(SIDES)}",
             fields=(*block.names, *SIDES),
         )
-    if others:
+    if unexpected:
         raise InputError(
-            f"{others[0]} cannot be combined with kind {kind}: omit it", fields=(others[0],)
+            f"{unexpected[0]} cannot be combined with kind {kind}: omit it", fields=(unexpected[0],)
         )
 
 
 def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | None) -> None:
-    """Refuse a criterion of failure that blocks of a kind do not have."""
+    """Reject a failure criterion that this kind does not have."""
     if rotation_deg is None:
         return
     if block.criterion is None:
@@ -330,14 +330,14 @@ def _failure(rotation_deg: float | None) -> str:
     return "failure past recovery" if rotation_deg is None else f"a rotation of {rotation_deg:g}°"
 
 
-def _measures(given: Collection[str]) -> str:
-    return " and ".join(name for name in given if name in MEASURES) or "no intensity measure"
+def _measures(names: Collection[str]) -> str:
+    return " and ".join(name for name in names if name in MEASURES) or "no intensity measure"
 
 
 def _of_row(row: ModelRow) -> FragilityModel:
-    kept = _rows_before.get(id(row))
-    if kept is not None and kept[0] is row:
-        return kept[1]
+    cached = _rows_before.get(id(row))
+    if cached is not None and cached[0] is row:
+        return cached[1]
     model = FragilityModel.from_row(row)
     if len(_rows_before) >= _MOST_ROWS:
         _rows_before.clear()
@@ -346,7 +346,7 @@ def _of_row(row: ModelRow) -> FragilityModel:
 
 
 def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
-    """Return a model of a database as it is stored.
+    """Return a stored model of a database by name.
 
     Args:
         db: database, as for :func:`find_model`.
@@ -358,7 +358,7 @@ def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
 
 
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
-    """Return the models of a database as they are stored, sorted by name.
+    """Return the stored models of a database, sorted by name.
 
     Args:
         db: database, as for :func:`find_model`.
@@ -367,7 +367,7 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
 
 
 def _store(db: str | PathLike[str] | None) -> _Store:
-    """Return the models of a database; those of a file are read again only when it has changed.
+    """Return the models of a database; a file is read again only after it has changed.
 
     A database that nobody names and that holds no model does not take the place of the reference.
     """
@@ -392,7 +392,7 @@ def _read(db: str | PathLike[str] | None) -> _Store:
 
 
 def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
-    """Return whether the models of a database are in memory: an answer then waits for no file."""
+    """Return whether the models of a database are in memory, so that no file has to be read."""
     return _in_memory(db) is not None
 
 
@@ -405,13 +405,13 @@ def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
         return _unchanged(named, False)
     if not _stamp(DEFAULT_NAME, False):
         return _unchanged(_SHIPPED, True)
-    here = _unchanged(DEFAULT_NAME, False)
-    return here if here is None or here.rows else _unchanged(_SHIPPED, True)
+    store = _unchanged(DEFAULT_NAME, False)
+    return store if store is None or store.rows else _unchanged(_SHIPPED, True)
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:
-    kept = _stores_before.get((path, shipped))
-    return kept if kept is not None and kept.stamp == _stamp(path, shipped) else None
+    cached = _stores_before.get((path, shipped))
+    return cached if cached is not None and cached.stamp == _stamp(path, shipped) else None
 
 
 def _read_again(path: Path, shipped: bool) -> _Store:
@@ -426,8 +426,8 @@ def _read_again(path: Path, shipped: bool) -> _Store:
 
 
 def _stamp(path: str, shipped: bool) -> _Stamp:
-    """Return what tells this content of a file from another: a name alone does not, for a
-    relative one means another file in another folder.
+    """Return the signature of a file's content; a name alone is ambiguous, since a relative one
+    depends on the folder.
     """
     try:
         file = os.stat(path)  # noqa: PTH116  (Path takes ten times as long)

@@ -1,4 +1,4 @@
-"""Intensity terms: what the shaking is measured by, in m/s.
+"""Intensity terms: combinations of intensity measures as a velocity in m/s.
 
 Each is pure arithmetic on single numbers or arrays and loads no library.
 """
@@ -50,7 +50,8 @@ class Term:
         return f"{self.title}, {self.symbol} [m/s]"
 
     def intensity_m_s(self, measures: Mapping[str, Any]) -> Any:
-        """Return the term [m/s] from measures, and p of the block [1/s] where it is read, by name.
+        """Return the term [m/s] from intensity measures, and p of the block [1/s] where required,
+        by name.
 
         More than it needs may be given.
         """
@@ -68,7 +69,7 @@ def pga_tm_m_s(pga_g: Any, tm_s: Any) -> Any:
 
 
 def first_m_s(*measures: Any) -> Any:
-    """Return the first measure [m/s]; the others enter the model by themselves."""
+    """Return the first intensity measure [m/s]; the others are separate predictors."""
     return measures[0]
 
 
@@ -77,9 +78,9 @@ def pga_over_p_m_s(pga_g: Any, p: Any) -> Any:
     return pga_g * STANDARD_GRAVITY_M_S2 / p
 
 
-def _first_over_p(pga_g: Any, *others: Any) -> Any:
-    """Return PGA·g/p [m/s], p being the last; the other measures enter the model by themselves."""
-    return pga_over_p_m_s(pga_g, others[-1])
+def _first_over_p(pga_g: Any, *rest: Any) -> Any:
+    """Return PGA·g/p [m/s], with p last; the other intensity measures are separate predictors."""
+    return pga_over_p_m_s(pga_g, rest[-1])
 
 
 def spectral_velocity_m_s(sa_g: Any, period_s: float) -> Any:
@@ -87,8 +88,8 @@ def spectral_velocity_m_s(sa_g: Any, period_s: float) -> Any:
     return sa_g * (STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi))
 
 
-def _first_at_1s(sa10_g: Any, *_others: Any) -> Any:
-    """Return V_1.0 [m/s]; the other measures enter the model by themselves."""
+def _first_at_1s(sa10_g: Any, *_rest: Any) -> Any:
+    """Return V_1.0 [m/s]; the other intensity measures are separate predictors."""
     return spectral_velocity_m_s(sa10_g, 1.0)
 
 
@@ -246,13 +247,13 @@ def spectral(sa_g: Mapping[float, T]) -> dict[str, T]:
         if period not in SPECTRAL:
             raise InputError(
                 f"sa_g has the period {period!r} s: SA is supported at "
-                f"{', '.join(f'{each:g}' for each in SPECTRAL)} s"
+                f"{', '.join(f'{supported:g}' for supported in SPECTRAL)} s"
             )
     return {SPECTRAL[period]: value for period, value in sa_g.items()}
 
 
 def intensity_term(name: str) -> Term:
-    """Return the term of that name."""
+    """Return the term with this name."""
     try:
         return TERMS[name]
     except KeyError:
@@ -261,18 +262,18 @@ def intensity_term(name: str) -> Term:
         ) from None
 
 
-def terms_from(given: Collection[str]) -> tuple[str, ...]:
-    """Return the names of the terms that the given measures suffice for."""
-    return tuple(name for name in TERMS if set(TERMS[name].inputs) <= set(given))
+def terms_from(names: Collection[str]) -> tuple[str, ...]:
+    """Return the names of the terms that the given intensity measures suffice for."""
+    return tuple(name for name in TERMS if set(TERMS[name].inputs) <= set(names))
 
 
 def least_inputs(terms: Iterable[str]) -> list[tuple[str, ...]]:
-    """Return the sets of measures of which each suffices for one of some terms, none of which holds
-    another.
-    """
-    known = [TERMS[name].inputs for name in terms if name in TERMS]
-    stated = [inputs for inputs in known if set(inputs) <= set(INTENSITY)]
-    least = [own for own in stated if not any(set(other) < set(own) for other in stated)]
+    """Return the minimal sets of intensity measures that suffice for any of the terms."""
+    input_sets = [TERMS[name].inputs for name in terms if name in TERMS]
+    user_sets = [inputs for inputs in input_sets if set(inputs) <= set(INTENSITY)]
+    least = [
+        inputs for inputs in user_sets if not any(set(other) < set(inputs) for other in user_sets)
+    ]
     return list(dict.fromkeys(least))
 
 

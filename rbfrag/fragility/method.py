@@ -1,4 +1,4 @@
-"""What methods of fitting are made of. No library is loaded here.
+"""Building blocks of fitting methods. No library is loaded here.
 
 A method says P = F(eta): its parameters, eta with its slopes, the link F, what mechanics rules out
 and how it is fitted. Formulas are written once over a namespace: :data:`SINGLE` for numbers,
@@ -24,8 +24,8 @@ from rbfrag.vocabulary.quantities import QUANTITIES
 _LARGEST_EXPONENT = 709.0
 
 
-class Numbers(NamedTuple):
-    """The functions that formulas need, for numbers or for arrays.
+class ArrayNamespace(NamedTuple):
+    """Elementary functions for formulas, of numbers or of arrays.
 
     Args:
         ndtr: standard normal distribution function.
@@ -54,7 +54,7 @@ def _exp(x: float) -> float:
     return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
 
 
-SINGLE = Numbers(
+SINGLE = ArrayNamespace(
     math.log, _exp, math.sqrt, normal_share, max, min, math.sin, math.cos,
     normal_quantile, lambda errors, x: errors.step_sums(*x),
 )  # fmt: skip
@@ -62,8 +62,8 @@ SINGLE = Numbers(
 
 
 @cache
-def arrays() -> Numbers:
-    """Return the same functions for numpy arrays."""
+def arrays() -> ArrayNamespace:
+    """Return the elementary functions of numpy arrays."""
     import numpy as np
     from scipy.special import ndtr, ndtri
 
@@ -81,14 +81,14 @@ def arrays() -> Numbers:
             np.add.reduce(squares, axis=0, out=fourths[part])
         return total, fourths
 
-    return Numbers(
+    return ArrayNamespace(
         np.log, np.exp, np.sqrt, ndtr, np.maximum, np.minimum, np.sin, np.cos,
         ndtri, step_sums,
     )  # fmt: skip
 
 
-class Eta(NamedTuple):
-    """What a formula gives.
+class LinearPredictor(NamedTuple):
+    """Linear predictor eta with its slopes and dispersion.
 
     Args:
         eta: the argument of the link.
@@ -103,9 +103,9 @@ class Eta(NamedTuple):
     sigma_slopes: tuple[Any, ...] = ()
 
 
-def linear(b: Sequence[float], *features: Any) -> Eta:
+def linear(b: Sequence[float], *features: Any) -> LinearPredictor:
     """Return eta = Σ b·feature, whose slopes are the features."""
-    return Eta(sum(map(mul, b, features)), features)
+    return LinearPredictor(sum(map(mul, b, features)), features)
 
 
 class Link(NamedTuple):
@@ -120,9 +120,9 @@ class Link(NamedTuple):
     """
 
     name: str
-    probability: Callable[[Any, Numbers], Any]
-    density: Callable[[Any, Numbers], Any]
-    quantile: Callable[[Any, Numbers], Any]
+    probability: Callable[[Any, ArrayNamespace], Any]
+    density: Callable[[Any, ArrayNamespace], Any]
+    quantile: Callable[[Any, ArrayNamespace], Any]
     formula: str
 
 
@@ -149,8 +149,8 @@ LOGLOG = Link(
 )
 
 
-class Bound(NamedTuple):
-    """A limit to the values of a question: P is 0 beyond it by mechanics, or they are rejected.
+class MechanicalBound(NamedTuple):
+    """Condition under which mechanics rules out failure: P is 0 whatever the model predicts.
 
     Args:
         holds: whether (where) it is so, from values by name.
@@ -175,7 +175,7 @@ class Bound(NamedTuple):
         return self.text.format_map(defaultdict(str, equal))
 
 
-ABOVE_TWICE_PGV = Bound(
+ABOVE_TWICE_PGV = MechanicalBound(
     lambda v: v["y_m_s"] >= 2.0 * v["intensity_m_s"],
     "y_m_s",
     "PGV{intensity_m_s} is at most half the toppling velocity k_r g/p{y_m_s}: no excursion from "
@@ -185,12 +185,12 @@ _STRONG_KR = 0.3
 """k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
 
 
-def log_strength(v: Mapping[str, Any], ns: Numbers) -> Any:
+def log_strength(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
     """Return k' = ln(1 + k_r/0.3)."""
     return ns.log(1.0 + v["kr"] / _STRONG_KR)
 
 
-ABOVE_SPECTRUM = Bound(
+ABOVE_SPECTRUM = MechanicalBound(
     lambda v: v["y_m_s"] >= v["intensity_m_s"],
     "y_m_s",
     "the toppling spectrum X(p){intensity_m_s} of the motion is at most the toppling velocity "
@@ -201,7 +201,7 @@ ABOVE_SPECTRUM = Bound(
 
 @dataclass(frozen=True)
 class BlockParameters:
-    """What describes a block in predictions.
+    """Parameters that describe a block in predictions.
 
     Args:
         kind: the kind of failure that they stand for where none is named.
@@ -232,13 +232,13 @@ class BlockParameters:
     kind: str
     strength: str
     size: str | None
-    at_rest: Bound
+    at_rest: MechanicalBound
     criterion: str | None = None
     options: tuple[str, ...] = ()
     stored: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
     fractions: tuple[str, ...] = ()
-    adjust: Callable[[dict[str, Any], Numbers], None] | None = None
-    refuses: tuple[Bound, ...] = ()
+    adjust: Callable[[dict[str, Any], ArrayNamespace], None] | None = None
+    refuses: tuple[MechanicalBound, ...] = ()
     safe_steps: int = 0
     judged_kr: float = math.inf
     points: Literal["strengths", "scaled_records", "displacements"] = "strengths"
@@ -246,17 +246,17 @@ class BlockParameters:
 
     @cached_property
     def sigmas(self) -> dict[str, str]:
-        """What a question may leave uncertain, by the name of its standard deviation."""
+        """Parameters that may be uncertain, by the name of their standard deviation."""
         uncertain = (self.size, self.strength, *self.fractions)
         return {f"{name}_sigma": name for name in uncertain if name is not None}
 
     def criterion_of(self, diagnostics: Mapping[str, object]) -> float | None:
-        """Return a model's criterion of failure from what is stored; None for the usual one."""
+        """Return the failure criterion in a model's diagnostics; None for the usual one."""
         value = diagnostics.get(self.criterion) if self.criterion is not None else None
         return float(value) if isinstance(value, int | float) else None
 
     def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return arrays with what a block has of itself where an option is NaN.
+        """Return arrays with the block's own value where an option is NaN.
 
         Args:
             values: the question, arrays that numpy can broadcast.
@@ -267,20 +267,22 @@ class BlockParameters:
         for name in self.options:
             if self.adjust is None or name not in values or not np.isnan(values[name]).any():
                 continue
-            own = {n: np.asarray(value) for n, value in values.items() if n != name}
+            inputs = {n: np.asarray(value) for n, value in values.items() if n != name}
             with np.errstate(all="ignore"):
-                self.adjust(own, arrays())
-            if name in own:
-                filled[name] = np.where(np.isnan(values[name]), own[name], values[name])
+                self.adjust(inputs, arrays())
+            if name in inputs:
+                filled[name] = np.where(np.isnan(values[name]), inputs[name], values[name])
         return filled
 
-    def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
-        """Return the given values with what formulas read.
+    def completed(
+        self, inputs: Mapping[str, Any], term: Term, ns: ArrayNamespace
+    ) -> dict[str, Any]:
+        """Return the inputs with the derived variables of the formulas.
 
         These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
         Values that no logarithm takes are left to the caller.
         """
-        values = dict(given)
+        values = dict(inputs)
         if self.adjust is not None:
             self.adjust(values, ns)
         if self.size is not None:
@@ -291,7 +293,7 @@ class BlockParameters:
         return values
 
 
-NOT_LIFTED = Bound(
+NOT_LIFTED = MechanicalBound(
     lambda v: v["kr"] >= v["pga_g"],
     "kr",
     "k_r{kr} is not below PGA{pga_g}: the block cannot uplift without vertical motion",
@@ -307,7 +309,7 @@ TOPPLING_BLOCK = BlockParameters(
 
 
 class SizeFactor(NamedTuple):
-    """What eta is multiplied by: h(p) = exp(A l - B l²), l = ln p with p in 1/s.
+    """Size factor of eta: h(p) = exp(A l - B l²), l = ln p with p in 1/s.
 
     Without it a model is too vague for small blocks and too sure for large ones. A factor on all of
     eta keeps P monotone in the block's strength and in the shaking, which factors on single terms
@@ -322,13 +324,13 @@ class SizeFactor(NamedTuple):
 
     @property
     def formula(self) -> str:
-        """h as mathtext."""
+        """The size factor h as mathtext."""
         if not self.b:
             return rf"p^{{{self.a:g}}}"
         return rf"\exp({self.a:g}\,\ln p - {self.b:g}\,\ln^2 p)"
 
-    def of(self, p: Any, ns: Numbers) -> Any:
-        """Return h of the frequency parameter p [1/s]."""
+    def of(self, p: Any, ns: ArrayNamespace) -> Any:
+        """Return h at the frequency parameter p [1/s]."""
         l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
         return ns.exp((self.a - self.b * l) * l)
 
@@ -339,7 +341,7 @@ _LEAST_P, _GREATEST_P = math.sqrt(0.1), math.sqrt(30.0)
 
 @dataclass(frozen=True)
 class Form:
-    """A method on one measure.
+    """A fitting method applied to one intensity term.
 
     Args:
         parameters: their names; the method's `exponent` stands last and may be missing.
@@ -360,9 +362,9 @@ class Form:
     """
 
     parameters: tuple[str, ...]
-    formula: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+    formula: Callable[[Sequence[float], Mapping[str, Any], ArrayNamespace], LinearPredictor]
     rank: int
-    bounds: tuple[Bound, ...] = ()
+    bounds: tuple[MechanicalBound, ...] = ()
     start: tuple[float, ...] = ()
     size_factor: SizeFactor | None = None
     terms: tuple[str, ...] = ()
@@ -371,8 +373,8 @@ class Form:
     advice: str = ""
 
     def unscaled(
-        self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
-    ) -> tuple[Eta, Any]:
+        self, parameters: Sequence[float], values: Mapping[str, Any], ns: ArrayNamespace
+    ) -> tuple[LinearPredictor, Any]:
         """Return eta and its slopes before the size factor, and the factor.
 
         Args:
@@ -382,15 +384,17 @@ class Form:
         formula = self.formula(parameters, values, ns)
         return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
 
-    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
+    def eta(
+        self, parameters: Sequence[float], values: Mapping[str, Any], ns: ArrayNamespace
+    ) -> LinearPredictor:
         """Return eta and its slopes; arguments as for :meth:`unscaled`."""
         unscaled, h = self.unscaled(parameters, values, ns)
-        slopes = tuple(h * each for each in unscaled.slopes)
+        slopes = tuple(h * slope for slope in unscaled.slopes)
         return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
 
 
 class FittedVariance(NamedTuple):
-    """Mean and variance of the critical velocity, of a method that fits the variance in bins.
+    """Mean and variance of the critical velocity, for a method that fits the variance in bins.
 
     Args:
         mean_m_s: mean from the parameters and the intensity [m/s].
@@ -403,7 +407,7 @@ class FittedVariance(NamedTuple):
 
 @dataclass(frozen=True)
 class Method:
-    """One method of fitting.
+    """A fitting method.
 
     Args:
         name: name in options and in the database.
@@ -433,7 +437,9 @@ class Method:
     failure: Callable[[Mapping[str, Any], float | None], str] | None = None
     median_of: str | None = None
     doubts: (
-        Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]
+        Callable[
+            [Sequence[float], Mapping[str, Any], ArrayNamespace], Iterator[tuple[Any, str, str]]
+        ]
         | None
     ) = None
     fitted_variance: FittedVariance | None = None

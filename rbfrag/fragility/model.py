@@ -1,4 +1,4 @@
-"""A fitted fragility model of any kind, ready to answer. No library is loaded here."""
+"""A fitted fragility model of any kind, ready for predictions. No library is loaded here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import ABOUT_SCATTER, CREDIBLE, HIGHEST, LOWEST, TERMS, Term
-from rbfrag.fragility.method import TOPPLING_BLOCK, Bound, Form, Method, Numbers
+from rbfrag.fragility.method import TOPPLING_BLOCK, ArrayNamespace, Form, MechanicalBound, Method
 from rbfrag.fragility.methods import method_named, method_names
 from rbfrag.results.diagnostic import Diagnostic
 
@@ -35,7 +35,7 @@ NO_EVENT_RANGE = Diagnostic(
 
 
 class Range(NamedTuple):
-    """Where a value needs no words."""
+    """Range of a value within which no warning is given."""
 
     name: str
     low: float
@@ -43,7 +43,7 @@ class Range(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a model says of a block and a motion, numbers or arrays.
+    """Prediction of a model for a block and a motion, numbers or arrays.
 
     Args:
         probability: P.
@@ -73,7 +73,7 @@ SYNTHETIC = Diagnostic(
 
 @dataclass(frozen=True)
 class FragilityModel:
-    """One fitted fragility model: a stored row in the form that answers.
+    """A fitted fragility model: a stored row in the form used for predictions.
 
     Args:
         term: the intensity term it reads.
@@ -177,7 +177,7 @@ class FragilityModel:
 
     @property
     def dependence(self) -> Dependence | None:
-        """The copula of blocks of one earthquake that is stored with the model, if there is one."""
+        """Gaussian copula of blocks in one earthquake, if stored with the model."""
         stored = self.row.dependence
         names = Dependence.__dataclass_fields__
         if stored is None or not set(names) <= set(stored):
@@ -196,30 +196,30 @@ class FragilityModel:
 
     @property
     def uncertain(self) -> bool:
-        """Whether it answers for blocks or shaking that are not known exactly."""
+        """True if the model integrates over uncertain blocks or shaking."""
         return False
 
     @property
     def scattered(self) -> bool:
-        """Whether the shaking is uncertain: P itself then tells how much lies out of the ranges."""
+        """True if the shaking is uncertain; P then includes shaking outside the fitted ranges."""
         return False
 
     @property
     def meaning(self) -> str:
-        """What the probability is a probability of."""
+        """Event whose probability the model predicts."""
         if self.kind != self.method.block.kind:
             return f"probability that the block fails ({self.kind})"
         return self.method.meaning
 
     @property
     def criterion(self) -> float | None:
-        """What counts as failure where there are several criteria; None for the usual one."""
+        """Failure criterion where there are several; None for the usual one."""
         return self.method.block.criterion_of(self.row.diagnostics)
 
     def with_ratios(
         self, values: dict[str, Any], of: Mapping[str, Any] | None = None
     ) -> dict[str, Any]:
-        """Add the ratios of measures and k/PGA where they are judged by; return the values.
+        """Add the ratios of intensity measures and k/PGA for the range checks; return the values.
 
         Args:
             values: completed values.
@@ -233,7 +233,7 @@ class FragilityModel:
         return values
 
     def ratios_of(self, values: Collection[str]) -> tuple[Ratio, ...]:
-        """Return the ratios of some values that the model or common sense judges by."""
+        """Return the ratios used in the range checks of these values."""
         key = tuple(values)
         ratios = self.ratios.get(key)
         if ratios is None:
@@ -257,7 +257,7 @@ class FragilityModel:
         return low <= least * (1.0 + 1e-9) and most * (1.0 - 1e-9) <= high
 
     def clear_ranges(self, values: Collection[str]) -> tuple[Range, ...]:
-        """Return the ranges within which nothing is to be said of the values of some names."""
+        """Return the ranges of values within which no warning is given."""
         key = tuple(values)
         ranges = self.ranges.get(key)
         if ranges is None:
@@ -282,8 +282,8 @@ class FragilityModel:
             low, high = max(low, least), min(high, most)
         return Range(name, low, high)
 
-    def lies_outside(self, values: dict[str, Any], ns: Numbers) -> Any:
-        """Return whether completed values lie outside the ranges that were fitted."""
+    def lies_outside(self, values: dict[str, Any], ns: ArrayNamespace) -> Any:
+        """Return whether completed values lie outside the fitted ranges."""
         values = self.with_ratios(values)
         outside: Any = False
         for name, (low, high) in self.row.domain.items():
@@ -294,10 +294,10 @@ class FragilityModel:
             outside = outside | (self.spread.holds(values, ns) ^ True)
         return outside
 
-    def bounds(self, given: Collection[str]) -> tuple[Bound, ...]:
-        """Return what mechanics forbids of a question that gives values of some names."""
+    def bounds(self, names: Collection[str]) -> tuple[MechanicalBound, ...]:
+        """Return the mechanical bounds that apply to the named inputs."""
         bounds, at_rest = self.form.bounds, self.method.block.at_rest
-        if "pga_g" not in given or self.vertical or at_rest in bounds:
+        if "pga_g" not in names or self.vertical or at_rest in bounds:
             return bounds
         return (at_rest, *bounds)
 
@@ -305,18 +305,18 @@ class FragilityModel:
         self,
         values: Mapping[str, Any],
         quantiles: Quantiles | None,
-        ns: Numbers,
-        given: Mapping[str, Any],
+        ns: ArrayNamespace,
+        inputs: Mapping[str, Any],
     ) -> Answer:
-        """Return P with its interval, and eta.
+        """Return P with its confidence interval, and eta.
 
         Args:
             values: completed values, within what the bounds allow.
             quantiles: of the confidence level; None for P and eta alone.
-            given: the values that were completed, which a model of uncertain blocks completes
+            inputs: the values that were completed, which a model of uncertain blocks completes
                 for each that one may be.
         """
-        del given
+        del inputs
         unscaled, h = self.form.unscaled(self.parameters, values, ns)
         eta = unscaled.eta * h
         link = self.method.link.probability
@@ -333,7 +333,7 @@ Model = ModelRow | FragilityModel | str
 
 
 def _fit_line(row: ModelRow) -> str:
-    """Return the command that fits a stored model again."""
+    """Return the command that repeats the fit of a stored model."""
     selection = row.diagnostics
     words = ["rbfrag fit"]
     if row.kind != TOPPLING_BLOCK.kind:

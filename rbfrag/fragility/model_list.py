@@ -1,4 +1,4 @@
-"""The list of fitted models. Loads no library."""
+"""List of fitted models for scripts. Loads no library."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _finite(loss: float) -> float | None:
 
 
 def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:
-    """Return how many critical values a model was fitted to; of one that reads none, outcomes."""
+    """Return the number of critical values, or else of outcomes, that a model was fitted to."""
     critical, outcomes = (diagnostics.get(name) for name in ("n", "n_outcomes"))
     number = critical or outcomes or critical
     return None if number is None else int(number)

@@ -1,4 +1,4 @@
-"""The probability that a block fails, by one model: the answer, and what gives it.
+"""Probability that a block fails, predicted by one model.
 
 For single numbers neither numpy nor any other library is loaded.
 """
@@ -133,7 +133,7 @@ class Prediction(Result):
 
     @property
     def _is_by_mechanics(self) -> bool:
-        """Whether mechanics gives P = 0 or 1 in place of the model."""
+        """True if mechanics gives P = 0 or 1 in place of the model."""
         return self.probability in (0.0, 1.0) and self.how != by_model(self.model)
 
     def _reason(self) -> str:
@@ -142,7 +142,7 @@ class Prediction(Result):
         return next((str(text) for text in diagnostics(self.warnings) if text.code in codes), "")
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield what was asked, the prediction interval, the drained bound and the model."""
+        """Yield the inputs, the prediction interval, the drained bound and the model."""
         if shaking := describe.shaking(self.shaking or {}, self.inputs):
             yield TextLine("Shaking", shaking)
         if self.sites is not None:
@@ -170,7 +170,7 @@ class Prediction(Result):
         return f"{where}, {ends} of the blocks fail ({level} prediction interval)"
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield the values and the answers of all suited models, if verbose."""
+        """Yield the values and the predictions of all suitable models, if verbose."""
         if not verbose:
             return
         apart = ("drained", "warnings", "shaking", "answers", "polarities")
@@ -188,7 +188,7 @@ class Prediction(Result):
             )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the answer under the keys of the JSON contract."""
+        """Return the prediction under the keys of the JSON contract."""
         values = {"kind": self.kind, "mode": self.mode, **vars(self)}
         values["warnings"] = list(self.warnings)
         del values["inputs"], values["alternatives"]
@@ -223,7 +223,7 @@ class MotionPrediction(Prediction):
     reverse: Prediction | None = None
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield the answers in both polarities among the tables."""
+        """Yield the predictions for both polarities among the tables."""
         tables = [*super().tables(verbose=verbose)]
         both = {"forward": self.forward, "reverse": self.reverse}
         rows = [
@@ -234,7 +234,7 @@ class MotionPrediction(Prediction):
         yield from (*tables[:1], TextTable(("polarity", *OF_POLARITY), rows), *tables[1:])
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the answer under the keys of the JSON contract, and both polarities."""
+        """Return the prediction under the keys of the JSON contract, and both polarities."""
         result = super().as_dict()
         both = {name: result.pop(name) for name in ("forward", "reverse")}
         result["polarities"] = {
@@ -249,14 +249,14 @@ A = TypeVar("A", bound="Prediction | PredictionArray")
 def with_remarks(
     answer: A, remarks: tuple[Diagnostic, ...], last: tuple[Diagnostic, ...] = ()
 ) -> A:
-    """Return an answer with warnings about its blocks, first, and about its shaking, last."""
+    """Add warnings about blocks (first) and about the shaking (last) to a prediction."""
     if not remarks and not last:
         return answer
     return with_values(answer, warnings=(*remarks, *answer.warnings, *last))
 
 
 def with_values(answer: A, **values: Any) -> A:
-    """Return an answer with other values of some of its fields."""
+    """Return a copy of a prediction with some fields replaced."""
     # a copy of the attributes: to make the object again takes as long as the answer
     result = object.__new__(type(answer))
     vars(result).update(vars(answer), **values)
@@ -265,7 +265,7 @@ def with_values(answer: A, **values: Any) -> A:
 
 def answer_given(
     model: FragilityModel,
-    given: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike],
     level: float,
     *,
     nan: Literal["propagate", "raise"] = "propagate",
@@ -273,37 +273,40 @@ def answer_given(
     weights: ArrayLike | None = None,
     sites: float | None = None,
 ) -> Prediction | PredictionArray:
-    """Return the answer of one model for values by name; see :func:`predict`."""
+    """Return the prediction of one model from inputs by name; see :func:`predict`."""
     if sites is not None:
-        answer = answer_given(model, given, level, nan=nan, interval=interval, weights=weights)
-        return _at_sites(answer, model, sites, given, weights)
-    if not given.keys() >= {*model.method.block.names}:
-        check_numbers(model.kind, model.method.block, given)
+        answer = answer_given(model, inputs, level, nan=nan, interval=interval, weights=weights)
+        return _at_sites(answer, model, sites, inputs, weights)
+    if not inputs.keys() >= {*model.method.block.names}:
+        check_numbers(model.kind, model.method.block, inputs)
     quantiles = quantiles_of(checked_level(level))
     # Kept apart: most questions are about certain blocks and shaking, and need no more.
     certain, scatter, tau = model, None, None
-    if not ABOUT_SCATTER.isdisjoint(given):
+    if not ABOUT_SCATTER.isdisjoint(inputs):
         from rbfrag.fragility.shaking import Scatter, ShakenModel
 
-        tau = given.get("pgv_tau")
-        scatter, given = Scatter.of(model.term, given)
+        tau = inputs.get("pgv_tau")
+        scatter, inputs = Scatter.of(model.term, inputs)
     if weights is not None:
         from rbfrag.fragility.uncertain import drawn_model
 
-        model, given = drawn_model(certain, given, weights)
-    elif not model.method.block.sigmas.keys().isdisjoint(given):
+        model, inputs = drawn_model(certain, inputs, weights)
+    elif not model.method.block.sigmas.keys().isdisjoint(inputs):
         from rbfrag.fragility.uncertain import uncertain_model
 
-        model, given = uncertain_model(certain, given)
-    singles = single_numbers(given)
+        model, inputs = uncertain_model(certain, inputs)
+    singles = single_numbers(inputs)
     if scatter is not None:
         if model is certain and singles is not None and scatter.single:
             model = ShakenModel.over(certain, scatter=scatter)
         else:
-            from rbfrag.fragility.shaking_points import ShakingPoints
+            from rbfrag.fragility.shaking_points import GroundMotionQuadrature
             from rbfrag.fragility.uncertain import UncertainModel
 
-            points, possible = ShakingPoints(certain, scatter), getattr(model, "possible", None)
+            points, possible = (
+                GroundMotionQuadrature(certain, scatter),
+                getattr(model, "possible", None),
+            )
             model = UncertainModel.over(certain, possible=possible, points=points)
     if singles is not None:
         answer = _answer_single(model, singles, quantiles)
@@ -314,17 +317,19 @@ def answer_given(
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
 
-    return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
+    return predict_many(model, inputs, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
 def _at_sites(
     answer: A,
     model: FragilityModel,
     sites: float,
-    given: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike],
     weights: ArrayLike | None,
 ) -> A:
-    """Return an answer with the range of the share that fails at some sites of one earthquake."""
+    """Return the prediction with the prediction interval of the failed fraction at several sites in
+    one earthquake.
+    """
     if isinstance(sites, bool | str) or sites not in range(1, MOST_SITES + 1):
         raise InputError(
             f"sites must be a whole number from 1 to {MOST_SITES:,}, not {sites!r}",
@@ -333,13 +338,13 @@ def _at_sites(
     if model.dependence is None:
         return with_remarks(answer, (NO_EVENT_RANGE,))
     # Kept apart: a single answer loads no library.
-    scatters = not ABOUT_SCATTER.isdisjoint(given)
+    scatters = not ABOUT_SCATTER.isdisjoint(inputs)
     if scatters and isinstance(answer, Prediction) and answer.shaking is None:
         scatters = False
     if scatters:
-        if not isinstance(answer, Prediction) or "pgv_tau" not in given or weights is not None:
+        if not isinstance(answer, Prediction) or "pgv_tau" not in inputs or weights is not None:
             return with_remarks(answer, (NOT_SHARED,))
-        return _shaken_at_sites(answer, model, int(sites), given)
+        return _shaken_at_sites(answer, model, int(sites), inputs)
     from rbfrag.fragility.joint import share_range
 
     ends = share_range(answer.probability, model.dependence, int(sites), answer.level)
@@ -356,44 +361,47 @@ NOT_SHARED = Diagnostic(
 
 
 def _shaken_at_sites(
-    answer: A, model: FragilityModel, sites: int, given: Mapping[str, ArrayLike]
+    answer: A, model: FragilityModel, sites: int, inputs: Mapping[str, ArrayLike]
 ) -> A:
     from rbfrag.fragility.shaking import Scatter
-    from rbfrag.fragility.shaking_points import ShakingPoints
+    from rbfrag.fragility.shaking_points import GroundMotionQuadrature
     from rbfrag.fragility.shared_shaking import shaken_share_range
     from rbfrag.fragility.uncertain import UncertainModel, uncertain_model
 
-    scatter, rest = Scatter.of(model.term, given)
+    scatter, rest = Scatter.of(model.term, inputs)
     if scatter is None or model.dependence is None or scatter.names[0] != "pgv_m_s":
         return with_remarks(answer, (NOT_SHARED,))
-    some, rest = uncertain_model(model, rest)
-    about = {"possible": getattr(some, "possible", None), "points": ShakingPoints(model, scatter)}
+    block_model, rest = uncertain_model(model, rest)
+    about = {
+        "possible": getattr(block_model, "possible", None),
+        "points": GroundMotionQuadrature(model, scatter),
+    }
     along, sigma = UncertainModel.over(model, **about).along(rest)
-    tau = single("pgv_tau", given["pgv_tau"])
+    tau = single("pgv_tau", inputs["pgv_tau"])
     low, high = shaken_share_range(along, tau, sigma, model.dependence, sites, answer.level)
     return type(answer)(**(vars(answer) | {"event_low": low, "event_high": high}))
 
 
 def array_answer(
     model: FragilityModel,
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     level: float = 0.95,
     *,
     interval: bool = True,
     sites: float | None = None,
 ) -> PredictionArray:
-    """Return the answer of one model for values by name, some of which are arrays."""
+    """Return the prediction of one model from inputs by name, some of them arrays."""
     from rbfrag.fragility.prediction_array import PredictionArray
 
-    answer = answer_given(model, given, level, interval=interval, sites=sites)
+    answer = answer_given(model, inputs, level, interval=interval, sites=sites)
     assert isinstance(answer, PredictionArray)
     return answer
 
 
-def single_numbers(given: Mapping[str, ArrayLike]) -> dict[str, float] | None:
-    """Return the values of a question as floats; None where one of them is an array."""
+def single_numbers(inputs: Mapping[str, ArrayLike]) -> dict[str, float] | None:
+    """Return the inputs as floats; None if one of them is an array."""
     singles: dict[str, float] = {}
-    for name, value in given.items():
+    for name, value in inputs.items():
         if type(value) is float:  # for speed
             singles[name] = value  # type: ignore[unreachable]
         elif is_single(value):
@@ -404,7 +412,7 @@ def single_numbers(given: Mapping[str, ArrayLike]) -> dict[str, float] | None:
 
 
 def is_single(value: object) -> bool:
-    """Return whether a value is one number (or something else that is no array)."""
+    """Return whether a value is a single number (or another object that is not an array)."""
     if isinstance(value, _SINGLE_TYPES):
         return True
     shape = getattr(value, "shape", None)
@@ -424,19 +432,19 @@ def single(name: str, value: object) -> float:
 
 
 def _answer_single(
-    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
+    model: FragilityModel, inputs: dict[str, float], quantiles: Quantiles
 ) -> Prediction:
     method, warnings, how = model.method, model.notes, by_model(model.name)
     try:
-        values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
+        values = model.with_ratios(method.block.completed(inputs, model.term, SINGLE))
         clear = not model.uncertain and is_clear(model, values)
     except (ArithmeticError, ValueError):  # the checks find the words
         clear = False
     if clear:
-        answer = model.answer(values, quantiles, SINGLE, given)
+        answer = model.answer(values, quantiles, SINGLE, inputs)
         x, in_domain = values["intensity_m_s"], True
     else:
-        judgement, sentences, ruled = _answer_with_diagnostics(model, given, quantiles)
+        judgement, sentences, ruled = _answer_with_diagnostics(model, inputs, quantiles)
         how = ruled or how
         answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
@@ -444,7 +452,7 @@ def _answer_single(
     median = None
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
-        median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
+        median = inputs[method.median_of] * math.exp(eta * math.exp(log_sigma))
     # frozen dataclasses set attributes one by one, which takes as long as the answer
     result = object.__new__(Prediction)
     vars(result).update(
@@ -452,17 +460,17 @@ def _answer_single(
         event_high=None, level=quantiles.level, model=model.row.name, term=model.term.name,
         method=method.name,
         failure=model.row.kind if method.failure is None
-        else method.failure(given, model.criterion),
+        else method.failure(inputs, model.criterion),
         y_m_s=values.get("y_m_s"), intensity_m_s=x, in_domain=in_domain, warnings=warnings,
         pgv_over_pga_s=values.get("pgv_over_pga_s"), median_displacement_m=median,
-        block_sd=block_sd, data=model.data, shaking=None, how=how, drained=None, inputs=given,
+        block_sd=block_sd, data=model.data, shaking=None, how=how, drained=None, inputs=inputs,
         sites=None, alternatives=(),
     )  # fmt: skip
     return result
 
 
 def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
-    """Return whether there is nothing to say about a question but its probability."""
+    """Return whether a prediction needs no warning."""
     for name, low, high in model.clear_ranges(values):
         if not low <= values[name] <= high:
             return False
@@ -483,7 +491,7 @@ def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
 
 
 def _answer_with_diagnostics(
-    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
+    model: FragilityModel, inputs: dict[str, float], quantiles: Quantiles
 ) -> tuple[Judgement, list[Diagnostic], str]:
     # Kept apart: most questions need no words.
     from rbfrag.fragility.checks import answer_with_findings
@@ -507,7 +515,7 @@ def _answer_with_diagnostics(
             ruled.append(BY_MECHANICS)
 
     judgement = answer_with_findings(
-        model, given, tuple(given), quantiles, SINGLE,
+        model, inputs, tuple(inputs), quantiles, SINGLE,
         say=say, refuse=refuse, unstable=unstable, nothing=False,
     )  # fmt: skip
     if any(text.code == "unstable_at_rest" for text in sentences):

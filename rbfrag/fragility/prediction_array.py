@@ -16,7 +16,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.checks import NOTABLE_SHARE, Remark, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import ABOUT_SCATTER
-from rbfrag.fragility.method import Numbers, arrays
+from rbfrag.fragility.method import ArrayNamespace, arrays
 from rbfrag.fragility.model import AT_REST, Answer, FragilityModel
 from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.results.diagnostic import Diagnostic, diagnostics, texts_by_row
@@ -46,31 +46,31 @@ CHUNK = 1 << 14
 
 
 class Reasons:
-    """Sentences by element, kept as flat places and their texts until somebody reads them."""
+    """Reasons by element, stored as flat indices and texts; texts are generated on demand."""
 
     def __init__(self, shape: tuple[int, ...], parts: Sequence[ReasonPart]) -> None:
-        """Keep the sentences of some elements, as texts or as what writes them when it is asked."""
+        """Store the reasons of some elements, as texts or as functions that generate them."""
         self.shape, self.parts = shape, parts
 
     def array(self) -> NDArray[np.object_]:
-        """Return the text of every element, empty where there is none."""
+        """Return the text of every element; empty without a reason."""
         result = np.full(self.shape, "", dtype=object)
-        for places, texts in self.parts:
-            result.flat[places] = texts() if callable(texts) else texts
+        for indices, texts in self.parts:
+            result.flat[indices] = texts() if callable(texts) else texts
         return result
 
     def text_at(self, index: int) -> str:
         """Return the text of one element, by its index in the flat array."""
         text = ""
-        for places, texts in self.parts:
-            if (hits := np.flatnonzero(places == index)).size:
+        for indices, texts in self.parts:
+            if (hits := np.flatnonzero(indices == index)).size:
                 text = (texts() if callable(texts) else texts)[hits[-1]]
         return text
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PredictionArray(Result):
-    """Probabilities of many blocks or motions; all arrays have the broadcast shape.
+    """Failure probabilities of many blocks or motions; all arrays have the broadcast shape.
 
     Args:
         kind: how the blocks fail.
@@ -128,32 +128,34 @@ class PredictionArray(Result):
 
     @property
     def how(self) -> NDArray[np.object_]:
-        """What answered each: ``by mechanics``, ``model NAME``; empty text without an answer."""
+        """Source of each probability: ``by mechanics`` or ``model NAME``; empty without a
+        probability.
+        """
         names = np.full(self.probability.shape, f"model {self.model}", dtype=object)
         ruled = names if self.ruled is None else self.ruled.array()
         return np.where(np.isnan(self.probability), "", np.where(ruled == "", names, ruled))
 
     @property
     def kinds(self) -> NDArray[np.object_]:
-        """How each block fails; empty where that is not known."""
+        """Kind of failure of each block; empty if unknown."""
         if self.kind_codes is None:
             return np.full(self.probability.shape, self.kind, dtype=object)
         return np.array([*KINDS, ""], dtype=object)[self.kind_codes]
 
     @property
     def modes(self) -> NDArray[np.object_]:
-        """Failure mode of each block; empty where that is not known."""
+        """Failure mode of each block; empty if unknown."""
         if self.mode_codes is None:
             return np.full(self.probability.shape, mode_of_kind(self.kind), dtype=object)
         return np.array([*MODES, ""], dtype=object)[self.mode_codes]
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:
-        """Why an answer is missing, ruled or to be doubted; empty text elsewhere."""
+        """Reason why a probability is missing, fixed by mechanics or doubtful; otherwise empty."""
         return self.reasons.array()
 
     def with_rejected_elements(self) -> PredictionArray:
-        """Return the answer with a warning where elements have no probability."""
+        """Add a warning where elements have no probability."""
         missing = np.isnan(self.probability)
         count = int(np.count_nonzero(missing))
         if not count:
@@ -181,7 +183,7 @@ class PredictionArray(Result):
         yield TextLine("Model", f"{self.model}, {self.data}; {inside} within the fitted range")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the answer under the keys of the JSON contract; NaN stands for null."""
+        """Return the predictions under the keys of the JSON contract; NaN becomes null."""
         values = {name: getattr(self, name) for name in OF_ARRAYS}
         values["warnings"] = [*self.warnings]
         if self.drained is not None:
@@ -192,20 +194,20 @@ class PredictionArray(Result):
         """Return the columns by name; arrays are flat."""
         columns = super().table_columns()
         kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
-        others = {n: each for n, each in columns.items() if not n.endswith("_codes")}
-        drained = {f"drained_{n}": each.ravel() for n, each in (self.drained or {}).items()}
+        readable = {n: column for n, column in columns.items() if not n.endswith("_codes")}
+        drained = {f"drained_{n}": column.ravel() for n, column in (self.drained or {}).items()}
         last = {"how": self.how.ravel(), "reason": self.reason.ravel()}
-        return {**others, **kinds, **drained, **last}
+        return {**readable, **kinds, **drained, **last}
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the answers as a pandas table, with the index of the Series that were given."""
+        """Return the predictions as a pandas DataFrame, with the index of the input Series."""
         frame = super().to_frame()
         return frame if self.index is None else frame.set_axis(self.index)
 
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """The answers that are filled, flat arrays."""
+    """Result arrays to be filled, flat."""
 
     probability: FloatArray
     low: FloatArray
@@ -218,16 +220,16 @@ class _Columns:
 
 def predict_many(
     model: FragilityModel,
-    given: Mapping[str, object],
+    inputs: Mapping[str, object],
     quantiles: Quantiles,
     *,
     interval: bool,
     refuse_nan: bool,
 ) -> PredictionArray:
-    """Return the answers for broadcast arrays; see :func:`rbfrag.question.question.predict`.
+    """Return the predictions for broadcast arrays; see :func:`rbfrag.question.question.predict`.
 
     Args:
-        given: block and measures of the motion by name, numbers or arrays.
+        inputs: block and measures of the motion by name, numbers or arrays.
         quantiles: of the confidence level.
         interval: whether an interval is asked for.
         refuse_nan: raise instead of answering NaN.
@@ -236,8 +238,8 @@ def predict_many(
         InputError: arrays that are not numeric or do not broadcast, or, if asked, an
             element that cannot be used.
     """
-    index = index_of(given)
-    values, shape = flat(given)
+    index = index_of(inputs)
+    values, shape = flat(inputs)
     size = int(np.prod(shape))
     ns = arrays()
     p, low, high, y, x = np.empty((5, size))
@@ -251,19 +253,21 @@ def predict_many(
 
     def answer(start: int) -> NDArray[np.intp]:
         part = slice(start, min(start + CHUNK, size))
-        own = {name: v if v.size == 1 else v[part] for name, v in values.items()}
+        part_inputs = {name: v if v.size == 1 else v[part] for name, v in values.items()}
         with np.errstate(all="ignore"):
-            return _answer_part(model, own, reach, part, out, ns) + start
+            return _answer_part(model, part_inputs, reach, part, out, ns) + start
 
     # gathered: the words cost as much for a few elements as for thousands
     flagged = np.concatenate([np.empty(0, dtype=np.intp), *_in_chunks(answer, size)])
 
     def explain(start: int) -> tuple[NDArray[np.intp], Texts, Texts, list[Diagnostic]]:
-        places = flagged[start : start + CHUNK]
-        own = {n: v.repeat(places.size) if v.size == 1 else v[places] for n, v in values.items()}
+        indices = flagged[start : start + CHUNK]
+        chunk_inputs = {
+            n: v.repeat(indices.size) if v.size == 1 else v[indices] for n, v in values.items()
+        }
         with np.errstate(all="ignore"):
-            return places, *_answer_with_diagnostics(
-                model, own, reach, places, shape, out, refuse_nan=refuse_nan
+            return indices, *_answer_with_diagnostics(
+                model, chunk_inputs, reach, indices, shape, out, refuse_nan=refuse_nan
             )
 
     explained = _in_chunks(explain, flagged.size)
@@ -275,7 +279,7 @@ def predict_many(
         event_low=np.full(shape, np.nan),
         event_high=np.full(shape, np.nan),
         in_domain=out.in_domain.reshape(shape),
-        reasons=Reasons(shape, [(places, texts) for places, texts, *_ in explained]),
+        reasons=Reasons(shape, [(indices, texts) for indices, texts, *_ in explained]),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
         level=quantiles.level,
@@ -286,21 +290,21 @@ def predict_many(
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
         data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
-        ruled=Reasons(shape, [(places, how) for places, _, how, _ in explained]),
+        ruled=Reasons(shape, [(indices, how) for indices, _, how, _ in explained]),
     )
 
 
-def index_of(given: Mapping[str, Any]) -> pd.Index | None:
-    """Return the index of pandas Series; None where none is given.
+def index_of(inputs: Mapping[str, Any]) -> pd.Index | None:
+    """Return the index of pandas Series inputs; None without Series.
 
     Raises:
         InputError: Series of different indices: pandas would join them by their labels.
     """
-    series = {name: value for name, value in given.items() if hasattr(value, "iloc")}
+    series = {name: value for name, value in inputs.items() if hasattr(value, "iloc")}
     if not series:
         return None
-    first, *others = series
-    for name in others:
+    first, *rest = series
+    for name in rest:
         if not series[name].index.equals(series[first].index):
             raise InputError(
                 f"{first} and {name} are Series of different index: join them first, or give "
@@ -311,7 +315,7 @@ def index_of(given: Mapping[str, Any]) -> pd.Index | None:
 
 
 def _in_chunks(work: Callable[[int], T], size: int) -> list[T]:
-    """Return what a function gives for the start of every chunk, a thread for each core."""
+    """Return the results of a function for the start of every chunk, with one thread per core."""
     chunks = range(0, size, CHUNK)
     workers = min(len(chunks), os.cpu_count() or 1)
     if workers <= 1:
@@ -322,15 +326,15 @@ def _in_chunks(work: Callable[[int], T], size: int) -> list[T]:
 
 def _answer_part(
     model: FragilityModel,
-    given: Mapping[str, FloatArray],
+    inputs: Mapping[str, FloatArray],
     quantiles: Quantiles | None,
     part: slice,
     out: _Columns,
-    ns: Numbers,
+    ns: ArrayNamespace,
 ) -> NDArray[np.intp]:
-    """Fill the answers of a part; return where there is something to say, which is not answered."""
+    """Fill the predictions of a part; return the indices that need warnings."""
     method, block = model.method, model.method.block
-    values = model.with_ratios(block.completed(given, model.term, ns))
+    values = model.with_ratios(block.completed(inputs, model.term, ns))
     clear = np.ones(part.stop - part.start, dtype=np.bool_)
     for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
@@ -343,7 +347,7 @@ def _answer_part(
         clear &= np.logical_not(holds)
     if model.spread is not None:
         clear &= model.spread.holds(values, ns)
-    answer = model.answer(values, quantiles, ns, given)
+    answer = model.answer(values, quantiles, ns, inputs)
     if answer.outside is not None:
         clear &= answer.outside < NOTABLE_SHARE
     for column, value in _answered(out, answer):
@@ -355,33 +359,33 @@ def _answer_part(
 
 def _answer_with_diagnostics(
     model: FragilityModel,
-    given: dict[str, FloatArray],
+    inputs: dict[str, FloatArray],
     quantiles: Quantiles | None,
-    places: NDArray[np.intp],
+    indices: NDArray[np.intp],
     shape: tuple[int, ...],
     out: _Columns,
     *,
     refuse_nan: bool,
 ) -> tuple[Texts, Texts, list[Diagnostic]]:
-    """Answer elements that need explanation; return their reasons, what ruled, and warnings."""
+    """Fill the elements that need explanation; return their reasons, sources and warnings."""
     reasons: list[tuple[str, NDArray[np.bool_]]] = []
     ruled: list[tuple[str, NDArray[np.bool_]]] = []
     warnings: list[Diagnostic] = []
-    at_rest = np.zeros(places.size, dtype=np.bool_)
+    at_rest = np.zeros(indices.size, dtype=np.bool_)
 
     def say(holds: NDArray[np.bool_], finding: Remark) -> None:
         if not holds.any():
             return
         text = finding.in_general()
         reasons.append((text, holds))
-        warnings.append(Diagnostic(text, finding.code, rows=places[holds]))
+        warnings.append(Diagnostic(text, finding.code, rows=indices[holds]))
         if finding.how:
             ruled.append((finding.how, holds))
 
     def refuse(holds: NDArray[np.bool_], finding: Remark) -> None:
         if refuse_nan and holds.any():
             first = int(np.flatnonzero(holds)[0])
-            where = tuple(int(i) for i in np.unravel_index(places[first], shape))
+            where = tuple(int(i) for i in np.unravel_index(indices[first], shape))
             text = f"element {where}: {finding.about(float(finding.value[first]))}"
             raise InputError(text, fields=(finding.name,))
         if holds.any():
@@ -392,31 +396,31 @@ def _answer_with_diagnostics(
         if holds.any():
             reasons.append(("unstable", holds))
             ruled.append((BY_MECHANICS, holds))
-            warnings.append(Diagnostic(AT_REST, "unstable_at_rest", rows=places[holds]))
+            warnings.append(Diagnostic(AT_REST, "unstable_at_rest", rows=indices[holds]))
 
     block = model.method.block
-    stated = [name for name in (*block.options, *block.sigmas, *ABOUT_SCATTER) if name in given]
-    needed = [*block.names, *model.term.inputs, *stated]
+    optional = [name for name in (*block.options, *block.sigmas, *ABOUT_SCATTER) if name in inputs]
+    needed = [*block.names, *model.term.inputs, *optional]
     judgement = answer_with_findings(
-        model, given, needed, quantiles, arrays(),
+        model, inputs, needed, quantiles, arrays(),
         say=say, refuse=refuse, unstable=unstable,
-        nothing=np.zeros(places.size, dtype=np.bool_),
+        nothing=np.zeros(indices.size, dtype=np.bool_),
     )  # fmt: skip
     for column, answer in _answered(out, judgement.answer):
         values = np.where(judgement.ruled, 0.0, answer)
         values[at_rest] = 0.0 if column is out.block_sd else 1.0
         values[judgement.missing] = np.nan
-        column[places] = values
+        column[indices] = values
     y = judgement.values.get("y_m_s", np.nan)
     for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
-        column[places] = np.where(judgement.missing, np.nan, value)
-    out.in_domain[places] = judgement.in_domain
-    size = places.size
+        column[indices] = np.where(judgement.missing, np.nan, value)
+    out.in_domain[indices] = judgement.in_domain
+    size = indices.size
     return texts_by_row(reasons, size, "; "), texts_by_row(ruled, size, "; "), warnings
 
 
 def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
-    """Return the columns that a model answers, each with what is to stand there."""
+    """Return the columns that a model fills, each with its values."""
     pairs = (
         (out.probability, answer.probability), (out.low, answer.low), (out.high, answer.high),
         (out.block_sd, answer.block_sd),
@@ -424,10 +428,10 @@ def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
     return [(column, value) for column, value in pairs if column is not None and value is not None]
 
 
-def flat(given: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
+def flat(inputs: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
     """Return flat arrays of the broadcast size, or of size 1, and the broadcast shape."""
     arrays: dict[str, FloatArray] = {}
-    for name, value in given.items():
+    for name, value in inputs.items():
         try:
             if isinstance(value, np.ma.MaskedArray):
                 # Under a mask lies a number that means nothing.

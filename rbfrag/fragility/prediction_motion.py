@@ -1,4 +1,4 @@
-"""The probability that one block fails in a motion that is known itself."""
+"""Probability that one block fails in a given motion."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ SIMULATED = (
 
 
 def predict_motion(
-    given: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike],
     motion: MotionLike,
     *,
     kind: str | None,
@@ -54,7 +54,9 @@ def predict_motion(
     weights: ArrayLike | None = None,
     sites: float | None = None,
 ) -> Prediction:
-    """Return the probability for one block; arguments as for :func:`rbfrag.predict`."""
+    """Return the failure probability of one block in a motion; arguments as for
+    :func:`rbfrag.predict`.
+    """
     if sites is not None:
         text = "sites cannot be combined with a motion: give its intensity measures instead"
         raise InputError(text, fields=("sites",))
@@ -62,39 +64,39 @@ def predict_motion(
         raise InputError(f"weights cannot be combined with a motion: {SIMULATED}")
     motion = as_motion(motion)
     beside = {*INTENSITY, *ABOUT_SCATTER, *NOT_OF_A_RECORD} - {*UNRECORDED}
-    extra = [name for name in given if name in beside]
+    extra = [name for name in inputs if name in beside]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} cannot be combined with a motion, which has them: omit them"
         )
     if polarity not in ("forward", "reverse", "both"):
         raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
-    uncertain = [name for name in given if name.endswith("_sigma")]
+    uncertain = [name for name in inputs if name.endswith("_sigma")]
     if uncertain:
         raise InputError(f"{uncertain[0]} cannot be combined with a motion: {SIMULATED}")
-    several = [name for name, value in given.items() if not is_single(value)]
+    several = [name for name, value in inputs.items() if not is_single(value)]
     if several:
         raise InputError(
             f"{' and '.join(several)} must be single numbers with a motion: call it once for each "
             "block, or use rbfrag.toppling_spectrum and a model of the term xp"
         )
-    block = {name: single(name, value) for name, value in given.items()}
+    block = {name: single(name, value) for name, value in inputs.items()}
     measures = {name: value for name, value in block.items() if name in UNRECORDED}
     measures |= measures_of(motion)
-    known = {*SPECTRAL.values(), *(("xp_m_s",) if "p2" in block else ())}
+    computed = {*SPECTRAL.values(), *(("xp_m_s",) if "p2" in block else ())}
     chosen = find_model(
-        model, (*block, *measures, *known), db, kind=kind, rotation_deg=rotation_deg
+        model, (*block, *measures, *computed), db, kind=kind, rotation_deg=rotation_deg
     )
     answers: dict[str, Prediction] = {}
     for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
-        own = {**block, **measures}
-        for name in known.intersection(chosen.term.inputs):
-            own[name] = (
+        motion_inputs = {**block, **measures}
+        for name in computed.intersection(chosen.term.inputs):
+            motion_inputs[name] = (
                 motion.spectral_accelerations[name]
                 if name in SPECTRAL.values()
                 else _spectrum_of(motion, block["p2"], direction)
             )
-        answer = answer_given(chosen, own, level)
+        answer = answer_given(chosen, motion_inputs, level)
         assert isinstance(answer, Prediction)
         answers[direction] = with_remarks(answer, unused_measures(chosen, block))
     if polarity != "both":
@@ -104,8 +106,8 @@ def predict_motion(
 
 def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
     def mean(name: str) -> float | None:
-        one, other = getattr(forward, name), getattr(reverse, name)
-        return None if one is None or other is None else 0.5 * (float(one) + float(other))
+        first, other = getattr(forward, name), getattr(reverse, name)
+        return None if first is None or other is None else 0.5 * (float(first) + float(other))
 
     warnings = [
         text if text in other.warnings else text.replaced(text=f"{polarity}: {text}")
@@ -132,7 +134,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
 
 
 def measures_of(motion: GroundMotion) -> dict[str, float]:
-    """Return the measures of a motion by the names of :func:`rbfrag.predict`.
+    """Return the intensity measures of a motion by the names of :func:`rbfrag.predict`.
 
     Without spectral accelerations, which take longer.
     """
@@ -141,7 +143,7 @@ def measures_of(motion: GroundMotion) -> dict[str, float]:
 
 
 def _spectrum_of(motion: GroundMotion, p2: float, polarity: Literal["forward", "reverse"]) -> float:
-    """Return X(p) [m/s]."""
+    """Return the toppling spectrum X(p) [m/s]."""
     # a p2 that cannot be used is refused by the prediction
     drawn = p2 if math.isfinite(p2) and p2 > 0.0 else 1.0
     return float(toppling_spectrum(motion, drawn, polarity))

@@ -1,4 +1,4 @@
-"""Shaking that is not known exactly: P is its mean over all that the measures may be.
+"""Uncertain shaking: P is averaged over the distribution of the intensity measures.
 
 The logarithms of the measures are normal about those of what is stated, with its standard
 deviations; those of several correlate as total residuals do, and a scatter that all share (of an
@@ -18,14 +18,14 @@ from typing import Any, Self
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import ABOUT_SCATTER, AMPLIFIED, SCATTERED, Term
-from rbfrag.fragility.method import Bound, Numbers
+from rbfrag.fragility.method import ArrayNamespace, MechanicalBound
 from rbfrag.fragility.model import Answer, FragilityModel
 
 POINTS = tuple(0.3 * i for i in range(-20, 21))
 """The points of a standard normal variable: steps of .3 to 6 on either side."""
 
 _DENSITY = [math.exp(-0.5 * x * x) for x in POINTS]
-WEIGHTS = tuple(each / sum(_DENSITY) for each in _DENSITY)
+WEIGHTS = tuple(density / sum(_DENSITY) for density in _DENSITY)
 """Their weights, which sum to 1: P is right to 1e-4 for standard deviations up to 1."""
 
 _ORDER = ("pgv_m_s", "pga_g", "sa03_g", "sa10_g", "sa30_g")
@@ -38,19 +38,19 @@ _CORRELATIONS = (
 )
 
 
-def correlation(one: str, other: str) -> float:
-    """Return the correlation of the total residuals of the logarithms of two measures (RotD50).
+def correlation(measure: str, other: str) -> float:
+    """Return the correlation of the total log residuals of two intensity measures (RotD50).
 
     Baker, J. W. & Bradley, B. A. (2017): Intensity measure correlations observed in the NGA-West2
     database, and dependence of correlations on rupture and site parameters. Earthquake Spectra
     33(1), 145-156.
     """
-    return _CORRELATIONS[_ORDER.index(one)][_ORDER.index(other)]
+    return _CORRELATIONS[_ORDER.index(measure)][_ORDER.index(other)]
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """What of the shaking that a model reads is known with scatter.
+    """Intensity measures of a model that have a dispersion.
 
     Args:
         names: the measures that scatter.
@@ -63,15 +63,15 @@ class Scatter:
     single: bool = True
 
     @classmethod
-    def of(cls, term: Term, given: Mapping[str, Any]) -> tuple[Scatter | None, dict[str, Any]]:
-        """Return the scatter of a question, and the question without what does not scatter.
+    def of(cls, term: Term, inputs: Mapping[str, Any]) -> tuple[Scatter | None, dict[str, Any]]:
+        """Return the dispersion in the inputs, and the inputs without zero dispersions.
 
         Raises:
             InputError: a standard deviation is negative or no number.
         """
-        rest = dict(given)
-        for name in ABOUT_SCATTER.intersection(given):
-            value = given[name]
+        rest = dict(inputs)
+        for name in ABOUT_SCATTER.intersection(inputs):
+            value = inputs[name]
             if isinstance(value, float | int) and not 0.0 <= value < math.inf:
                 raise InputError(
                     f"{name} = {value:g}: give a standard deviation of 0 or more", fields=(name,)
@@ -84,80 +84,84 @@ class Scatter:
                 or (nothing is True or getattr(nothing, "all", bool)())
             ):
                 del rest[name]
-        stated = {SCATTERED[name] for name in rest if name in SCATTERED}
+        scattered = {SCATTERED[name] for name in rest if name in SCATTERED}
         common = "amplification_sigma" if "amplification_sigma" in rest else None
-        moved = [name for name in term.inputs if name in (AMPLIFIED if common else stated)]
-        scatter = cls(tuple(moved), common, len(moved) == 1 or not stated) if moved else None
+        moved = [name for name in term.inputs if name in (AMPLIFIED if common else scattered)]
+        scatter = cls(tuple(moved), common, len(moved) == 1 or not scattered) if moved else None
         return scatter, rest
 
-    def in_numbers(self, given: Mapping[str, float], tau: Any) -> dict[str, dict[str, float]]:
-        """Return median, sigma and, where it is known, tau of each measure that scatters."""
+    def in_numbers(self, inputs: Mapping[str, float], tau: Any) -> dict[str, dict[str, float]]:
+        """Return the median, sigma and, if given, tau of each uncertain intensity measure."""
         result = {}
         for name in self.names:
-            sigma = math.hypot(self.deviation(name, given), self.shared(name, given))
-            result[name] = {"median": given[name], "sigma": sigma}
+            sigma = math.hypot(self.deviation(name, inputs), self.shared(name, inputs))
+            result[name] = {"median": inputs[name], "sigma": sigma}
         if tau is not None and "pgv_m_s" in result:
             result["pgv_m_s"]["tau"] = float(tau)
         return result
 
-    def deviation(self, name: str, given: Mapping[str, Any]) -> Any:
-        """Return the standard deviation of a measure's logarithm by itself."""
-        return given.get(f"{name.partition('_')[0]}_sigma", 0.0)
+    def deviation(self, name: str, inputs: Mapping[str, Any]) -> Any:
+        """Return the log standard deviation of one intensity measure alone."""
+        return inputs.get(f"{name.partition('_')[0]}_sigma", 0.0)
 
-    def shared(self, name: str, given: Mapping[str, Any]) -> Any:
-        """Return that of what all measures share."""
-        return 0.0 if self.common is None else AMPLIFIED[name] * given[self.common]
+    def shared(self, name: str, inputs: Mapping[str, Any]) -> Any:
+        """Return the log standard deviation that all intensity measures share."""
+        return 0.0 if self.common is None else AMPLIFIED[name] * inputs[self.common]
 
 
 @dataclass(frozen=True)
 class MeanModel(FragilityModel):
-    """A fitted model that answers by the mean over what is not known exactly."""
+    """A fitted model whose probability is averaged over uncertain inputs."""
 
     @classmethod
     def over(cls, model: FragilityModel, **about: Any) -> Self:
-        """Return a model that answers for all that block or shaking may be; None is what it is."""
-        own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
-        return cls(**own, **{name: value for name, value in about.items() if value is not None})
+        """Return a model that averages over uncertain block or shaking; None means certain."""
+        attributes = {
+            attribute.name: getattr(model, attribute.name) for attribute in fields(FragilityModel)
+        }
+        return cls(
+            **attributes, **{name: value for name, value in about.items() if value is not None}
+        )
 
     @property
     def uncertain(self) -> bool:
-        """Whether it answers for what is not known exactly."""
+        """True if the model integrates over uncertain inputs."""
         return True
 
-    def bounds(self, given: Any) -> tuple[Bound, ...]:
-        """Return nothing: what mechanics forbids is asked at each point."""
-        del given
+    def bounds(self, names: Any) -> tuple[MechanicalBound, ...]:
+        """Return no bounds: they are applied at each integration point."""
+        del names
         return ()
 
 
 @dataclass(frozen=True)
 class ShakenModel(MeanModel):
-    """A fitted model that answers for one variable of the shaking and one certain block."""
+    """A fitted model for one uncertain intensity measure and one certain block."""
 
     scatter: Scatter = field(kw_only=True)
 
     @property
     def scattered(self) -> bool:
-        """Whether the shaking is uncertain."""
+        """True: the shaking is uncertain."""
         return True
 
     def answer(
         self,
         values: Mapping[str, Any],
         quantiles: Quantiles | None,
-        ns: Numbers,
-        given: Mapping[str, Any],
+        ns: ArrayNamespace,
+        inputs: Mapping[str, Any],
     ) -> Answer:
-        """Return the answer over all that the shaking may be; see :class:`FragilityModel`."""
+        """Return the prediction averaged over the shaking; see :class:`FragilityModel`."""
         scatter, link = self.scatter, self.method.link
         sigmas = {
-            name: math.hypot(scatter.deviation(name, given), scatter.shared(name, given))
+            name: math.hypot(scatter.deviation(name, inputs), scatter.shared(name, inputs))
             for name in scatter.names
         }
         middle = outside = 0.0
         totals: list[float] = []
         for x, weight in zip(POINTS, WEIGHTS, strict=True):
-            at = {**given, **{n: given[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
+            at = {**inputs, **{n: inputs[n] * math.exp(sigma * x) for n, sigma in sigmas.items()}}
             values = self.method.block.completed(at, self.term, ns)
             if any(bound.holds(values) for bound in FragilityModel.bounds(self, values)):
                 continue
@@ -179,6 +183,6 @@ class ShakenModel(MeanModel):
         # d(mean P) by each parameter over F' at the mean: slopes of the eta that has the mean P
         at_mean = link.quantile(middle, ns)
         density = link.density(at_mean, ns)
-        reach = self.errors.half_width([each / density for each in totals], quantiles, ns)
+        reach = self.errors.half_width([total / density for total in totals], quantiles, ns)
         low, high = (link.probability(at_mean + end * reach, ns) for end in (-1.0, 1.0))
         return answer._replace(low=low, high=high)

@@ -1,4 +1,4 @@
-"""Points of shaking that is not known exactly, for many questions at once."""
+"""Quadrature points of uncertain shaking, for many inputs at once."""
 
 from __future__ import annotations
 
@@ -26,12 +26,14 @@ _PROBED = 2.4
 
 
 def correlations(names: tuple[str, ...]) -> FloatArray:
-    """Return the matrix of :func:`~rbfrag.fragility.shaking.correlation` of some measures."""
-    return np.array([[correlation(one, other) for other in names] for one in names])
+    """Return the matrix of :func:`~rbfrag.fragility.shaking.correlation` for these intensity
+    measures.
+    """
+    return np.array([[correlation(first, other) for other in names] for first in names])
 
 
-class ShakingPoints:
-    """Points of the measures that scatter, and their weights.
+class GroundMotionQuadrature:
+    """Quadrature points of the uncertain intensity measures, and their weights.
 
     The first measure is taken in the equal steps of one alone, the second in steps of what it may
     be given the first. Of the others given both steps are taken in the direction in which eta moves
@@ -50,14 +52,14 @@ class ShakingPoints:
 
     @cached_property
     def _axes(self) -> list[FloatArray]:
-        """Scores of the axes."""
+        """Standard normal scores of the axes."""
         k, first = 1 if self._scatter.single else len(self._scatter.names), np.array(POINTS)
         second = SECOND if k == 2 else BESIDE_OTHERS
         return [first[first > self._above], second, ALONG][:k]
 
     @cached_property
     def _scores(self) -> list[FloatArray]:
-        """Scores by which each measure moves, shape of the axes that it depends on, and (k,)."""
+        """Scores of each intensity measure, shape of the axes that it depends on, and (k,)."""
         k, axes = len(self._scatter.names), self._axes
         if self._scatter.single:
             return [axes[0][:, None]] * k
@@ -85,47 +87,47 @@ class ShakingPoints:
             result = np.multiply.outer(result, density / density.sum())
         return result
 
-    def factors(self, given: Mapping[str, FloatArray]) -> FloatArray:
-        """Return what scores of the measures are multiplied by, shape (n, k, k)."""
-        factors = self._lower(given)
+    def factors(self, inputs: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the factors of the scores of the intensity measures, shape (n, k, k)."""
+        factors = self._lower(inputs)
         turns = factors.shape[1] > 3 and not self._scatter.single
-        return self._turned(given, factors) if turns else factors
+        return self._turned(inputs, factors) if turns else factors
 
-    def deviation(self, given: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the standard deviation of the first measure, shape (n,)."""
-        return np.asarray(self._lower(given)[:, 0, 0])
+    def deviation(self, inputs: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the standard deviation of the first intensity measure, shape (n,)."""
+        return np.asarray(self._lower(inputs)[:, 0, 0])
 
     def measures(
-        self, given: Mapping[str, FloatArray], factors: FloatArray
+        self, inputs: Mapping[str, FloatArray], factors: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return the measures that scatter, the shape of the axes and (n,).
+        """Return the uncertain intensity measures, the shape of the axes and (n,).
 
         Args:
-            given: the question, shape (n,) each.
+            inputs: the question, shape (n,) each.
             factors: what :meth:`factors` gave for it.
         """
         result, axes = {}, len(self._axes)
         for i, (name, scores) in enumerate(zip(self._scatter.names, self._scores, strict=True)):
-            moved = given[name] * np.exp(scores @ factors[:, i, : scores.shape[-1]].T)
+            moved = inputs[name] * np.exp(scores @ factors[:, i, : scores.shape[-1]].T)
             result[name] = moved[
                 (*[slice(None)] * (moved.ndim - 1), *[None] * (axes + 1 - moved.ndim))
             ]
         return result
 
     def _at(
-        self, given: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
+        self, inputs: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
     ) -> dict[str, FloatArray]:
         return {
-            name: given[name] * np.exp(scores @ factors[:, i].T)
+            name: inputs[name] * np.exp(scores @ factors[:, i].T)
             for i, name in enumerate(self._scatter.names)
         }
 
     def _eta(
-        self, given: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
+        self, inputs: Mapping[str, FloatArray], factors: FloatArray, scores: FloatArray
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return eta at some scores, shape (scores, n), and where mechanics forbids failure."""
+        """Return eta at the scores, shape (scores, n), and where mechanics rules out failure."""
         ns, model = arrays(), self._model
-        values: dict[str, Any] = {**given, **self._at(given, factors, scores)}
+        values: dict[str, Any] = {**inputs, **self._at(inputs, factors, scores)}
         values = model.method.block.completed(values, model.term, ns)
         unscaled, h = model.form.unscaled(model.parameters, values, ns)
         eta, forbidden = unscaled.eta * h, np.zeros(1, dtype=np.bool_)
@@ -133,33 +135,33 @@ class ShakingPoints:
             forbidden = forbidden | bound.holds(values)
         return eta, forbidden
 
-    def fails_at(self, given: Mapping[str, FloatArray], score: float, least: float) -> Any:
-        """Return where P exceeds some least value at a score of the first measure, shape (n,)."""
+    def fails_at(self, inputs: Mapping[str, FloatArray], score: float, least: float) -> Any:
+        """Return where P exceeds a threshold at a score of the first measure, shape (n,)."""
         k = len(self._scatter.names)
         scores = np.zeros((2 * k - 1, k))  # all at their medians, and each by itself off it
         scores[:, 0] = score
         for i in range(1, k):
             scores[2 * i - 1 : 2 * i + 1, i] = (-3.0, 3.0)
         with np.errstate(all="ignore"):
-            eta, forbidden = self._eta(given, self._lower(given), scores)
+            eta, forbidden = self._eta(inputs, self._lower(inputs), scores)
             # P rises with eta: one link is enough
             best = np.where(forbidden, -np.inf, np.nan_to_num(eta, nan=np.inf)).max(axis=0)
             return self._model.method.link.probability(best, arrays()) > least
 
-    def _lower(self, given: Mapping[str, FloatArray]) -> FloatArray:
-        """Return lower factors of the covariances of the logarithms, shape (n, k, k)."""
+    def _lower(self, inputs: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the lower Cholesky factors of the log covariances, shape (n, k, k)."""
         names, scatter = self._scatter.names, self._scatter
-        own, shared = (
-            [np.atleast_1d(of(name, given)) for name in names]
+        individual, shared = (
+            [np.atleast_1d(of(name, inputs)) for name in names]
             for of in (scatter.deviation, scatter.shared)
         )
-        k, n = len(names), max(each.size for each in (*own, *shared))
+        k, n = len(names), max(column.size for column in (*individual, *shared))
         factor = np.zeros((n, k, k))
-        for i, one in enumerate(names):
+        for i, first in enumerate(names):
             for j, other in enumerate(names[: i + 1]):
                 rest = shared[i] * shared[j] - (factor[:, i, :j] * factor[:, j, :j]).sum(axis=1)
-                if own[i].any() and own[j].any():
-                    rest = rest + correlation(one, other) * own[i] * own[j]
+                if individual[i].any() and individual[j].any():
+                    rest = rest + correlation(first, other) * individual[i] * individual[j]
                 if i == j:
                     # what is left of rounding is nothing
                     factor[:, i, i] = np.sqrt(np.where(rest > 1e-12, rest, 0.0))
@@ -168,14 +170,14 @@ class ShakingPoints:
                     np.divide(rest, pivot, out=factor[:, i, j], where=pivot > 0.0)
         return factor
 
-    def _turned(self, given: Mapping[str, FloatArray], factors: FloatArray) -> FloatArray:
-        """Return factors whose third score moves eta most, by a reflection of Householder."""
+    def _turned(self, inputs: Mapping[str, FloatArray], factors: FloatArray) -> FloatArray:
+        """Return factors whose third score moves eta most, by a Householder reflection."""
         k = factors.shape[1]
         around = np.zeros((2 * (k - 2), k))
         around[:, 0] = _PROBED
         for i in range(k - 2):
             around[2 * i : 2 * i + 2, i + 2] = (-0.5, 0.5)
-        at, _ = self._eta(given, factors, around)
+        at, _ = self._eta(inputs, factors, around)
         gradient = np.nan_to_num(at[1::2] - at[::2], posinf=0.0, neginf=0.0).T
         length = np.linalg.norm(gradient, axis=1, keepdims=True)
         mirror = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0.0)

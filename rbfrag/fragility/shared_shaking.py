@@ -1,4 +1,4 @@
-"""What share of like blocks fails at some sites of one earthquake, where the shaking scatters."""
+"""Fraction of identical blocks that fail at several sites in one earthquake (uncertain shaking)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _LEAST, _MOST = 1e-9, 1.0 - 1e-9
 def shaken_share_range(
     along: FloatArray, tau: float, sigma: float, law: Dependence, sites: int, level: float
 ) -> tuple[float, float]:
-    """Return between which shares of like blocks fail at some sites of one future earthquake.
+    """Return the prediction interval of the failed fraction of identical blocks at several sites in
+    one earthquake.
 
     Given what the shaking of all sites shares, that of each site is independent, and the number of
     failures is beta-binomial, as in :func:`rbfrag.fragility.joint.share_range`, of the mean and of
@@ -51,6 +52,6 @@ def shaken_share_range(
     order = np.argsort(counts, axis=None)
     below = np.cumsum(np.broadcast_to(w / _LEVELS.size, counts.shape).ravel()[order])
     tail = 0.5 - 0.5 * level
-    places = np.minimum(np.searchsorted(below, (tail, 1.0 - tail)), order.size - 1)
-    low, high = counts.ravel()[order[places]] / n
+    indices = np.minimum(np.searchsorted(below, (tail, 1.0 - tail)), order.size - 1)
+    low, high = counts.ravel()[order[indices]] / n
     return float(low), float(high)

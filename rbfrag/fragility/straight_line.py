@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rbfrag.fragility.method import Numbers
+from rbfrag.fragility.method import ArrayNamespace
 
 NEGATIVE_LIMIT = 0.025
 """Probability of a negative critical velocity above which a straight line is doubted."""
@@ -23,12 +23,12 @@ def variance_m2_s2(b: Sequence[float], x: Any) -> Any:
     return x * b[3] + b[2]
 
 
-def negative_probability(b: Sequence[float], x: Any, ns: Numbers) -> Any:
-    """Return the probability that the model gives to critical velocities below zero at x."""
+def negative_probability(b: Sequence[float], x: Any, ns: ArrayNamespace) -> Any:
+    """Return the model's probability of negative critical velocities at x."""
     return ns.ndtr(-(mean_m_s(b, x) / ns.sqrt(variance_m2_s2(b, x))))
 
 
 def rise(b: Sequence[float], x: Any, y: Any) -> Any:
-    """Return v^(3/2) deta/dx, negative where P would fall with growing intensity."""
+    """Return v^(3/2) deta/dx, negative where P would decrease with increasing intensity."""
     slope = b[3] + 2.0 * b[4] * x if len(b) > 4 else b[3]
     return variance_m2_s2(b, x) * b[1] - (mean_m_s(b, x) - y) * slope * 0.5

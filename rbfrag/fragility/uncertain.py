@@ -1,4 +1,4 @@
-"""Blocks and shaking that are not known exactly: the probability over all that they may be.
+"""Uncertain blocks and shaking: the failure probability averaged over their distributions.
 
 P = Σ w_i F(eta_i) over the product of what the block and what the shaking may be. The interval is
 that of the sum: the slope of the sum by each parameter is Σ w_i F'(eta_i) x_i, one step of the
@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
-from rbfrag.fragility.method import SINGLE, BlockParameters, Eta, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, ArrayNamespace, BlockParameters, LinearPredictor, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.shaking import MeanModel
-from rbfrag.fragility.shaking_points import ShakingPoints
+from rbfrag.fragility.shaking_points import GroundMotionQuadrature
 from rbfrag.solver.results import FloatArray
 from rbfrag.solver.scatter import fraction, lognormal
 
@@ -36,7 +36,7 @@ _AT_ONCE, _STEP = 1 << 15, 0.1
 
 
 def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray]:
-    """Return points of a standard normal variable in equal steps, and weights that sum to 1.
+    """Return equally spaced points of a standard normal variable, with weights that sum to 1.
 
     For smooth integrands as good as Gauss-Hermite, and much better for a fragility that is steep
     beside the scatter.
@@ -53,7 +53,7 @@ def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray
 def scatter_steps(
     sigma: float, reach: float = 5.0, fewest: int = 9
 ) -> tuple[FloatArray, FloatArray]:
-    """Return :func:`normal_steps` of .1 of a logarithm or less; of no scatter the mean alone.
+    """Return :func:`normal_steps` of at most 0.1 in a logarithm; without dispersion the mean alone.
 
     Args:
         sigma: standard deviation of the logarithm.
@@ -66,17 +66,18 @@ def scatter_steps(
 def normal_product(
     axes: Sequence[tuple[FloatArray, FloatArray]],
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Return points of independent variables together, shape (k,) each, and their weights."""
+    """Return product points of independent variables, shape (k,) each, and their weights."""
     weight = np.ones(1)
     for _, of_one in axes:
         weight = np.outer(weight, of_one).ravel()
     points = np.meshgrid(*(x for x, _ in axes), indexing="ij")
-    return [each.ravel() for each in points], weight
+    return [grid.ravel() for grid in points], weight
 
 
 @dataclass(frozen=True, eq=False)
 class BlockScatter:
-    """Strength and size lognormal about medians, fractions normal cut at 0 and 1; independent.
+    """Block uncertainty: strength and size lognormal, fractions normal truncated at 0 and 1;
+    independent.
 
     Args:
         z: standard normal points by the name of the value, shape (k,) each.
@@ -89,7 +90,7 @@ class BlockScatter:
 
     @classmethod
     def of(cls, block: BlockParameters, sigmas: Iterator[str]) -> BlockScatter:
-        """Return the points for what is uncertain of a block, a product of steps.
+        """Return the integration points of the uncertain block parameters, a product of steps.
 
         Args:
             block: what describes blocks.
@@ -103,18 +104,18 @@ class BlockScatter:
         points, weight = normal_product(steps)
         return cls(block.fractions, dict(zip(names, points, strict=True)), weight)
 
-    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the values that change, shape (k, n), for what is given, shape (n,) each."""
+    def blocks(self, inputs: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the uncertain values, shape (k, n), from the inputs, shape (n,) each."""
         result = {}
         for name, z in self.z.items():
             law = fraction if name in self.fractions else lognormal
-            result[name] = law(z[:, None], given[name], given[f"{name}_sigma"])
+            result[name] = law(z[:, None], inputs[name], inputs[f"{name}_sigma"])
         return result
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """What a block may be, one by one, so that its values go together as they do in the draws.
+    """Draws from the block uncertainty, which keep the dependence between parameters.
 
     Args:
         values: values by name, shape (k,) each.
@@ -124,9 +125,9 @@ class Draws:
     values: Mapping[str, FloatArray]
     weight: FloatArray
 
-    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the values that change, shape (k, 1)."""
-        del given
+    def blocks(self, inputs: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return the uncertain values, shape (k, 1)."""
+        del inputs
         return {name: drawn[:, None] for name, drawn in self.values.items()}
 
     def medians(self) -> dict[str, float]:
@@ -141,13 +142,13 @@ class Draws:
 
 @dataclass(frozen=True, eq=False)
 class _Certain:
-    """One block, as it is given."""
+    """A block without uncertainty."""
 
     weight: FloatArray = field(default_factory=lambda: np.ones(1))
 
-    def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return nothing: no value changes."""
-        del given
+    def blocks(self, inputs: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return no values: the block is certain."""
+        del inputs
         return {}
 
 
@@ -157,7 +158,7 @@ Possible = BlockScatter | Draws | _Certain
 
 @dataclass(frozen=True)
 class UncertainModel(MeanModel):
-    """A fitted model that answers for blocks and shaking that are not known exactly.
+    """A fitted model for uncertain blocks and shaking.
 
     Args:
         possible: what the block may be.
@@ -166,79 +167,81 @@ class UncertainModel(MeanModel):
     """
 
     possible: Possible = field(kw_only=True, default_factory=_Certain)
-    points: ShakingPoints | None = field(kw_only=True, default=None)
+    points: GroundMotionQuadrature | None = field(kw_only=True, default=None)
     judged: bool = field(kw_only=True, default=True)
 
     @property
     def scattered(self) -> bool:
-        """Whether the shaking is uncertain."""
+        """True if the shaking is uncertain."""
         return self.points is not None
 
     def answer(
         self,
         values: Mapping[str, Any],
         quantiles: Quantiles | None,
-        ns: Numbers,
-        given: Mapping[str, Any],
+        ns: ArrayNamespace,
+        inputs: Mapping[str, Any],
     ) -> Answer:
-        """Return the answer over all that the block may be; see :class:`FragilityModel`."""
+        """Return the prediction averaged over block uncertainty; see :class:`FragilityModel`."""
         del values  # they are those of the medians
-        columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in given.items()}
+        columns = {n: np.atleast_1d(np.asarray(v, dtype=np.float64)) for n, v in inputs.items()}
         size = max(column.size for column in columns.values())
-        each, points, factors = self.possible.weight.size, self.points, np.empty(0)
+        n_points, points, factors = self.possible.weight.size, self.points, np.empty(0)
         parts = []
         with np.errstate(all="ignore"):
             if points is not None:
-                each *= points.weight.size
+                n_points *= points.weight.size
                 factors = points.factors(columns)
-            step = max(1, _AT_ONCE // each)
+            step = max(1, _AT_ONCE // n_points)
             for start in range(0, size, step):
-                own = {n: c if c.size == 1 else c[start : start + step] for n, c in columns.items()}
+                chunk = {
+                    n: c if c.size == 1 else c[start : start + step] for n, c in columns.items()
+                }
                 of_these = factors if len(factors) <= 1 else factors[start : start + step]
-                parts.append(self._part(own, of_these, quantiles, min(step, size - start)))
+                parts.append(self._part(chunk, of_these, quantiles, min(step, size - start)))
         rows = [None if row[0] is None else np.concatenate(row) for row in zip(*parts, strict=True)]
         if ns is SINGLE:
             return Answer(*(None if row is None else float(row[0]) for row in rows))
         return Answer(*rows)
 
-    def along(self, given: Mapping[str, Any]) -> tuple[FloatArray, float]:
-        """Return P of one question at each point of the first measure, and its deviation.
+    def along(self, inputs: Mapping[str, Any]) -> tuple[FloatArray, float]:
+        """Return P at each point of the first intensity measure, and its standard deviation.
 
         Args:
-            given: the question, single numbers.
+            inputs: the question, single numbers.
         """
         assert self.points is not None
-        columns = {name: np.array([float(value)]) for name, value in given.items()}
+        columns = {name: np.array([float(value)]) for name, value in inputs.items()}
         weight = self.points.weight
         with np.errstate(all="ignore"):
             values = self._values(columns, self.points.factors(columns))
             p = self._certain(values, (self.possible.weight.size, *weight.shape, 1))[0]
         over = tuple(range(1, weight.ndim))
-        each = np.tensordot(self.possible.weight, p, 1)[..., 0]
+        probability = np.tensordot(self.possible.weight, p, 1)[..., 0]
         share = weight / weight.sum(axis=over, keepdims=True)
-        return (each * share).sum(axis=over), float(self.points.deviation(columns)[0])
+        return (probability * share).sum(axis=over), float(self.points.deviation(columns)[0])
 
     def _part(
         self,
-        given: Mapping[str, FloatArray],
+        inputs: Mapping[str, FloatArray],
         factors: FloatArray,
         quantiles: Quantiles | None,
         size: int,
     ) -> Answer:
-        """Return the answer for so many questions at once."""
+        """Return the predictions for a chunk of inputs."""
         ns, of_block, points = arrays(), self.possible.weight, self.points
         # blocks, each variable of the shaking, and questions are the axes
         of_shaking = np.ones(()) if points is None else points.weight
         weight = np.multiply.outer(of_block, of_shaking)
         shape, axes = (*weight.shape, size), tuple(range(weight.ndim))
-        values = self._values(given, factors)
+        values = self._values(inputs, factors)
         p, forbidden, eta, unscaled, h = self._certain(values, shape)
         link = self.method.link
         middle = np.tensordot(weight, p, len(axes))
         block_sd = None
         if points is None or of_block.size > 1:
-            each = np.tensordot(of_shaking, np.moveaxis(p, 0, -2), of_shaking.ndim)
-            block_sd = np.sqrt(of_block @ np.square(each - middle))
+            block_p = np.tensordot(of_shaking, np.moveaxis(p, 0, -2), of_shaking.ndim)
+            block_sd = np.sqrt(of_block @ np.square(block_p - middle))
         outside = self._outside(values, p, weight) if self.judged else None
         answer = Answer(middle, None, None, None, None, block_sd, outside)
         if quantiles is None:
@@ -251,7 +254,7 @@ class UncertainModel(MeanModel):
         sums: dict[tuple[int, ...], FloatArray] = {}
 
         def total(slope: Any) -> FloatArray:
-            """Return Σ share · slope; along the axes that a slope does not have, share adds up."""
+            """Return Σ share · slope; the share is summed over axes that a slope lacks."""
             long = np.reshape(slope, (1,) * (len(shape) - np.ndim(slope)) + np.shape(slope))
             same = tuple(axis for axis in axes if long.shape[axis] == 1)
             if same not in sums:
@@ -265,21 +268,21 @@ class UncertainModel(MeanModel):
         )
         return answer._replace(low=low, high=high)
 
-    def _values(self, given: Mapping[str, FloatArray], factors: FloatArray) -> dict[str, Any]:
-        """Return completed values of all that block and shaking may be."""
+    def _values(self, inputs: Mapping[str, FloatArray], factors: FloatArray) -> dict[str, Any]:
+        """Return completed values at all integration points of block and shaking."""
         ndim = 0 if self.points is None else self.points.weight.ndim
         apart = (slice(None), *[None] * ndim)
-        blocks = {name: each[apart] for name, each in self.possible.blocks(given).items()}
-        values: dict[str, Any] = {**given, **blocks}
+        blocks = {name: value[apart] for name, value in self.possible.blocks(inputs).items()}
+        values: dict[str, Any] = {**inputs, **blocks}
         if self.points is not None:
-            measures = self.points.measures(given, factors)
-            values |= {name: each[None] for name, each in measures.items()}
+            measures = self.points.measures(inputs, factors)
+            values |= {name: value[None] for name, value in measures.items()}
         return self.method.block.completed(values, self.term, arrays())
 
     def _certain(
         self, values: Mapping[str, Any], shape: tuple[int, ...]
-    ) -> tuple[FloatArray, Any, FloatArray, Eta, Any]:
-        """Return P of each, where mechanics forbids failure, eta, and what that is made of."""
+    ) -> tuple[FloatArray, Any, FloatArray, LinearPredictor, Any]:
+        """Return P at each point, where mechanics rules out failure, eta and its parts."""
         ns = arrays()
         unscaled, h = self.form.unscaled(self.parameters, values, ns)
         eta = np.broadcast_to(unscaled.eta * h, shape)
@@ -290,35 +293,37 @@ class UncertainModel(MeanModel):
         return p, forbidden, eta, unscaled, h
 
     def _outside(self, values: dict[str, Any], p: FloatArray, weight: FloatArray) -> Any:
-        """Return the share of the block, or of P where the shaking scatters, outside the ranges."""
+        """Return the fraction of the block, or of P for uncertain shaking, outside the fitted
+        ranges.
+        """
         outside = np.broadcast_to(self.lies_outside(values, arrays()), p.shape)
         if self.points is None:
             return np.tensordot(weight, outside, weight.ndim)
         # of low shaking, which fails nothing, nothing is to be said
         share = np.tensordot(weight, p * outside, weight.ndim)
-        whole = np.tensordot(weight, p, weight.ndim)
-        return np.divide(share, whole, out=np.zeros(share.shape), where=whole > 0.0)
+        total = np.tensordot(weight, p, weight.ndim)
+        return np.divide(share, total, out=np.zeros(share.shape), where=total > 0.0)
 
 
 def drawn_model(
-    model: FragilityModel, given: Mapping[str, Any], weights: ArrayLike
+    model: FragilityModel, inputs: Mapping[str, Any], weights: ArrayLike
 ) -> tuple[FragilityModel, dict[str, Any]]:
-    """Return the model that answers for draws of one block, and the question for their medians.
+    """Return the model for draws of one block, and the inputs at their medians.
 
     Args:
         model: the model of certain blocks.
-        given: the question: arrays, shape (k,), are draws of the block.
+        inputs: the question: arrays, shape (k,), are draws of the block.
         weights: their weights, shape (k,), or 1 where all weigh the same.
 
     Raises:
         InputError: a draw that is no block, weights that are none, or standard deviations beside.
     """
     block = model.method.block
-    for name in given:
+    for name in inputs:
         if name in block.sigmas:
             raise InputError(f"{name} cannot be combined with draws, which give the dispersion")
     try:
-        named = {name: np.asarray(value, dtype=np.float64) for name, value in given.items()}
+        named = {name: np.asarray(value, dtype=np.float64) for name, value in inputs.items()}
         drawn = {name: value for name, value in named.items() if value.ndim}
         *columns, weight = np.broadcast_arrays(
             *drawn.values(), np.asarray(weights, dtype=np.float64)
@@ -337,23 +342,23 @@ def drawn_model(
             first = int(np.flatnonzero(finding.holds)[0])
             raise InputError(f"draw {first + 1}: {finding.about(float(finding.value[first]))}")
     draws = Draws(values, weight / weight.sum())
-    return UncertainModel.over(model, possible=draws), {**given, **draws.medians()}
+    return UncertainModel.over(model, possible=draws), {**inputs, **draws.medians()}
 
 
 def uncertain_model(
-    model: FragilityModel, given: Mapping[str, Any]
+    model: FragilityModel, inputs: Mapping[str, Any]
 ) -> tuple[FragilityModel, dict[str, Any]]:
-    """Return the model that answers a question, and the question without sigmas that are 0.
+    """Return the model for the inputs, and the inputs without zero standard deviations.
 
     Args:
         model: the model of certain blocks.
-        given: the question, with standard deviations among its values.
+        inputs: the question, with standard deviations among its values.
 
     Raises:
         InputError: a standard deviation is negative or no number, or of what is not given.
     """
     sigmas = model.method.block.sigmas
-    rest = dict(given)
+    rest = dict(inputs)
     for sigma, name in sigmas.items():
         if sigma not in rest:
             continue
@@ -364,7 +369,9 @@ def uncertain_model(
             del rest[sigma]
         elif name not in rest:
             raise InputError(f"{sigma} requires {name}: give the median")
-    own = [sigma for sigma in sigmas if sigma in rest]
-    if not own:
+    uncertain = [sigma for sigma in sigmas if sigma in rest]
+    if not uncertain:
         return model, rest
-    return UncertainModel.over(model, possible=BlockScatter.of(model.method.block, iter(own))), rest
+    return UncertainModel.over(
+        model, possible=BlockScatter.of(model.method.block, iter(uncertain))
+    ), rest

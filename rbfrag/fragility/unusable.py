@@ -1,4 +1,4 @@
-"""Blocks of a table that cannot be used: why each, how many, and what is said of them.
+"""Invalid rows of block tables: the reason for each, their number and the messages.
 
 Every command that takes many blocks answers those that it can, gives the others NaN and the reason,
 and says by :func:`unusable_in_words` how many they are. An answer that needs all of them, or a
@@ -33,7 +33,8 @@ _MOST_CHARACTERS = 260
 def block_reasons(
     block: BlockParameters, values: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.object_]:
-    """Return why blocks wait for no earthquake, in the words of `predict`; empty for those that do.
+    """Return why blocks cannot fail in an earthquake, in the words of `predict`; empty where they
+    can.
 
     Args:
         values: parameters of the block, options and standard deviations, if there are any, by the
@@ -49,31 +50,33 @@ def block_reasons(
 
     names = [name for name in (*block.options, *block.sigmas) if name in values]
     with np.errstate(all="ignore"):
-        own = block.filled(values)
-        for finding in refusals(own, (*block.names, *names), (block.strength, *block.options)):
+        filled = block.filled(values)
+        for finding in refusals(filled, (*block.names, *names), (block.strength, *block.options)):
             say(finding.holds, finding)
         at_rest = Remark(
-            own[block.strength] <= 0.0, block.strength, own[block.strength],
+            filled[block.strength] <= 0.0, block.strength, filled[block.strength],
             "is not above zero: the block is unstable and fails without an earthquake",
         )  # fmt: skip
         say(at_rest.holds, at_rest)
-        adjusted = dict(own)
+        adjusted = dict(filled)
         if block.adjust is not None:
             block.adjust(adjusted, arrays())
         for bound in block.refuses:
             if bound.about in names:
-                finding = Remark(bound.holds(adjusted), bound.about, own[bound.about], bound.text)
+                finding = Remark(
+                    bound.holds(adjusted), bound.about, filled[bound.about], bound.text
+                )
                 say(finding.holds, finding)
     return reasons
 
 
 def unusable_in_words(
-    count: int, total: int, places: Sequence[str], reasons: Sequence[str], effect: str = ""
+    count: int, total: int, labels: Sequence[str], reasons: Sequence[str], effect: str = ""
 ) -> tuple[Diagnostic, ...]:
-    """Return what is said of blocks that could not be used; nothing where there are none.
+    """Describe the rejected blocks; empty if there are none.
 
     Args:
-        places: where they stand, or the first.
+        labels: where they stand, or the first.
         reasons: why they could not be used.
         effect: what becomes of them in numbers of several blocks; those of a mean have no row.
     """
@@ -81,39 +84,39 @@ def unusable_in_words(
         return ()
     number = f"{count:,} of {total:,} blocks could not be used{effect}"
     if effect == FROM_MEAN:
-        return (Diagnostic(f"{number}: {in_list(places, reasons)}", "rows_rejected"),)
+        return (Diagnostic(f"{number}: {in_list(labels, reasons)}", "rows_rejected"),)
     which = "it is" if count == 1 else "the first is"
-    text = f"{number}; the reasons stand in the column reason; {which} {places[0]}: {reasons[0]}"
+    text = f"{number}; the reasons stand in the column reason; {which} {labels[0]}: {reasons[0]}"
     return (Diagnostic(text, "rows_rejected"),)
 
 
 def refuse(
-    source: str, places: Sequence[str], reasons: Sequence[str], total: int, why: str = ""
+    source: str, labels: Sequence[str], reasons: Sequence[str], total: int, why: str = ""
 ) -> NoReturn:
-    """Refuse blocks of which some, or all, cannot be used.
+    """Reject a table in which some or all blocks are invalid.
 
     Args:
         source: what messages call them.
-        places: where those stand that cannot be used; if none can, of the first.
+        labels: where those stand that cannot be used; if none can, of the first.
         reasons: why each cannot be used.
         why: why the others do not do; empty where there are no others.
     """
-    if not why or len(places) == total:
-        listed = in_list(places[:FIRST], reasons[:FIRST])
+    if not why or len(labels) == total:
+        listed = in_list(labels[:FIRST], reasons[:FIRST])
         if total == 1:
             raise InputError(f"{source}: invalid block: {listed}")
         more = f", the first {FIRST}" if total > FIRST else ""
         raise InputError(f"{source}: none of {total:,} blocks is valid{more}: {listed}")
     raise InputError(
-        f"{source}: {len(places):,} of {total:,} blocks are invalid, and {why}: "
-        f"{in_list(places, reasons)}: correct or remove these rows"
+        f"{source}: {len(labels):,} of {total:,} blocks are invalid, and {why}: "
+        f"{in_list(labels, reasons)}: correct or remove these rows"
     )
 
 
 def refuse_elements(
     reasons: NDArray[np.object_], why: str = "", fields: Collection[str] = ()
 ) -> None:
-    """Refuse arrays of blocks, by their elements; without `why` only where none can be used.
+    """Reject arrays with invalid elements; without `why` only if all are invalid.
 
     Args:
         reasons: of each element, empty where it can be used, shape (m,).
@@ -128,26 +131,26 @@ def refuse_elements(
 
 
 def elements(reasons: NDArray[np.object_]) -> list[str]:
-    """Return where the elements of an array stand that cannot be used."""
+    """Return the indices of invalid elements of an array."""
     return [f"element {i}" for i in np.flatnonzero(reasons != "").tolist()]
 
 
-def in_list(places: Iterable[str], reasons: Iterable[str]) -> str:
-    """Return blocks with their reasons as one phrase: alike ones together, as many as fit.
+def in_list(labels: Iterable[str], reasons: Iterable[str]) -> str:
+    """Describe blocks with their reasons in one phrase: grouped by reason, as many as fit.
 
     Args:
-        places: where each stands, as "line 3 (block A7)".
+        labels: where each stands, as "line 3 (block A7)".
         reasons: why it cannot be used.
     """
     alike: dict[str, list[str]] = {}
-    for place, reason in zip(places, reasons, strict=True):
+    for place, reason in zip(labels, reasons, strict=True):
         alike.setdefault(reason, []).append(place)
     text, unlisted = "", sum(map(len, alike.values()))
-    for reason, some in alike.items():
-        more = f" and {len(some) - FIRST:,} more" if len(some) > FIRST else ""
-        phrase = f"{', '.join(some[:FIRST])}{more}: {reason}"
+    for reason, members in alike.items():
+        more = f" and {len(members) - FIRST:,} more" if len(members) > FIRST else ""
+        phrase = f"{', '.join(members[:FIRST])}{more}: {reason}"
         if text and len(text) + len(phrase) > _MOST_CHARACTERS:
             break
         text += f"{'; ' if text else ''}{phrase}"
-        unlisted -= len(some)
+        unlisted -= len(members)
     return text + (f"; and {unlisted:,} more" if unlisted else "")

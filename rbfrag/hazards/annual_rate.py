@@ -1,4 +1,4 @@
-"""How often per year something fails whose fragility is a function of the caller's."""
+"""Annual rate of failure for a user-supplied fragility function."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ the curve."""
 
 @dataclass(frozen=True, eq=False)
 class FailureRate:
-    """Annual failure rates of m fragilities and what the ends of the curve leave open.
+    """Annual failure rates of m fragility functions, and what lies beyond the ends of the curve.
 
     Args:
         annual_rate: rates [1/a], shape (m,).
@@ -67,7 +67,7 @@ def probability_in(years: float, annual_rate: FloatArray) -> FloatArray:
 
 
 def checked_years(years: float) -> float:
-    """Return a period [a], or refuse what is none."""
+    """Return a period [a] after checking that it is positive and finite."""
     if not np.isfinite(years) or years <= 0.0:
         raise InputError(f"years = {years:g}: give a period above 0 years")
     return years

@@ -1,4 +1,4 @@
-"""How often per year blocks fail under hazard curves, with what is not known: `hazard`."""
+"""Annual rates of failure under hazard curves, with their uncertainty: `hazard`."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def hazard(
     run: Run | None = None,
     **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> HazardAnswer:
-    """Return how often per year blocks fail under a seismic hazard curve.
+    """Return the annual rates of failure of blocks under a seismic hazard curve.
 
     λ_f = ∫ P(fails | x) (-dλ), by P on the nodes of a grid against the curve's mass there
     (:mod:`rbfrag.hazards.kernel`). The interval is that of the model's parameters, by the delta
@@ -135,7 +135,7 @@ def hazard(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, meaning, answering = parts_of(
+    inputs, meaning, answering = parts_of(
         numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
     curves, weight = branch_curves(curve, weights, meaning)
@@ -146,33 +146,33 @@ def hazard(
             at_least=at_least, years=years, one_class=one_class, count=count, run=run,
         )  # fmt: skip
 
-    return with_drained_rates(answer, given)
+    return with_drained_rates(answer, inputs)
 
 
 def with_drained_rates(
-    answer: Callable[[Mapping[str, Any]], HazardAnswer], given: Mapping[str, Any]
+    answer: Callable[[Mapping[str, Any]], HazardAnswer], inputs: Mapping[str, Any]
 ) -> HazardAnswer:
-    """Return the rates of blocks; with those without water pressure where water stands.
+    """Return the rates of the blocks, with the drained rates where there is water pressure.
 
     Args:
         answer: answers for fields of blocks.
-        given: these fields.
+        inputs: these fields.
     """
-    result = answer(given)
-    if not is_wet(given):
+    result = answer(inputs)
+    if not is_wet(inputs):
         return result
     try:
-        bound = answer(without_water(given))
+        bound = answer(without_water(inputs))
     except InputError as error:
         return replace(result, warnings=(*result.warnings, no_drained_bound(error)))
-    wet = np.asarray(given["water_m"], dtype=np.float64) > 0.0
+    wet = np.asarray(inputs["water_m"], dtype=np.float64) > 0.0
     return replace(result, drained=np.where(wet, bound.annual_rate, np.nan))
 
 
 def hazard_at_sites(
     sites: Sequence[Sequence[HazardCurve]],
     site: Indices | None,
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     meaning: CurveKeywords,
     answering: AnsweringFields,
     *,
@@ -184,12 +184,12 @@ def hazard_at_sites(
     count: ArrayLike | None = None,
     run: Run | None = None,
 ) -> HazardAnswer:
-    """Return how often per year blocks of some sites fail; see :func:`hazard`.
+    """Return the annual rates of failure of blocks at several sites; see :func:`hazard`.
 
     Args:
         sites: curves of one measure of each site, as many of each.
         site: index of each block's site, shape (m,); None for one site.
-        given: fields of the blocks, numbers or of shape (m,).
+        inputs: fields of the blocks, numbers or of shape (m,).
         meaning: what the levels of the curves are.
         answering: model, level and database.
         weight: weights of the curves of a site, NaN for one that is no branch; None where none is.
@@ -208,7 +208,7 @@ def hazard_at_sites(
             f"the disaggregation by magnitude{by_model}",
             fields=("model", "disaggregation"),
         )
-    parts, remarks, reason = parts_by_model(given, reading, answering)
+    parts, remarks, reason = parts_by_model(inputs, reading, answering)
     refuse_elements(reason, fields=BLOCK)
     sound = np.asarray(reason == "", dtype=bool)
     where = np.zeros(sound.size, dtype=np.intp) if site is None else site
@@ -224,12 +224,15 @@ def hazard_at_sites(
     # over the quadrature points of their own parameters.
     blocks: list[tuple[Indices, KernelBlocks]] = []
     for part in parts:
-        places = where[part.places]
-        for own, some in KernelBlocks.of(part.model, reading.median, part.numbers, places):
-            blocks.append((part.places[own], some))
-    each = [(places, some, rates(some, mass, level, run)) for places, some in blocks]
+        indices = where[part.indices]
+        for rows, group in KernelBlocks.of(part.model, reading.median, part.numbers, indices):
+            blocks.append((part.indices[rows], group))
+    group_rates = [(indices, group, rates(group, mass, level, run)) for indices, group in blocks]
     number = np.ones(sound.size) if count is None else np.asarray(count, dtype=np.float64)
-    result, total = _whole(each, sound.size, len(mass.branches)), _total_half(each, number, level)
+    result, total = (
+        _join_rates(group_rates, sound.size, len(mass.branches)),
+        _total_half(group_rates, number, level),
+    )
     if one_class:
         result, where = _of_class(result, total), np.zeros(1, dtype=np.intp)
         number = np.ones(1)
@@ -238,7 +241,7 @@ def hazard_at_sites(
     joints: tuple[JointRate | None, ...] = (None,) * len(sites)
     of_joints: tuple[str, ...] = ()
     if (joint or at_least is not None) and not one_class:
-        joints, of_joints = joint_at_sites(each, mass, at_least, years, level, number)
+        joints, of_joints = joint_at_sites(group_rates, mass, at_least, years, level, number)
     ends = _beyond(result, mass, where)
     notes = reading.warnings
     if SINGLE_CURVE in notes and sound.size == 1:
@@ -258,9 +261,9 @@ def hazard_at_sites(
     edges, contribution = np.empty(0), np.empty((0, 0))
     if result.rate.size == 1:
         edges, contribution = curve_contributions(
-            sites[0], branch_weight, reading, [some for _, some in blocks]
+            sites[0], branch_weight, reading, [group for _, group in blocks]
         )
-    whole = float(np.nansum(number * result.rate))
+    total_rate = float(np.nansum(number * result.rate))
     nothing = np.full(result.rate.shape, np.nan)
     low, high = nothing, nothing
     quantiles: dict[float, FloatArray] = {}
@@ -268,7 +271,7 @@ def hazard_at_sites(
         low, high, quantiles = _quantiles(result, weight, level)
     kinds = np.full(sound.size, "", dtype=object)
     for part in parts:
-        kinds[part.places] = part.model.row.kind
+        kinds[part.indices] = part.model.row.kind
     models = [part.model for part in parts]
     return HazardAnswer(
         annual_rate=result.rate,
@@ -280,9 +283,9 @@ def hazard_at_sites(
         probability=_probability(result, branch_weight, years),
         years=years,
         level=level,
-        model=_listed(one.name for one in models),
-        term=_listed(one.term.name for one in models),
-        method=_listed(one.row.method for one in models),
+        model=_listed(model.name for model in models),
+        term=_listed(model.term.name for model in models),
+        method=_listed(model.row.method for model in models),
         site=where,
         curves=tuple(first),
         edges=edges,
@@ -295,8 +298,8 @@ def hazard_at_sites(
         curve_kind="weighted branches" if weight is not None else first[0].statistic or None,
         branches=_branches(sites[0], result, weight, number),
         quantiles=quantiles,
-        total_low=float(interval_end(np.array(whole), total, -1.0)),
-        total_high=float(interval_end(np.array(whole), total, 1.0)),
+        total_low=float(interval_end(np.array(total_rate), total, -1.0)),
+        total_high=float(interval_end(np.array(total_rate), total, 1.0)),
         warnings=counted(texts),
         reason=np.full(1, "", dtype=object) if one_class else reason,
         kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
@@ -325,21 +328,28 @@ def _single_component_note(
         )
 
 
-def _whole(each: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int) -> Rates:
-    """Return the rates of all blocks, NaN of those that cannot be used.
+def _join_rates(
+    group_rates: Sequence[tuple[Indices, KernelBlocks, Rates]], size: int, branches: int
+) -> Rates:
+    """Return the rates of all blocks; NaN where a block is rejected.
 
     Without gradients, of which each model has its own; error and outside are parts of the rates.
     """
     rows = np.full((7 + branches, size), np.nan)
-    for places, _, one in each:
-        scale = np.maximum(one.rate, np.finfo(np.float64).tiny)
-        own = (one.rate, one.half, one.error / scale, one.outside / scale)
-        rows[:, places] = [*own, *one.ends, *one.branches]
+    for indices, _, part_rates in group_rates:
+        scale = np.maximum(part_rates.rate, np.finfo(np.float64).tiny)
+        values = (
+            part_rates.rate,
+            part_rates.half,
+            part_rates.error / scale,
+            part_rates.outside / scale,
+        )
+        rows[:, indices] = [*values, *part_rates.ends, *part_rates.branches]
     return Rates(rows[0], rows[1], rows[:0], rows[2], rows[3], rows[7:], rows[4:7])
 
 
 def _of_class(result: Rates, half: float) -> Rates:
-    """Return the rates of a class: those of a block drawn from it.
+    """Return the mean rate of a class of blocks.
 
     Args:
         half: what the interval of the sum of all rates reaches to on either side.
@@ -358,17 +368,19 @@ def _of_class(result: Rates, half: float) -> Rates:
 
 
 def _total_half(
-    each: Sequence[tuple[Indices, KernelBlocks, Rates]], count: FloatArray, level: float
+    group_rates: Sequence[tuple[Indices, KernelBlocks, Rates]], count: FloatArray, level: float
 ) -> float:
-    """Return what the interval of the sum of all rates reaches to on either side.
+    """Return the half-width of the confidence interval of the total rate.
 
     Blocks of one model have its parameters in common; those of several are independent.
     """
     gradients: dict[str, tuple[Any, FloatArray]] = {}
-    for places, blocks, one in each:
+    for indices, blocks, part_rates in group_rates:
         model = blocks.model
-        before = gradients.get(model.name, (model.errors, np.zeros(one.gradient.shape[0])))[1]
-        gradients[model.name] = model.errors, before + one.gradient @ count[places]
+        before = gradients.get(model.name, (model.errors, np.zeros(part_rates.gradient.shape[0])))[
+            1
+        ]
+        gradients[model.name] = model.errors, before + part_rates.gradient @ count[indices]
     halves = [
         float(half_width(errors, gradient[:, None], level)[0])
         for errors, gradient in gradients.values()
@@ -377,7 +389,7 @@ def _total_half(
 
 
 def _beyond(result: Rates, mass: SiteMass, site: Indices) -> tuple[FloatArray, FloatArray]:
-    """Return the rates from beyond the last level of the curves, at least and at most [1/a]."""
+    """Return lower and upper bounds of the rates from shaking above the last level [1/a]."""
     ends = mass.ends
     assert ends is not None
     last = ends.rate[site]
@@ -393,13 +405,13 @@ def _probability(result: Rates, weight: FloatArray, years: float) -> FloatArray:
 def _quantiles(
     result: Rates, weight: FloatArray, level: float
 ) -> tuple[FloatArray, FloatArray, dict[float, FloatArray]]:
-    """Return the 5 and 95 % quantiles over the branches alone, and those of the mixture."""
+    """Return quantiles of rates over the branches, without and with parameter uncertainty."""
     used = ~np.isnan(weight)
-    own, shares = result.branches[used], weight[used]
+    branch_rates, shares = result.branches[used], weight[used]
     with np.errstate(divide="ignore", invalid="ignore"):
         log_sd = np.divide(result.half, result.rate) / quantiles_of(level).normal
-    low, high = weighted_quantiles(own, shares, (QUANTILES[0], QUANTILES[-1]))
-    mixed = mixture_quantiles(own, shares, np.nan_to_num(log_sd), QUANTILES)
+    low, high = weighted_quantiles(branch_rates, shares, (QUANTILES[0], QUANTILES[-1]))
+    mixed = mixture_quantiles(branch_rates, shares, np.nan_to_num(log_sd), QUANTILES)
     return low, high, dict(zip(QUANTILES, mixed, strict=True))
 
 
@@ -452,7 +464,7 @@ _NUMBER = re.compile(r"[+-]?\d[\d.,]*(?:e[+-]?\d+)?")
 
 
 def counted(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return warnings by kind: one that differs from another in numbers alone is counted with it.
+    """Return the warnings grouped: texts that differ only in their numbers are counted together.
 
     What is said of each of thousands of sites is said once, with the first as an example.
     """

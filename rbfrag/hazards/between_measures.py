@@ -1,4 +1,4 @@
-"""By what rates of intensity measures differ, and PGV from PGA or from a spectral acceleration.
+"""Ratios of rates between intensity measures, and PGV predicted from PGA and magnitude.
 
 A model of PGA averages over the PGV that goes with a PGA in the reference, whose earthquakes are
 stronger than those that most often make such a PGA. PGV and SA(1.0) need no magnitude.
@@ -47,7 +47,7 @@ def velocity_of(pga_g: FloatArray, magnitude: FloatArray) -> FloatArray:
 
 
 def component_of_velocity(component: Component) -> Component:
-    """Return what PGV by :func:`velocity_of` is to a model where PGA is of a component."""
+    """Return the component of PGV by :func:`velocity_of`, where PGA is of a given component."""
     return replace(
         component,
         amplitude=component.ratio("pga_g") ** _SLOPE,
@@ -56,7 +56,7 @@ def component_of_velocity(component: Component) -> Component:
 
 
 def factors_between(tau: float) -> tuple[float, float]:
-    """Return by what rates of other measures differ from this one, 95 %: exp(±1.96 tau)."""
+    """Return the 95 % range of the ratio to rates by other intensity measures: exp(±1.96 tau)."""
     return math.exp(-1.96 * tau), math.exp(1.96 * tau)
 
 
@@ -69,7 +69,7 @@ def as_dict(tau: float | None) -> dict[str, float] | None:
 
 
 def in_words(tau: float) -> str:
-    """Return the factors by which another intensity measure may change a rate, in words."""
+    """Return the text on the factors by which another intensity measure may change a rate."""
     low, high = factors_between(tau)
     return f"Not included in the interval: choice of intensity measure, × {low:.2f}–{high:.2f}"
 

@@ -1,4 +1,4 @@
-"""Hazard curves of one site that are branches of a logic tree, statistics of it, or both."""
+"""Hazard curves of one site: logic-tree branches, their statistics, or both."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Weights = Sequence[float | None] | str | os.PathLike[str]
 
 
 def curve_name(curve: HazardCurve) -> str:
-    """Return what of a logic tree a curve is, or where it comes from."""
+    """Return the logic-tree branch or statistic of a curve, or else its source."""
     return curve.statistic or curve.source
 
 
@@ -48,56 +48,58 @@ def quantile_warning(curve: HazardCurve, answer: str) -> Iterator[Diagnostic]:
 
 
 def branch_curves(
-    given: CurveLike | Sequence[CurveLike], weights: Weights | None, meaning: CurveKeywords
+    curve_sources: CurveLike | Sequence[CurveLike], weights: Weights | None, meaning: CurveKeywords
 ) -> tuple[list[HazardCurve], FloatArray | None]:
-    """Return curves of one site and measure, and the weights of those that are branches.
+    """Return the curves of one site and measure, and the weights of the logic-tree branches.
 
     Args:
-        given: curves or their files.
+        curve_sources: curves or their files.
         weights: as for :func:`rbfrag.hazard`.
         meaning: which curves are meant.
     """
-    curves = as_curves(given, **meaning)
+    curves = as_curves(curve_sources, **meaning)
     refuse_unlike(curves)
     return curves, branch_weights(weights, curves)
 
 
-def branch_weights(given: Weights | None, curves: Sequence[HazardCurve]) -> FloatArray | None:
-    """Return the weights of the curves of a site, which sum to 1; None where none is given.
+def branch_weights(weights: Weights | None, curves: Sequence[HazardCurve]) -> FloatArray | None:
+    """Return the branch weights of the curves of a site, which sum to 1; None without weights.
 
     Args:
-        given: numbers in the order of the curves, None for one that is no branch and has the weight
-            NaN; also as text: 0.5,0.3,0.2; or the name of a file of realizations.
+        weights: numbers in the order of the curves, None for a curve that is not a branch (weight
+            NaN); also as text: 0.5,0.3,0.2; or the name of a file of realizations.
 
     Raises:
         InputError: another number of weights, one that is none, or a sum other than 1.
     """
-    if isinstance(given, str | os.PathLike):
-        stated = os.fspath(given)
+    if isinstance(weights, str | os.PathLike):
+        text = os.fspath(weights)
         try:
-            given = [float(part) for part in stated.split(",")]
+            weights = [float(part) for part in text.split(",")]
         except ValueError:
-            given = realization_weights(stated, curves)
-    if given is None or all(one is None for one in given):
+            weights = realization_weights(text, curves)
+    if weights is None or all(weight is None for weight in weights):
         return None
-    if len(given) != len(curves):
-        raise InputError(f"{len(given)} weights for {len(curves)} curves: give one for each")
-    values = np.array([math.nan if one is None else one for one in given], dtype=np.float64)
-    known = values[~np.isnan(values)]
-    if not ((known >= 0.0) & (known <= 1.0)).all():
+    if len(weights) != len(curves):
+        raise InputError(f"{len(weights)} weights for {len(curves)} curves: give one for each")
+    values = np.array(
+        [math.nan if weight is None else weight for weight in weights], dtype=np.float64
+    )
+    finite = values[~np.isnan(values)]
+    if not ((finite >= 0.0) & (finite <= 1.0)).all():
         raise InputError(
-            f"weights {', '.join(f'{one:g}' for one in known)}: each must be from 0 to 1"
+            f"weights {', '.join(f'{weight:g}' for weight in finite)}: each must be from 0 to 1"
         )
-    if abs(known.sum() - 1.0) > _ADDS_UP:
+    if abs(finite.sum() - 1.0) > _ADDS_UP:
         raise InputError(
-            f"the weights of {known.size} branches add up to {known.sum():.6g}, not 1: give the "
+            f"the weights of {finite.size} branches add up to {finite.sum():.6g}, not 1: give the "
             "curves and weights of all branches"
         )
-    return np.asarray(values / known.sum())
+    return np.asarray(values / finite.sum())
 
 
 def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
-    """Refuse no curve at all, and curves of several measures or sites."""
+    """Reject an empty list of curves, and curves of several measures or sites."""
     if not curves:
         raise InputError("no hazard curve: give one or more")
     measures = list(dict.fromkeys(curve.imt for curve in curves))
@@ -107,16 +109,16 @@ def refuse_unlike(curves: Sequence[HazardCurve]) -> None:
             "with imt",
             fields=("imt",),
         )
-    places = list(dict.fromkeys(curve.place for curve in curves if curve.place))
-    if len(places) > 1:
+    sites = list(dict.fromkeys(curve.place for curve in curves if curve.place))
+    if len(sites) > 1:
         raise InputError(
-            f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks are "
+            f"the curves are of {len(sites)} sites ({sites[0]}; {sites[1]}; …): the blocks are "
             "at one site: choose it by number or name"
         )
 
 
 def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[float]) -> FloatArray:
-    """Return the smallest values that the weights up to them reach q, shape (len(q), ...).
+    """Return the smallest values with cumulative weight of at least q, shape (len(q), ...).
 
     Args:
         values: one a branch along the first axis.
@@ -132,7 +134,7 @@ def weighted_quantiles(values: FloatArray, weights: FloatArray, q: Sequence[floa
 def mixture_quantiles(
     rates_of: FloatArray, weight: FloatArray, log_sd: FloatArray, q: Sequence[float]
 ) -> FloatArray:
-    """Return quantiles of rates over branches, each lognormal about its rate, (len(q), m).
+    """Return quantiles of rates over branches with lognormal dispersion, shape (len(q), m).
 
     Args:
         rates_of: rate in each branch, branches x m.
@@ -157,7 +159,7 @@ def mixture_quantiles(
 def realization_weights(
     path: str | os.PathLike[str], curves: Sequence[HazardCurve]
 ) -> list[float | None]:
-    """Return the weight of each curve by OpenQuake's realizations file; None for no branch.
+    """Return the weight of each curve from OpenQuake's realizations file; None for no branch.
 
     Args:
         path: CSV with ``rlz_id`` and ``weight``, lines that begin with # left out.

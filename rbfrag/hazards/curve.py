@@ -1,4 +1,4 @@
-"""A seismic hazard curve: how often per year each level of shaking is exceeded."""
+"""Seismic hazard curves: annual rates of exceedance against the level of shaking."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ANSWERED = "PGV, SA(1), PGA"
 
 
 class CurveKeywords(TypedDict, total=False):
-    """Which curve of a file is meant, and what its levels mean; see :func:`rbfrag.hazard`."""
+    """Keywords that select a curve of a file and define its levels; see :func:`rbfrag.hazard`."""
 
     imt: str | None
     site: str | None
@@ -37,7 +37,7 @@ class CurveKeywords(TypedDict, total=False):
 
 
 class _CurveSite(TypedDict, total=False):
-    """Where a curve is of, and of what; see :class:`HazardCurve`."""
+    """Site, measure and logic-tree statistic of a curve; see :class:`HazardCurve`."""
 
     period_s: float | None
     site: str
@@ -49,7 +49,7 @@ class _CurveSite(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HazardCurve(Tabular):
-    """Annual rates of exceedance at rising levels of one measure of shaking.
+    """Annual rates of exceedance at increasing levels of one intensity measure.
 
     Args:
         measure: one of `MEASURES`.
@@ -103,10 +103,12 @@ class HazardCurve(Tabular):
 
     @property
     def known_as(self) -> str | None:
-        """Name of the measure in `predict`; None where no model reads it alone."""
+        """Name of the measure in `predict`; None where no model uses it as its only measure."""
         name = self.measure
         if name == "sa_g":
-            name = next((each for period, each in SPECTRAL.items() if self.is_of(period)), name)
+            name = next(
+                (measure for period, measure in SPECTRAL.items() if self.is_of(period)), name
+            )
         return name if name in ALONE else None
 
     def is_of(self, period_s: float) -> bool:
@@ -115,7 +117,7 @@ class HazardCurve(Tabular):
 
     @property
     def place(self) -> str:
-        """The site in words."""
+        """Name or coordinates of the site, as text."""
         if self.site:
             return self.site
         if self.lon is None or self.lat is None:
@@ -159,7 +161,7 @@ def hazard_curve(
     source: str = "hazard curve",
     **of: Unpack[_CurveSite],
 ) -> HazardCurve:
-    """Return a checked hazard curve; levels that say nothing are left out with a warning.
+    """Return a checked hazard curve; levels without a usable rate are omitted with a warning.
 
     Levels whose rate is infinite (a probability of 1) are left out. From the first level of
     rate zero on nothing is exceeded: that level becomes `end_level`.
@@ -230,9 +232,9 @@ def _refuse_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str)
             )
     for i in range(1, x.size):
         if x[i] <= x[i - 1]:
-            what = "repeats" if x[i] == x[i - 1] else "falls"
+            verb = "repeats" if x[i] == x[i - 1] else "falls"
             raise InputError(
-                f"{source}: level {i + 1} ({measure} = {x[i]:g}) {what} after {x[i - 1]:g}: "
+                f"{source}: level {i + 1} ({measure} = {x[i]:g}) {verb} after {x[i - 1]:g}: "
                 "levels must increase"
             )
         if rate[i] > rate[i - 1]:

@@ -1,4 +1,4 @@
-"""Hazard curves out of a file: OpenQuake CSV, JSON of the USGS, two columns, or a row a site."""
+"""Hazard curve files: OpenQuake CSV, USGS JSON, two columns, or one row per site."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ CurveLike = HazardCurve | str | os.PathLike[str]
 
 
 def as_curves(
-    given: CurveLike | Sequence[CurveLike], **meaning: Unpack[CurveKeywords]
+    sources: CurveLike | Sequence[CurveLike], **meaning: Unpack[CurveKeywords]
 ) -> list[HazardCurve]:
-    """Return the curves that an argument gives, of each file the one that it means.
+    """Return the hazard curves of an argument, reading the selected curve of each file.
 
     Raises:
         InputError: something else, or a file that holds curves of several sites.
     """
-    if isinstance(given, str | os.PathLike):
-        curves = suited_in(given, **meaning)
+    if isinstance(sources, str | os.PathLike):
+        curves = suited_in(sources, **meaning)
         if len(curves) > 1:
             raise InputError(
-                f"{given} has {len(curves)} sites, and the blocks are at one site: choose it by "
+                f"{sources} has {len(curves)} sites, and the blocks are at one site: choose it by "
                 "number or name"
             )
         return curves
-    if isinstance(given, HazardCurve):
-        return _by_magnitude([given], meaning)
-    if not isinstance(given, Sequence):
+    if isinstance(sources, HazardCurve):
+        return _by_magnitude([sources], meaning)
+    if not isinstance(sources, Sequence):
         raise InputError(
-            f"curve is of type {type(given).__name__}: give a HazardCurve, the path of its file, "
+            f"curve is of type {type(sources).__name__}: give a HazardCurve, the path of its file, "
             "or a list of them"
         )
-    return [curve for each in given for curve in as_curves(each, **meaning)]
+    return [curve for source in sources for curve in as_curves(source, **meaning)]
 
 
 def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) -> list[HazardCurve]:
-    """Return the curves of a file that models can answer for, one a site; see :func:`as_curves`."""
+    """Return the curves of a file that a model can use, one per site; see :func:`as_curves`."""
     convert = meaning.get("convert")
     period = None if convert is None else velocity_conversion(convert).period_s
     imt = meaning.get("imt")
@@ -69,14 +69,14 @@ def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) ->
 
 
 def _by_magnitude(curves: list[HazardCurve], meaning: CurveKeywords) -> list[HazardCurve]:
-    """Return the curves, of PGV where those of PGA are given with a disaggregation."""
+    """Return the curves, with PGA converted to PGV where a disaggregation is given."""
     path = meaning.get("disaggregation")
     if path is None or all(curve.magnitudes_from_g is not None for curve in curves):
         return curves
     from rbfrag.hazards.disaggregation import Disaggregation
 
-    known = Disaggregation.read(path)
-    return [known.velocity_curve(curve, **meaning) for curve in curves]
+    disaggregation = Disaggregation.read(path)
+    return [disaggregation.velocity_curve(curve, **meaning) for curve in curves]
 
 
 def read_hazard_curves(
@@ -136,19 +136,19 @@ def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCu
     named = [curve for curve in curves if curve.site == site]
     if named:
         return named
-    places = list(dict.fromkeys((curve.site, curve.lon, curve.lat) for curve in curves))
-    if site.isdigit() and 1 <= int(site) <= len(places):
-        place = places[int(site) - 1]
+    sites = list(dict.fromkeys((curve.site, curve.lon, curve.lat) for curve in curves))
+    if site.isdigit() and 1 <= int(site) <= len(sites):
+        place = sites[int(site) - 1]
         return [curve for curve in curves if (curve.site, curve.lon, curve.lat) == place]
     raise InputError(
-        f"{source}: there is no site {site!r}; give a number from 1 to {len(places)}, or a name"
+        f"{source}: there is no site {site!r}; give a number from 1 to {len(sites)}, or a name"
     )
 
 
 def suited_curves(
     curves: list[HazardCurve], *, converted_period_s: float | None = None
 ) -> list[HazardCurve]:
-    """Return the curves of one measure, that of which a model alone knows most.
+    """Return the curves of one measure, the best single predictor among those of the models.
 
     Args:
         converted_period_s: period of the spectral acceleration that a conversion to PGV has been
@@ -175,8 +175,8 @@ def suited_curves(
                     fields=("imt",),
                 )
                 return [replace(curve, warnings=(*curve.warnings, note)) for curve in chosen]
-    wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
-    raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
+    required = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
+    raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {required}")
 
 
 _DECIMAL = r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
@@ -208,7 +208,7 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
 
 
 def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCurve]:
-    """Yield the total curves of an answer of the Unified Hazard Tool or of nshmp-ws.
+    """Yield the total curves of a response of the Unified Hazard Tool or of nshmp-ws.
 
     The former has ``metadata`` with ``imt`` and ``xvals`` (or ``xvalues``) and ``yvals`` for each
     site or kind of source, the latter ``xs`` and ``ys``; levels in g (PGV: cm/s), annual rates.
@@ -222,14 +222,14 @@ def _service_curves(document: dict[str, Any], source: str) -> Iterator[HazardCur
         for data in member["data"] if isinstance(member["data"], list) else [member["data"]]:
             if data.get("component", "Total") != "Total":
                 continue  # of one kind of source
-            known = {**about, **data, **data.get("values", {})}
+            fields = {**about, **data, **data.get("values", {})}
             x, y = (
-                _numbers(next((known[key] for key in keys if key in known), None), keys[0], where)
+                _numbers(next((fields[key] for key in keys if key in fields), None), keys[0], where)
                 for keys in (("xs", "xvalues", "xvals"), ("ys", "yvalues", "yvals"))
             )
             yield hazard_curve(
                 kind.measure, kind.factor * x, y, source=where, period_s=kind.period_s,
-                lon=known.get("longitude"), lat=known.get("latitude"),
+                lon=fields.get("longitude"), lat=fields.get("latitude"),
             )  # fmt: skip
 
 
@@ -244,7 +244,7 @@ def _curve(name: str, member: Any, where: str) -> HazardCurve:
 
 
 def _usgs_type(name: str, where: str) -> IntensityType:
-    """Return what Peak Ground Acceleration, 1.00 Second Spectral Acceleration or SA1P0 means."""
+    """Return the type of a USGS measure such as 1.00 Second Spectral Acceleration or SA1P0."""
     peaks = {"peak ground acceleration": "PGA", "peak ground velocity": "PGV"}
     name = peaks.get(name.lower(), name)
     name = re.sub(r"SA(\d+)P(\d+)", r"SA(\1.\2)", _SPECTRAL.sub(r"SA(\1)", name))
@@ -286,26 +286,26 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     head = ",".join(rows[0])
     if len(rows) > 1:
         _refuse_maps([name.strip() for name in rows[1]], source)
-    years = number_at(_stated("investigation_time", head, source), f"{source}, line 1")
+    years = number_at(_header_value("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
-    kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
-    statistic, component = _stated("kind", head, source, ""), _component_in(text)
+    kind = openquake_type(_header_value("imt", head, source), f"{source}, line 1")
+    statistic, component = _header_value("kind", head, source, ""), _component_in(text)
     if len(rows) < 2:
         raise InputError(f"{source}: ends after line 1, before the names of the columns")
     names = [name.strip() for name in rows[1]]
-    levels, places = [], []
-    for place, name in enumerate(names):
+    levels, columns = [], []
+    for column, name in enumerate(names):
         match = _LEVEL.fullmatch(name)
         if match:
             levels.append(kind.factor * number_at(match.group(1), f"{source}, line 2"))
-            places.append(place)
+            columns.append(column)
         elif name not in _SITE_COLUMNS:
             raise InputError(
                 f"{source}, line 2: column {name!r} is not one of {', '.join(_SITE_COLUMNS)} and "
                 "poe-LEVEL"
             )
-    if not places:
+    if not columns:
         raise InputError(f"{source}, line 2: there is no column poe-LEVEL")
     curves = []
     for line, row in enumerate(rows[2:], start=3):
@@ -314,13 +314,13 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
         where = f"{source}, line {line}"
         if len(row) != len(names):
             raise InputError(f"{where}: {len(row)} cells under {len(names)} columns")
-        poe = np.array([number_at(row[place], where) for place in places])
+        poe = np.array([number_at(row[column], where) for column in columns])
         wrong = ~((poe >= 0.0) & (poe <= 1.0))
         if wrong.any():
             raise InputError(
                 f"{where}: {poe[wrong][0]:g} is not a probability: poe must be between 0 and 1"
             )
-        place_of = {name: row[i].strip() for i, name in enumerate(names)}
+        cell_of = {name: row[i].strip() for i, name in enumerate(names)}
         with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(poe, years)
         curves.append(
@@ -332,7 +332,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 period_s=kind.period_s,
                 statistic=statistic,
                 component=component,
-                **_site_of(place_of, where),
+                **_site_of(cell_of, where),
             )
         )
     if not curves:
@@ -341,19 +341,19 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
 
 
 def _refuse_maps(names: Sequence[str], source: str) -> None:
-    """Refuse a hazard map and uniform hazard spectra, which have one level of each measure."""
+    """Reject hazard maps and uniform hazard spectra, which have one level of each measure."""
     if any(_LEVEL.fullmatch(name) for name in names):
         return
-    for pattern, what in _NO_CURVES.items():
+    for pattern, data in _NO_CURVES.items():
         column = next((name for name in names if re.fullmatch(pattern, name)), None)
         if column is not None:
             raise InputError(
-                f"{source}, line 2: {column!r} is a column of {what}: single levels make no rate; "
+                f"{source}, line 2: {column!r} is a column of {data}: single levels make no rate; "
                 "export the curves of that job instead:  oq export hcurves CALC_ID -e csv"
             )
 
 
-def _stated(name: str, head: str, source: str, default: str | None = None) -> str:
+def _header_value(name: str, head: str, source: str, default: str | None = None) -> str:
     match = re.search(rf"\b{name}\s*=\s*(?:'([^']*)'|\"+([^\"]*)\"+|([^,\s]+))", head)
     if match is None:
         if default is not None:
@@ -363,9 +363,9 @@ def _stated(name: str, head: str, source: str, default: str | None = None) -> st
 
 
 def _site_of(cells: dict[str, str], where: str) -> dict[str, Any]:
-    """Return name and coordinates of a row's site."""
+    """Return the name and coordinates of the site of a row."""
     named = (cells[name] for name in ("custom_site_id", "site_id", "name", "site") if name in cells)
-    lon, lat = (_coordinate(cells, *each, where) for each in (("lon", 180.0), ("lat", 90.0)))
+    lon, lat = (_coordinate(cells, *axis, where) for axis in (("lon", 180.0), ("lat", 90.0)))
     return {"site": next(named, ""), "lon": lon, "lat": lat}
 
 
@@ -397,7 +397,7 @@ HEADER_HELP = (
 
 
 def table_curves(text: str, source: str, imt: str | None = None) -> list[HazardCurve]:
-    """Return the curve of a two-column CSV file as a list of one, or those of a row a site.
+    """Return the curve of a two-column CSV file, or the curves of a table with one row per site.
 
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
     ``pgv_cm_s`` or ``sa(0.5)_g``, also with the unit in brackets; and ``annual_rate`` [1/a],
@@ -474,7 +474,7 @@ _COMPONENT = re.compile(
 
 
 def _component_in(text: str) -> str:
-    """Return the horizontal component that a comment names (`component='RotD50'`), or nothing."""
+    """Return the horizontal component that a comment names, such as `component='RotD50'`."""
     match = _COMPONENT.search(text)
     name = "" if match is None else re.sub(r"[\s-]+", "_", match[1].lower())
     return name if name in COMPONENTS else ""
@@ -489,7 +489,7 @@ def _site_rows(
 ) -> Iterator[HazardCurve]:
     """Yield the curve of each row below a header of site columns and levels."""
     line, header = rows[0]
-    kind = _stated_type(imt, f"{source}, line {line}: levels of shaking")
+    kind = _type_from_option(imt, f"{source}, line {line}: levels of shaking")
     levels = [kind.factor * float(name) for name in header if _is_level(name)]
     for number, row in rows[1:]:
         where = f"{source}, line {number}"
@@ -503,9 +503,9 @@ def _site_rows(
         )  # fmt: skip
 
 
-def _stated_type(imt: str | None, what: str) -> IntensityType:
+def _type_from_option(imt: str | None, subject: str) -> IntensityType:
     if imt is None:
-        text = f"{what} in g: the header does not say whether of PGA or SA; state it as imt PGA"
+        text = f"{subject} in g: the header does not say whether of PGA or SA; state it as imt PGA"
         raise InputError(f"{text} or SA(1.0)", fields=("imt",))
     return openquake_type(imt, "imt")
 
@@ -516,7 +516,7 @@ _RETURN_PERIODS = frozenset(
 
 
 def _with_unit(name: str) -> str:
-    """Return the name of a column in small letters, a unit in brackets spelled as in pgv_m_s."""
+    """Return a column name in lower case with its bracketed unit written as in pgv_m_s."""
     text = name.strip().lower()
     unit = _UNIT.search(text)
     if unit is None or not unit[1].strip(" 0123456789."):
@@ -527,7 +527,7 @@ def _with_unit(name: str) -> str:
 
 def _levels(name: str, where: str, imt: str | None) -> tuple[str, float, float | None]:
     if name == "ground_motion_g":
-        kind = _stated_type(imt, f"{where}: ground motion")
+        kind = _type_from_option(imt, f"{where}: ground motion")
         return kind.measure, 1.0, kind.period_s
     if name in _LEVELS:
         return *_LEVELS[name], None

@@ -1,4 +1,4 @@
-"""A hazard curve of PGV out of one of PGA and the magnitudes that its shaking comes from."""
+"""Hazard curves of PGV from curves of PGA and their disaggregation by magnitude."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _RAREST = 1e-15
 
 @dataclass(frozen=True, eq=False)
 class Disaggregation:
-    """Which magnitudes the exceedances of some levels of PGA come from, at one site.
+    """Disaggregation by magnitude of the rates of exceedance of PGA at one site.
 
     Args:
         levels: PGA [g], rising, shape (n,).
@@ -55,7 +55,7 @@ class Disaggregation:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Disaggregation:
-        """Return what a file of the OpenQuake engine says of PGA: Mag-*.csv or Mag_Dist-*.csv.
+        """Read the disaggregation of PGA from an OpenQuake file: Mag-*.csv or Mag_Dist-*.csv.
 
         Beside imt, iml and mag it has a column ``mean`` or that of one realization, probabilities
         of exceedance by the earthquakes of one bin; what else they are divided by is summed.
@@ -73,7 +73,7 @@ class Disaggregation:
                 "one realization: export disagg-stats of OpenQuake, with Mag among disagg_outputs"
             )
         sums: dict[float, dict[float, float]] = {}
-        whole: dict[float, float] = {}
+        totals: dict[float, float] = {}
         for line, cells in rows:
             row, where = dict(zip(names, cells, strict=False)), f"{path}, line {line}"
             if row.get("imt") != "PGA":
@@ -88,18 +88,18 @@ class Disaggregation:
                 )
             of = sums.setdefault(level, {})
             of[magnitude] = of.get(magnitude, 0.0) - math.log1p(-poe)
-            whole[level] = whole.get(level, 0.0) + poe
+            totals[level] = totals.get(level, 0.0) + poe
         # Contributions of magnitude bins are independent: their exceedance rates -ln(1 - poe) add
         # up, the probabilities do not. Only fractions of the level's rate are kept.
-        levels = sorted(x for x, own in sums.items() if x > 0.0 and any(own.values()))
+        levels = sorted(x for x, rates in sums.items() if x > 0.0 and any(rates.values()))
         if not levels:
             raise InputError(f"{path}: it has no disaggregation of PGA")
-        if all(abs(whole[level] - 1.0) < 1e-3 for level in levels):
+        if all(abs(totals[level] - 1.0) < 1e-3 for level in levels):
             raise InputError(
                 f"{path}: the values of each level sum to 1, not probabilities of exceedance: "
                 "export disagg-stats or disagg-rlzs, not the traditional one"
             )
-        bins = sorted({m for own in sums.values() for m in own})
+        bins = sorted({m for rates in sums.values() for m in rates})
         rate = np.array([[sums[x].get(m, 0.0) for m in bins] for x in levels])
         place = {name: number_at(text, f"{path}, line 1") for name, text in _PLACE.findall(head)}
         share = rate / rate.sum(axis=1, keepdims=True)
@@ -108,14 +108,14 @@ class Disaggregation:
         )  # fmt: skip
 
     def shares(self, u: FloatArray) -> FloatArray:
-        """Return the share of each magnitude in what exceeds exp(u) [g], k x u.
+        """Return the fraction of each magnitude in the exceedance of exp(u) [g], k x u.
 
         Between levels linear in ln PGA; beyond them that of the last one.
         """
-        return np.stack([np.interp(u, np.log(self.levels), own) for own in self.share.T])
+        return np.stack([np.interp(u, np.log(self.levels), fraction) for fraction in self.share.T])
 
     def velocity_curve(self, curve: HazardCurve, **meaning: Unpack[CurveKeywords]) -> HazardCurve:
-        """Return the curve of PGV of single components that goes with one of PGA.
+        """Return the curve of single-component PGV that corresponds to a curve of PGA.
 
         The rate λ s_M of each magnitude falls with the PGA; the mass that it loses at a PGA goes to
         the PGV of the law (:func:`rbfrag.hazards.between_measures.velocity_of`), with its scatter.
@@ -134,10 +134,14 @@ class Disaggregation:
                 f"curve is of {curve.imt}: omit it, or convert",
                 fields=("disaggregation", "convert"),
             )
-        for axis, own, other in (("lon", self.lon, curve.lon), ("lat", self.lat, curve.lat)):
-            if own is not None and other is not None and abs(own - other) > _SAME_PLACE:
+        for axis, coordinate, other in (("lon", self.lon, curve.lon), ("lat", self.lat, curve.lat)):
+            if (
+                coordinate is not None
+                and other is not None
+                and abs(coordinate - other) > _SAME_PLACE
+            ):
                 raise InputError(
-                    f"{self.source}: the disaggregation is of {axis} {own:g}, the curve of "
+                    f"{self.source}: the disaggregation is of {axis} {coordinate:g}, the curve of "
                     f"{other:g}: choose the site that it is of",
                     fields=("site",),
                 )
@@ -155,7 +159,7 @@ class Disaggregation:
         onto = Grid.over(step, velocity.min(), velocity.max(), smoothing.reach)
         mass = smoothing.of(onto.spread(velocity.ravel()) @ -np.diff(of_each).ravel())
         rate = np.maximum.accumulate(mass[::-1].cumsum())[::-1]
-        kept = np.flatnonzero(rate > _RAREST * rate[0])[_EVERY // 2 :: _EVERY]
+        nodes = np.flatnonzero(rate > _RAREST * rate[0])[_EVERY // 2 :: _EVERY]
         texts = [
             *LevelShaking.of(curve, component=name).warnings,
             Diagnostic(
@@ -174,7 +178,7 @@ class Disaggregation:
                 )
             )
         return replace(
-            curve, measure="pgv_m_s", levels=np.exp(onto.u[kept] - 0.5 * step), end_level=None,
-            annual_rate=rate[kept], warnings=tuple(texts),
+            curve, measure="pgv_m_s", levels=np.exp(onto.u[nodes] - 0.5 * step), end_level=None,
+            annual_rate=rate[nodes], warnings=tuple(texts),
             magnitudes_from_g=float(max(self.levels[0], curve.levels[0])),
         )  # fmt: skip

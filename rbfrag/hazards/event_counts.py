@@ -1,4 +1,4 @@
-"""What fails in each earthquake of a part of an event set: expected, and sampled jointly.
+"""Failures in each earthquake of an event set: expected values, and joint samples.
 
 A row of a portfolio may stand for like blocks. Z of one of these is that of the side it faces, so
 that as many fail as face sides whose Z is low enough; how many face each side is multinomial.
@@ -38,7 +38,7 @@ LARGE, ENOUGH_SITES = 1000, 30
 
 _VALUES_AT_ONCE = 1 << 19
 _OF_EVENTS, _OF_BLOCKS = 0, 1
-_MOST_KEPT = 16
+_MAX_SAMPLERS = 16
 _STRENGTHS, _SIZES, _REACH = 41, 9, 5.0
 """Points of what like blocks scatter by, and how far they reach in standard deviations."""
 
@@ -52,7 +52,7 @@ _MOST_SUMMED = 50
 
 
 class EventYears(NamedTuple):
-    """Events of whole years.
+    """Complete years of an event set, with everything needed to evaluate them.
 
     Args:
         number: place of the part in the order of all.
@@ -74,8 +74,8 @@ class EventYears(NamedTuple):
     shifted: tuple[Portfolio, ...] = ()
 
 
-class SomeYears(NamedTuple):
-    """Events of whole years alone, which travel without what all parts have in common.
+class EventBatch(NamedTuple):
+    """Complete years of an event set, sent to a worker without the data that all parts share.
 
     Args:
         number: place of the part in the order of all.
@@ -87,7 +87,7 @@ class SomeYears(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """How often numbers are reached: sums of weights, and of their squares.
+    """Weighted counts of exceedance, and sums of their squares.
 
     The rows are rates of events, years whose largest event, and years whose sum reaches a number,
     each of shape (laws, k), the laws of shifted portfolios after those of the portfolio itself; and
@@ -100,14 +100,14 @@ class Curves(NamedTuple):
     realizations: FloatArray
 
     @classmethod
-    def whole(cls, parts: Sequence[Curves]) -> Curves:
-        """Return the curves of all parts together."""
-        return cls(*(np.sum(each, axis=0) for each in zip(*parts, strict=True)))
+    def merge(cls, parts: Sequence[Curves]) -> Curves:
+        """Return the sum of the curves of all parts."""
+        return cls(*(np.sum(values, axis=0) for values in zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class PartCounts:
-    """What fails in the n events of a part.
+    """Failures in the n events of a part.
 
     Args:
         failures: expected failures, shape (n,).
@@ -136,7 +136,7 @@ class PartCounts:
 
 
 class Shaken(NamedTuple):
-    """Blocks that one event may fail.
+    """Blocks that one event may cause to fail.
 
     Args:
         block: rows of the portfolio, shape (m,).
@@ -156,12 +156,12 @@ class Shaken(NamedTuple):
 
 
 def laws_of(portfolio: Portfolio) -> tuple[str, ...]:
-    """Return the joint laws that answer: the stored one, or the two bounds."""
+    """Return the dependence models: that of the stored model, or the two bounds."""
     return (DEPENDENT, INDEPENDENT) if portfolio.dependence is None else (COPULA,)
 
 
 def shift_error(rates: FloatArray) -> FloatArray:
-    """Return the standard error of ln λ from the parameters.
+    """Return the standard error of ln λ due to parameter uncertainty.
 
     Args:
         rates: λ by the parameters, then by them one standard deviation to both sides along each
@@ -171,18 +171,18 @@ def shift_error(rates: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((0.25 * (log[1::2] - log[2::2]) ** 2).sum(axis=0)))
 
 
-def count_years(common: EventYears, some: SomeYears) -> PartCounts:
-    """Return what fails in the events of a part; a function of a module, for worker processes.
+def count_years(common: EventYears, batch: EventBatch) -> PartCounts:
+    """Return the failures in the events of a part; a module-level function, for worker processes.
 
     Args:
         common: the portfolio and what is asked, of no events.
-        some: the events.
+        batch: the events.
     """
-    return count_part(common._replace(number=some.number, events=some.events))
+    return count_part(common._replace(number=batch.number, events=batch.events))
 
 
 def count_part(part: EventYears) -> PartCounts:
-    """Return what fails in the events of a part."""
+    """Return the failures in the events of a part."""
     # Expected failures and losses are sums of P and need no sampling. Counts of one event need the
     # joint distribution: they are sampled with the dependence model of each site.
     events, portfolio = part.events, part.portfolio
@@ -192,32 +192,34 @@ def count_part(part: EventYears) -> PartCounts:
     blocks = np.zeros((3, portfolio.size))
     rows = laws * (1 + len(part.shifted))
     drawn, with_any = np.zeros((rows, n, 2, part.samples)), np.zeros((laws, n))
-    kept: dict[bytes, JointSampler | LargeCounts | None] = {}
+    samplers: dict[bytes, JointSampler | LargeCounts | None] = {}
     for event, shaken in _shaken(part):
-        own, p = shaken.block, shaken.probability
-        failures[event] = p @ (portfolio.weight[own] * number[own])
-        counted = portfolio.weight[own] > 0.0
-        bounds[:, event] = _bounds(p[counted], number[own][counted])
+        indices, p = shaken.block, shaken.probability
+        failures[event] = p @ (portfolio.weight[indices] * number[indices])
+        counted = portfolio.weight[indices] > 0.0
+        bounds[:, event] = _bounds(p[counted], number[indices][counted])
         mean = events.weight[event] * p
-        blocks[0, own] += mean
-        blocks[1, own] += mean * mean
-        blocks[2, own] += events.weight[event] * shaken.outside
+        blocks[0, indices] += mean
+        blocks[1, indices] += mean * mean
+        blocks[2, indices] += events.weight[event] * shaken.outside
         if cost is not None:
-            loss[event] = p @ (cost[own] * number[own])
+            loss[event] = p @ (cost[indices] * number[indices])
         if part.samples:
-            key = own.tobytes()
-            if key not in kept:
-                if len(kept) == _MOST_KEPT:
-                    kept.clear()
-                kept[key] = _sampler(portfolio, own)
-            drawn[:, event], with_any[:, event] = _sampled(part, event, shaken, kept[key])
+            key = indices.tobytes()
+            if key not in samplers:
+                if len(samplers) == _MAX_SAMPLERS:
+                    samplers.clear()
+                samplers[key] = _sampler(portfolio, indices)
+            drawn[:, event], with_any[:, event] = _sampled(part, event, shaken, samplers[key])
     # Variance of the loss within an event, over its samples.
     variance = np.full((laws, n), np.nan)
     if part.samples > 1:
         variance = drawn[:laws, :, 1].var(axis=-1, ddof=1)
     if not part.samples:  # known alone where no law matters, as of single blocks
-        known = bounds if laws == len(bounds) else bounds[:1]
-        with_any = known if laws > 1 else np.where(np.ptp(bounds, axis=0) <= 0.0, known, np.nan)
+        any_bounds = bounds if laws == len(bounds) else bounds[:1]
+        with_any = (
+            any_bounds if laws > 1 else np.where(np.ptp(bounds, axis=0) <= 0.0, any_bounds, np.nan)
+        )
     counts, losses = (
         _curves(events, drawn[:, :, i], ends, laws)
         for i, ends in enumerate((part.counts, part.losses))
@@ -237,7 +239,7 @@ def _bounds(p: FloatArray, count: IntArray) -> tuple[float, float]:
 
 
 def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
-    """Yield each event that may fail a block, with those blocks."""
+    """Yield each event that may cause a failure, with the blocks concerned."""
     # P of each pair of event and block, averaged over the component's scatter; pairs below NOTHING
     # are dropped.
     events, portfolio = part.events, part.portfolio
@@ -254,36 +256,36 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
         u = np.log(np.maximum(events.measures[portfolio.measures[0]], _LEAST_SHAKING))
         grid = Grid.over(step, float(u.min()), float(u.max()), smoothing.reach)
     for site in np.intersect1d(events.site, portfolio.site):
-        own = np.flatnonzero(portfolio.site == site)
+        indices = np.flatnonzero(portfolio.site == site)
         if one_measure:
-            shifts = shifts_on(portfolio, own, about, grid, smoothing)
+            shifts = shifts_on(portfolio, indices, about, grid, smoothing)
         rows = np.flatnonzero(events.site == site)
-        at_once = max(1, _VALUES_AT_ONCE // (own.size * weight.size))
+        at_once = max(1, _VALUES_AT_ONCE // (indices.size * weight.size))
         for start in range(0, rows.size, at_once):
             chunk = rows[start : start + at_once]
             shaking = {n: events.measures[n][chunk, None, None] for n in portfolio.measures}
             points = (z[:, 0, None], z[:, 1, None], z[:, 2, None])
-            at_points, inside = portfolio.probability(own, shaking, points)
+            at_points, inside = portfolio.probability(indices, shaking, points)
             p, outside = (
                 np.einsum("rkm,k->rm", values, weight)
                 for values in (at_points, at_points * ~inside)
             )
             which, block = np.nonzero(p > NOTHING)
             shifted = (
-                np.einsum("rkm,k->rm", other.probability(own, shaking, points)[0], weight)
+                np.einsum("rkm,k->rm", other.probability(indices, shaking, points)[0], weight)
                 for other in (() if shifts is not None else part.shifted)
             )
             square = _variance_of_score(at_points, weight) if part.shifted else 0.0 * p
-            columns = [each[which, block] for each in (p, outside, square, *shifted)]
+            columns = [values[which, block] for values in (p, outside, square, *shifted)]
             if shifts is not None:
                 first, weights = grid.cubic(u[chunk][which])
                 columns += [*sum(w * shifts[:, block, first + i] for i, w in enumerate(weights))]
-            parts.append((own[block], chunk[which], *columns))
+            parts.append((indices[block], chunk[which], *columns))
     if not parts:
         return
     block, row, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((block, events.event[row]))
-    block, row, p, outside, square, *more = (each[order] for each in (block, row, *columns))
+    block, row, p, outside, square, *more = (values[order] for values in (block, row, *columns))
     # Parameter errors enter as shifts of the score Φ⁻¹(P), which keep the order of blocks in a
     # sample: all shifted portfolios use the same draws.
     p = np.minimum(p, 1.0)
@@ -294,43 +296,43 @@ def _shaken(part: EventYears) -> Iterator[tuple[int, Shaken]]:
     event = events.event[row]
     starts = np.flatnonzero(np.diff(event, prepend=-1))
     for first, last in pairwise([*starts.tolist(), event.size]):
-        some = slice(first, last)
+        span = slice(first, last)
         yield (
             int(event[first]),
-            Shaken(block[some], row[some], p[some], outside[some], square[some], shift[:, some]),
+            Shaken(block[span], row[span], p[span], outside[span], square[span], shift[:, span]),
         )
 
 
 def _variance_of_score(p: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the variance of Φ⁻¹ of P over points of its scatter, rows x points x m."""
+    """Return the variance of Φ⁻¹(P) over its quadrature points, rows x points x m."""
     if weight.size < 2:
         return np.zeros((p.shape[0], p.shape[2]))
     score = np.clip(ndtri(p), -_REACH, _REACH)
-    mean, square = (np.einsum("rkm,k->rm", each, weight) for each in (score, score * score))
+    mean, square = (np.einsum("rkm,k->rm", values, weight) for values in (score, score * score))
     return np.asarray(np.maximum(square - mean * mean, 0.0))
 
 
-def _sampler(portfolio: Portfolio, own: Indices) -> JointSampler | LargeCounts | None:
-    """Return what draws how some blocks fail together; None where only bounds are known."""
+def _sampler(portfolio: Portfolio, indices: Indices) -> JointSampler | LargeCounts | None:
+    """Return the sampler of joint failures of the blocks; None where only bounds are available."""
     law = portfolio.dependence
     if law is None:
         return None
-    where, sites = portfolio.placement(own), np.unique(portfolio.site[own]).size
-    certain = not portfolio.is_uncertain and (portfolio.weight[own] > 0.0).all()
-    if own.size > LARGE and sites >= ENOUGH_SITES and certain:
-        return LargeCounts(law, where, portfolio.count[own])
+    where, sites = portfolio.placement(indices), np.unique(portfolio.site[indices]).size
+    certain = not portfolio.is_uncertain and (portfolio.weight[indices] > 0.0).all()
+    if indices.size > LARGE and sites >= ENOUGH_SITES and certain:
+        return LargeCounts(law, where, portfolio.count[indices])
     return JointSampler(law, where)
 
 
 def _sampled(
     part: EventYears, event: int, shaken: Shaken, sampler: JointSampler | LargeCounts | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return numbers of failures and losses of the samples of one event, and the share with any.
+    """Return failures and losses in the samples of one event, and the fraction with failures.
 
     The stream of random numbers is that of the event, whichever part it stands in. By the shifted
     portfolios the same samples answer.
     """
-    portfolio, draws, own = part.portfolio, part.samples, shaken.block
+    portfolio, draws, indices = part.portfolio, part.samples, shaken.block
     laws = laws_of(portfolio)
     generator = np.random.default_rng([part.seed, _OF_EVENTS, int(part.events.event_id[event])])
     result = np.zeros((shaken.shift.shape[0], len(laws), 2, draws))
@@ -342,16 +344,16 @@ def _sampled(
         # the shifts are of P over all scatter, of which each sample knows its own part
         shaken = shaken._replace(shift=np.sqrt(1.0 + shaken.square) * shaken.shift)
     bounds = _bounds_of_z(part, shaken, generator)
-    scattered = int((portfolio.count[own] > 1).sum()) if portfolio.is_uncertain else 0
-    at_once = max(1, _VALUES_AT_ONCE // (own.size + SIDES * _STRENGTHS * _SIZES * scattered))
+    scattered = int((portfolio.count[indices] > 1).sum()) if portfolio.is_uncertain else 0
+    at_once = max(1, _VALUES_AT_ONCE // (indices.size + SIDES * _STRENGTHS * _SIZES * scattered))
     for start in range(0, draws, at_once):
-        some = slice(start, min(start + at_once, draws))
-        k = some.stop - start
-        here = bounds(k)
+        span = slice(start, min(start + at_once, draws))
+        k = span.stop - start
+        sample_bounds = bounds(k)
         for number, law in enumerate(laws):
-            sides = _sides(law, sampler, (k, own.size), generator)
-            result[:, number, :, some] = _failing(
-                portfolio, shaken, sides, here, generator, alone=law == INDEPENDENT
+            sides = _sides(law, sampler, (k, indices.size), generator)
+            result[:, number, :, span] = _failing(
+                portfolio, shaken, sides, sample_bounds, generator, alone=law == INDEPENDENT
             )
     return result.reshape(-1, 2, draws), (result[0, :, 0] > 0.0).mean(axis=1)
 
@@ -367,7 +369,7 @@ def _sides(
 
 
 class _Bounds(NamedTuple):
-    """Bounds below which Z fails a block.
+    """Thresholds of Z below which a block fails.
 
     Args:
         bound: of each row, draws x m; the first axis may be 1.
@@ -384,7 +386,7 @@ class _Bounds(NamedTuple):
     weight: FloatArray
 
     def share(self, z: FloatArray, shift: FloatArray) -> FloatArray:
-        """Return P of one of these like blocks given Z, sides x draws x rows.
+        """Return the failure probability of identical blocks given Z, sides x draws x rows.
 
         It fails up to the strength at which the bound is Z.
         """
@@ -408,7 +410,7 @@ def _failing(
     *,
     alone: bool,
 ) -> FloatArray:
-    """Return numbers of failures and losses of samples by shifted portfolios, shifts x 2 x draws.
+    """Return failures and losses in the samples by shifted portfolio, shifts x 2 x draws.
 
     What fails by no shift, as most does not, is not looked at again for each of them.
 
@@ -417,32 +419,32 @@ def _failing(
         alone: each of like blocks has a Z of its own.
     """
     # A block fails where its latent normal Z lies below its bound Φ⁻¹(P) plus the shift.
-    own, (number, draws, _) = shaken.block, sides.shape
-    count, weight, shift = portfolio.count[own], portfolio.weight[own], shaken.shift
+    indices, (number, draws, _) = shaken.block, sides.shape
+    count, weight, shift = portfolio.count[indices], portfolio.weight[indices], shaken.shift
     most = shift.max(axis=0)
     like, ones = np.flatnonzero(count > 1), np.flatnonzero(count == 1)
     side = generator.integers(number, size=(1, draws, ones.size))
     facing: IntArray = count[like]
     if like.size and not alone:
-        each = np.full(number, 1.0 / number)
-        drawn = generator.multinomial(facing, each, size=(draws, like.size))
+        chances = np.full(number, 1.0 / number)
+        drawn = generator.multinomial(facing, chances, size=(draws, like.size))
         facing = np.moveaxis(drawn, -1, 0)
     seed = int(generator.integers(1 << 62))
     chance = alone | bounds.scattered[like]
-    whole = [(ones, np.take_along_axis(sides[..., ones], side, axis=0), count[ones])]
+    groups = [(ones, np.take_along_axis(sides[..., ones], side, axis=0), count[ones])]
     if not chance.all():
-        whole.append((like[~chance], sides[..., like[~chance]], facing[..., ~chance]))
+        groups.append((like[~chance], sides[..., like[~chance]], facing[..., ~chance]))
     parts: list[tuple[NDArray[Any], ...]] = []
-    for places, z, many in whole:
-        excess = z - bounds.bound[:, places]
-        at = np.nonzero((excess <= most[places]) & (many > 0))
-        parts.append((at[1], places[at[2]], np.broadcast_to(many, z.shape)[at], excess[at]))
-    whole_of = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    order = np.argsort(whole_of[3] > 0.0, kind="stable")  # costs do not depend on the shifts
-    sample, block, many, excess = (each[order] for each in whole_of)
+    for members, z, many in groups:
+        excess = z - bounds.bound[:, members]
+        at = np.nonzero((excess <= most[members]) & (many > 0))
+        parts.append((at[1], members[at[2]], np.broadcast_to(many, z.shape)[at], excess[at]))
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    order = np.argsort(columns[3] > 0.0, kind="stable")  # costs do not depend on the shifts
+    sample, block, many, excess = (array[order] for array in columns)
     row, at_once = np.nonzero(excess <= shift[:, block])
-    failing, cost = weight[block] * many, _costs(portfolio, own[block], many, seed)
-    of_rows = [(row, *(each[at_once] for each in (sample, failing, cost)))]
+    failing, cost = weight[block] * many, _costs(portfolio, indices[block], many, seed)
+    of_rows = [(row, *(array[at_once] for array in (sample, failing, cost)))]
     # Identical blocks of a row are not followed one by one: given Z of a side, their number of
     # failures is binomial.
     scattered = like[chance]
@@ -454,79 +456,81 @@ def _failing(
         by_chance = by_chance if alone else by_chance.sum(axis=0)
         sample, block = np.nonzero(by_chance)
         many, block = by_chance[sample, block], scattered[block]
-        cost = _costs(portfolio, own[block], many, seed)
+        cost = _costs(portfolio, indices[block], many, seed)
         of_rows.append((np.full(sample.size, i), sample, weight[block] * many, cost))
     row, sample, *values = (np.concatenate(column) for column in zip(*of_rows, strict=True))
-    sums = [np.bincount(row * draws + sample, each, len(shift) * draws) for each in values]
+    sums = [np.bincount(row * draws + sample, array, len(shift) * draws) for array in values]
     return np.array(sums, dtype=np.float64).reshape(2, -1, draws).swapaxes(0, 1)
 
 
 def _bounds_of_z(
     part: EventYears, shaken: Shaken, generator: np.random.Generator
 ) -> Callable[[int], _Bounds]:
-    """Return a function for the bounds of Z in the next samples.
+    """Return a function that draws the thresholds of Z for the next samples.
 
     The component's scatter is that of the event at the site. A single block's own parameters are
     those of its sample in every event; those of like blocks are drawn by what they are given Z.
     """
-    portfolio, own = part.portfolio, shaken.block
+    portfolio, indices = part.portfolio, shaken.block
     strengths = np.linspace(-_REACH, _REACH, _STRENGTHS)
     sizes, weight = normal_steps(_SIZES, _REACH)
-    sigma = portfolio.size_sigma[own] + portfolio.strength_sigma[own]
-    scattered = (portfolio.count[own] > 1) & (sigma > 0.0)
+    sigma = portfolio.size_sigma[indices] + portfolio.strength_sigma[indices]
+    scattered = (portfolio.count[indices] > 1) & (sigma > 0.0)
     none = np.empty((_STRENGTHS, _SIZES, 1, 0))
     if not (portfolio.component.sigma > 0.0 or sigma.any()):
         bound = ndtri(shaken.probability)[None]
         return lambda _: _Bounds(bound, scattered, none, strengths, weight)
-    sites, site = np.unique(portfolio.site[own], return_inverse=True)
+    sites, site = np.unique(portfolio.site[indices], return_inverse=True)
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
     streams = [
-        [np.random.default_rng([part.seed, _OF_BLOCKS, block, i]) for block in own.tolist()]
+        [np.random.default_rng([part.seed, _OF_BLOCKS, block, i]) for block in indices.tolist()]
         for i in range(2 if sigma.any() else 0)
     ]
 
     def next_samples(k: int) -> _Bounds:
         xi = generator.standard_normal((k, sites.size))[:, site]
-        z = [np.stack([one.standard_normal(k) for one in each], axis=1) for each in streams]
+        z = [np.stack([rng.standard_normal(k) for rng in rngs], axis=1) for rngs in streams]
         z_p, z_k = z or (np.zeros(1), np.zeros(1))
-        p, scores = portfolio.probability(own, shaking, (xi, z_p, z_k))[0], none
+        p, scores = portfolio.probability(indices, shaking, (xi, z_p, z_k))[0], none
         if scattered.any():
-            some = {name: values[scattered] for name, values in shaking.items()}
+            subset = {name: values[scattered] for name, values in shaking.items()}
             points = (xi[:, scattered], sizes[:, None, None], strengths[:, None, None, None])
-            each = portfolio.probability(own[scattered], some, points)[0]
+            point_p = portfolio.probability(indices[scattered], subset, points)[0]
             chances = np.diff(ndtr(strengths[:-1] + 0.5 * np.diff(strengths)), prepend=0, append=1)
             p = np.broadcast_to(p, xi.shape).copy()
-            p[:, scattered] = np.einsum("jikm,j,i->km", each, chances, weight)
-            scores = np.clip(ndtri(each), -_FARTHEST, _FARTHEST)
+            p[:, scattered] = np.einsum("jikm,j,i->km", point_p, chances, weight)
+            scores = np.clip(ndtri(point_p), -_FARTHEST, _FARTHEST)
         return _Bounds(ndtri(p), scattered, scores, strengths, weight)
 
     return next_samples
 
 
 def _costs(portfolio: Portfolio, block: Indices, number: IntArray, seed: int) -> FloatArray:
-    """Return what so many failures of blocks cost, same shape."""
+    """Return the losses of numbers of failures of blocks, same shape."""
     cost = number * np.ones(block.size)
     if portfolio.loss is None:
         return 0.0 * cost
     sigma, generator = portfolio.loss_sigma[block], np.random.default_rng([seed, 1])
-    for many, draw in ((False, _sum_of_each), (True, _sum_by_moments)):
+    for many, draw in ((False, _sum_lognormals), (True, _sum_by_moments)):
         chosen = np.flatnonzero((sigma > 0.0) & ((number > _MOST_SUMMED) == many))
         if chosen.size:
             cost[chosen] = draw(number[chosen].astype(np.int64), sigma[chosen], generator)
     return np.asarray(portfolio.loss[block] * cost)
 
 
-def _sum_of_each(number: IntArray, sigma: FloatArray, generator: np.random.Generator) -> FloatArray:
-    """Return sums of lognormals of median 1."""
-    each = np.repeat(np.arange(number.size), number)
-    values = np.exp(sigma[each] * generator.standard_normal(each.size))
-    return np.asarray(np.bincount(each, values, minlength=number.size))
+def _sum_lognormals(
+    number: IntArray, sigma: FloatArray, generator: np.random.Generator
+) -> FloatArray:
+    """Return sums of lognormal variables of median 1."""
+    index = np.repeat(np.arange(number.size), number)
+    values = np.exp(sigma[index] * generator.standard_normal(index.size))
+    return np.asarray(np.bincount(index, values, minlength=number.size))
 
 
 def _sum_by_moments(
     number: IntArray, sigma: FloatArray, generator: np.random.Generator
 ) -> FloatArray:
-    """Return values of the gamma law, shifted, that has three moments of these sums."""
+    """Return samples of a shifted gamma distribution with the first three moments of these sums."""
     square = np.exp(sigma * sigma)
     mean, sd = np.sqrt(square), np.sqrt(square * (square - 1.0))
     skewness = (square + 2.0) * np.sqrt(square - 1.0)
@@ -535,35 +539,35 @@ def _sum_by_moments(
 
 
 def _common(part: EventYears, shaken: Shaken) -> float:
-    """Return the share of the scatter of what fails blocks that the component's is of."""
-    portfolio, own = part.portfolio, shaken.block
+    """Return the fraction of the variance of failure scores that is due to the component."""
+    portfolio, indices = part.portfolio, shaken.block
     if not portfolio.component.sigma > 0.0:
         return 0.0
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
-    ends = (portfolio.probability(own, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
+    ends = (portfolio.probability(indices, shaking, (xi, 0.0, 0.0))[0] for xi in (1.0, -1.0))
     high, low = (np.clip(ndtri(p), -_REACH, _REACH) for p in ends)
     square, p = 0.25 * (high - low) ** 2, shaken.probability
-    weight = portfolio.count[own] * p * (1.0 - p) + NOTHING
+    weight = portfolio.count[indices] * p * (1.0 - p) + NOTHING
     return float(np.average(square / (1.0 + square), weights=weight))
 
 
 def _of_many(
     part: EventYears, shaken: Shaken, sampler: LargeCounts, latent: LatentEvent, shift: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Return numbers of failures and losses of many blocks, and the probability of any."""
-    portfolio, own = part.portfolio, shaken.block
-    mean_loss, square = np.zeros(own.size), np.zeros(own.size)
+    """Return numbers of failures and losses of many blocks, and the probability of any failure."""
+    portfolio, indices = part.portfolio, shaken.block
+    mean_loss, square = np.zeros(indices.size), np.zeros(indices.size)
     if portfolio.mean_loss is not None:
-        mean_loss = portfolio.mean_loss[own]
-        square = mean_loss**2 * np.exp(portfolio.loss_sigma[own] ** 2)
-    weight = portfolio.weight[own]
+        mean_loss = portfolio.mean_loss[indices]
+        square = mean_loss**2 * np.exp(portfolio.loss_sigma[indices] ** 2)
+    weight = portfolio.weight[indices]
     marks = ((weight, weight**2), (mean_loss, square))
     bound = ndtri(shaken.probability) + shift
     return sampler.sums(bound, _common(part, shaken), latent, marks)
 
 
 def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray, laws: int) -> Curves:
-    """Return how often the samples of events, and of years, reach some numbers.
+    """Return weighted counts of exceedance for the samples of events and of years.
 
     Args:
         drawn: samples, shape (rows, n, draws); the laws, then those of shifted portfolios.
@@ -577,14 +581,14 @@ def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray, laws: int) ->
     order = np.argsort(year, kind="stable")
     starts = np.flatnonzero(np.diff(year[order], prepend=-1))
 
-    def reached(values: FloatArray, own: FloatArray) -> FloatArray:
-        """Return the weight of each event or year that reaches each number, rows x n x k."""
+    def reached(values: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the weight of each event or year that reaches each threshold, rows x n x k."""
         rows, n, draws = values.shape
         place = np.searchsorted(ends, values, side="right")
         place += (ends.size + 1) * np.arange(rows * n).reshape(rows, n, 1)
         number = np.bincount(place.ravel(), minlength=rows * n * (ends.size + 1))
         number = number.reshape(rows, n, -1)[..., :0:-1].cumsum(axis=-1)[..., ::-1]
-        return np.asarray(own[:, None] * (number / draws))
+        return np.asarray(weights[:, None] * (number / draws))
 
     def powers(parts: FloatArray) -> FloatArray:
         return np.stack([parts.sum(axis=1), (parts * parts).sum(axis=1)])

@@ -1,4 +1,4 @@
-"""What the earthquakes of an event set are expected to fail, by tables of P of each site.
+"""Expected failures in the earthquakes of an event set, from tables of P for each site.
 
 A site has a few sums over its blocks on the nodes of a grid, Σ w P, Σ loss P, Σ ln(1 - P) and the
 greatest P, which are interpolated at the shaking of each earthquake: no pair of block and
@@ -29,7 +29,7 @@ _MUCH = 1e3
 
 
 class EventMeans(NamedTuple):
-    """What is expected of n events.
+    """Expected failures and losses in n events.
 
     Args:
         failures: expected failures, shape (n,).
@@ -53,7 +53,7 @@ class EventMeans(NamedTuple):
 
 
 def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMeans:
-    """Return what the events are expected to fail; each model reads the one measure.
+    """Return the expected failures in the events; all models use the same single measure.
 
     Args:
         level: confidence level of the intervals.
@@ -78,25 +78,25 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
     totals: dict[str, tuple[ParameterErrors, FloatArray]] = {}
     for first, last in _groups(site, sites.size):
         tables = np.zeros((4, last - first, mass.grid.size))
-        for places, own in _blocks_of(portfolio, np.flatnonzero((site >= first) & (site < last)),
+        for indices, group in _blocks_of(portfolio, np.flatnonzero((site >= first) & (site < last)),
                                       site, shaking):  # fmt: skip
-            allowed = own.allowed_from(mass.grid)
-            table = table_of(own, mass.grid, 0, allowed)
+            allowed = group.allowed_from(mass.grid)
+            table = table_of(group, mass.grid, 0, allowed)
             p = np.clip(mass.smoothing.of(table.probability), 0.0, 1.0)
-            rate, _, outside, *gradient = sums_of(own, table, mass, 0)
-            blocks[0, places], blocks[2, places] = rate, outside
-            blocks[1, places] = np.einsum("mn,mn->m", p * p, squared[own.site])
-            half[places] = half_width(own.model.errors, np.stack(gradient), level)
-            before = totals.get(own.model.name, (None, np.zeros((2, len(gradient)))))[1]
-            by = np.stack([number[places], cost[places]])
-            totals[own.model.name] = own.model.errors, before + by @ np.stack(gradient).T
-            here = own.site - first
+            rate, _, outside, *gradient = sums_of(group, table, mass, 0)
+            blocks[0, indices], blocks[2, indices] = rate, outside
+            blocks[1, indices] = np.einsum("mn,mn->m", p * p, squared[group.site])
+            half[indices] = half_width(group.model.errors, np.stack(gradient), level)
+            before = totals.get(group.model.name, (None, np.zeros((2, len(gradient)))))[1]
+            by = np.stack([number[indices], cost[indices]])
+            totals[group.model.name] = group.model.errors, before + by @ np.stack(gradient).T
+            site_index = group.site - first
             stands = -np.log1p(-np.minimum(p, _SURE))
             for part, values, factor in (
                 (0, p, number), (1, p, cost), (2, stands, waiting)
             ):  # fmt: skip
-                np.add.at(tables[part], here, values * factor[places, None])
-            np.maximum.at(tables[3], here, p * counted[places, None])
+                np.add.at(tables[part], site_index, values * factor[indices, None])
+            np.maximum.at(tables[3], site_index, p * counted[indices, None])
         # Rates of any failure have two bounds: full dependence, max P, and independence, 1 - Π(1 -
         # P).
         with np.errstate(divide="ignore"):
@@ -104,12 +104,12 @@ def event_means(events: EventSet, portfolio: Portfolio, level: float) -> EventMe
         rows = order[starts[first] : starts[last]]
         _add_rows(sums, tables, logs, rows, place - first, events.site, events.event, u, *mass.grid)
     halves = np.array([half_width(errors, sums.T, level) for errors, sums in totals.values()])
-    whole = np.sqrt((halves**2).sum(axis=0))
+    total_half = np.sqrt((halves**2).sum(axis=0))
     failures, loss, stand, greatest = sums
     dependent = np.minimum(greatest, 1.0)
     bounds = np.stack([dependent, np.maximum(-np.expm1(-stand), dependent)])
     return EventMeans(
-        failures, loss, bounds, blocks, half, float(whole[0]), float(whole[1])
+        failures, loss, bounds, blocks, half, float(total_half[0]), float(total_half[1])
     )  # fmt: skip
 
 
@@ -120,21 +120,23 @@ def axes_of(row: ModelRow) -> FloatArray:
 
 
 def shifts_on(
-    portfolio: Portfolio, own: Indices, shaking: LevelShaking, grid: Grid, smoothing: Smoothing
+    portfolio: Portfolio, indices: Indices, shaking: LevelShaking, grid: Grid, smoothing: Smoothing
 ) -> FloatArray:
-    """Return by how much Φ⁻¹ of P differs at b ± one standard deviation along axes of the errors.
+    """Return the changes of Φ⁻¹(P) at b ± one standard deviation along the principal axes.
 
     Args:
-        own: rows of the portfolio, m of them.
+        indices: rows of the portfolio, m of them.
 
     Returns:
         Both sides of each axis of each model, one model after the other, x m x nodes; 0 for blocks
         of other models.
     """
     sizes = [2 * len(row.coefficients) for row in portfolio.models]
-    result = np.zeros((sum(sizes), own.size, grid.size))
-    for places, blocks in _blocks_of(portfolio, own, np.zeros(portfolio.size, np.intp), shaking):
-        number = int(portfolio.model[places[0]])
+    result = np.zeros((sum(sizes), indices.size, grid.size))
+    for positions, blocks in _blocks_of(
+        portfolio, indices, np.zeros(portfolio.size, np.intp), shaking
+    ):
+        number = int(portfolio.model[positions[0]])
         first = sum(sizes[:number])
         nowhere = np.full((blocks.weight.size, blocks.size), -np.inf)
         axes = axes_of(portfolio.models[number]).T
@@ -143,37 +145,37 @@ def shifts_on(
             for step in (0.0 * axes[0], *(side * axis for axis in axes for side in (1.0, -1.0)))
         ]))  # fmt: skip
         z = ndtri(np.clip(p, _LEAST, _SURE))
-        result[first : first + sizes[number], np.searchsorted(own, places)] = z[1:] - z[0]
+        result[first : first + sizes[number], np.searchsorted(indices, positions)] = z[1:] - z[0]
     return result
 
 
 def _groups(site: Indices, sites: int) -> Iterator[tuple[int, int]]:
-    """Yield ranges of sites with some hundred blocks together, or of one with more."""
+    """Yield ranges of sites with a few hundred blocks in total, or of one larger site."""
     number = np.bincount(site, minlength=sites)
     first, total = 0, 0
-    for last, own in enumerate(number.tolist()):
-        if total and total + own > _BLOCKS_AT_ONCE:
+    for last, count in enumerate(number.tolist()):
+        if total and total + count > _BLOCKS_AT_ONCE:
             yield first, last
             first, total = last, 0
-        total += own
+        total += count
     yield first, sites
 
 
 def _blocks_of(
     portfolio: Portfolio, rows: Indices, site: Indices, shaking: LevelShaking
 ) -> Iterator[tuple[Indices, KernelBlocks]]:
-    """Yield some rows of the portfolio by the models that answer for them, a few at a time."""
+    """Yield rows of the portfolio by model, a few at a time."""
     for number, model in enumerate(portfolio.answering):
-        own = rows[portfolio.model[rows] == number]
-        for start in range(0, own.size, _BLOCKS_AT_ONCE):
-            some = own[start : start + _BLOCKS_AT_ONCE]
-            numbers = portfolio.numbers_of(model, some)
-            for places, blocks in KernelBlocks.of(model, shaking.median, numbers, site[some]):
+        indices = rows[portfolio.model[rows] == number]
+        for start in range(0, indices.size, _BLOCKS_AT_ONCE):
+            batch = indices[start : start + _BLOCKS_AT_ONCE]
+            numbers = portfolio.numbers_of(model, batch)
+            for positions, blocks in KernelBlocks.of(model, shaking.median, numbers, site[batch]):
                 # of an uncertain block the draws are many
                 step = max(1, _BLOCKS_AT_ONCE // blocks.weight.size)
-                for first in range(0, places.size, step):
-                    part = np.arange(first, min(first + step, places.size))
-                    yield some[places[part]], blocks.only(part)
+                for first in range(0, positions.size, step):
+                    part = np.arange(first, min(first + step, positions.size))
+                    yield batch[positions[part]], blocks.only(part)
 
 
 @kernel
@@ -190,20 +192,20 @@ def _add_rows(
     first: int,
     size: int,
 ) -> None:
-    """Add the values of tables at the shaking of some rows to their events; of the last the most.
+    """Add interpolated table values to the event of each row; of the last table the maximum.
 
     Cubic in their logarithms, that small values are as right as great ones, and in the values
     themselves where these change much from node to node, as where P jumps.
     """
     for row in rows:
-        own = place[site[row]]
-        if own < 0 or own >= tables.shape[1] or not np.isfinite(u[row]):
+        site_row = place[site[row]]
+        if site_row < 0 or site_row >= tables.shape[1] or not np.isfinite(u[row]):
             continue
         start, a, b, c, d = cubic_at(u[row], step, first, size)
         for k in range(tables.shape[0]):
-            four = tables[k, own, start : start + 4]
+            four = tables[k, site_row, start : start + 4]
             if four.max() < _MUCH * four.min():
-                log = logs[k, own, start : start + 4]
+                log = logs[k, site_row, start : start + 4]
                 value = np.exp(a * log[0] + b * log[1] + c * log[2] + d * log[3])
             else:
                 value = max(a * four[0] + b * four[1] + c * four[2] + d * four[3], 0.0)

@@ -1,4 +1,4 @@
-"""Earthquakes of a stochastic event set, or of one scenario, and how they shook some sites."""
+"""Earthquakes of a stochastic event set or of one scenario, with the ground motion at sites."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Duration:
-    """How long each realization of the logic tree lasts.
+    """Duration of each realization of the logic tree.
 
     Args:
         investigation_time: length of one stochastic event set [a].
@@ -42,7 +42,7 @@ class Duration:
 
 @dataclass(frozen=True, eq=False)
 class EventSet:
-    """Earthquakes, and shaking by event and site.
+    """Earthquakes, and ground motion by event and site.
 
     What has no row was not shaken.
 
@@ -59,7 +59,7 @@ class EventSet:
         duration: of each realization; None for a scenario.
         realization_weights: weights of the realizations, which sum to 1, by their numbers.
         warnings: what was noticed on reading.
-        places: longitudes and latitudes of the sites [deg], shape (sites, 2); None: not known.
+        coordinates: longitudes and latitudes of the sites [deg], shape (sites, 2); None: not known.
     """
 
     event_id: IntArray
@@ -73,23 +73,23 @@ class EventSet:
     duration: Duration | None
     realization_weights: Mapping[int, float]
     warnings: tuple[str, ...] = ()
-    places: FloatArray | None = None
+    coordinates: FloatArray | None = None
 
     @property
     def branch(self) -> IntArray:
-        """Place of the realization of each event among `realization_weights`, shape (n,)."""
+        """Index of the realization of each event in `realization_weights`, shape (n,)."""
         numbers = np.array(list(self.realization_weights))
         order = np.argsort(numbers)
         return np.asarray(order[np.searchsorted(numbers[order], self.realization)])
 
     @property
     def is_scenario(self) -> bool:
-        """Whether the events are realisations of one, without a rate."""
+        """True if the events are realizations of one scenario, which has no rate."""
         return self.duration is None
 
     @property
     def effective_years(self) -> float | None:
-        """Length of one catalogue with the same sampling error [yr]; None of a scenario.
+        """Length of one catalogue of equal sampling uncertainty [a]; None for a scenario.
 
         T/Σw² of realizations of T years with the weights w.
         """
@@ -101,7 +101,7 @@ class EventSet:
 def event_weights(
     realization: IntArray, weights: Mapping[int, float], duration: Duration | None
 ) -> FloatArray:
-    """Return what each event counts.
+    """Return the weight of each event.
 
     With a duration its annual rate [1/a], weight(realization)/(investigation time × number of
     sets), which is right for one realization, for all of them and for samples alike. Without one
@@ -111,10 +111,10 @@ def event_weights(
         realization: realization of each event, shape (n,).
         duration: of each realization; None for a scenario.
     """
-    own = np.array([weights[number] for number in realization.tolist()])
+    event_weight = np.array([weights[number] for number in realization.tolist()])
     if duration is not None:
-        return own / duration.years
+        return event_weight / duration.years
     numbers, counts = np.unique(realization, return_counts=True)
     of_its = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
-    share = own / np.array([of_its[number] for number in realization.tolist()])
+    share = event_weight / np.array([of_its[number] for number in realization.tolist()])
     return np.asarray(share / share.sum())

@@ -51,7 +51,7 @@ SMALLEST_FRACTION = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class BranchRate:
-    """What one hazard curve of several says.
+    """Rates of failure under one of several hazard curves.
 
     Args:
         name: the branch or statistic that the curve is of, or where it comes from.
@@ -165,7 +165,7 @@ class HazardAnswer(Result):
 
     @property
     def joint(self) -> JointRate | None:
-        """What the blocks of the first site do together, where that is asked for."""
+        """Joint failures of the blocks of the first site; None if not requested."""
         return self.joints[0]
 
     @property
@@ -179,13 +179,13 @@ class HazardAnswer(Result):
             return None
         if self.joint is not None:
             return self.joint.annual_rate_any
-        known = np.flatnonzero(~np.isnan(self.annual_rate))
-        alone = known.size == 1 and self.count[known[0]] == 1.0
-        return float(self.annual_rate[known[0]]) if alone else None
+        indices = np.flatnonzero(~np.isnan(self.annual_rate))
+        alone = indices.size == 1 and self.count[indices[0]] == 1.0
+        return float(self.annual_rate[indices[0]]) if alone else None
 
     @property
     def expected_failures_per_year(self) -> float:
-        """Mean number of failures a year of all blocks [1/a]: Σ count · rate of the rates known."""
+        """Expected failures per year of all blocks [1/a]: Σ count · rate of the answered blocks."""
         return float(np.nansum(self.count * self.annual_rate))
 
     @property
@@ -201,12 +201,12 @@ class HazardAnswer(Result):
     @property
     def expected_failures_upper_bound(self) -> float | None:
         """Upper bound of `expected_failures_per_year`; None where that of a block is unknown."""
-        known = ~np.isnan(self.annual_rate)
-        return finite_or_none(float((self.count * self.upper_bound)[known].sum()))
+        has_rate = ~np.isnan(self.annual_rate)
+        return finite_or_none(float((self.count * self.upper_bound)[has_rate].sum()))
 
     @property
     def _is_truncated(self) -> NDArray[np.bool_]:
-        """Whether the rate is a range, as the curve ends or begins too early, shape (m,)."""
+        """True where the rate is a range because the curve ends or begins too early, shape (m,)."""
         rate, bound = self.annual_rate, self.upper_bound
         return (rate >= 0.0) & ~(bound <= np.maximum(NOTABLE_FACTOR * rate, NEVER))
 

@@ -1,4 +1,4 @@
-"""How often per year an earthquake fails any, or k or more, of several blocks of one site.
+"""Annual rate of earthquakes in which at least k of several blocks of one site fail.
 
 The ends of the interval of the rate of any failure are its rates where the model's parameters are
 moved by their error in the direction that changes the sum of the blocks' rates most.
@@ -41,7 +41,7 @@ USUAL_COUNTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 
 @dataclass(frozen=True, eq=False)
 class CountRate:
-    """Earthquakes in which so many blocks fail.
+    """Annual rate of earthquakes in which at least k blocks fail.
 
     Args:
         count: number of failures.
@@ -58,7 +58,7 @@ class CountRate:
 
 @dataclass(frozen=True, eq=False)
 class JointRate:
-    """Earthquakes that fail several blocks of one site.
+    """Annual rates of earthquakes in which several blocks of one site fail.
 
     Args:
         at_least: how often earthquakes fail some numbers of blocks or more, the first any; empty
@@ -79,12 +79,12 @@ class JointRate:
 
     @property
     def annual_rate_any(self) -> float | None:
-        """Annual rate of earthquakes with at least one failure [1/a]; None without a law."""
+        """Annual rate of earthquakes with any failure [1/a]; None without a dependence model."""
         return self.at_least[0].annual_rate if self.at_least else None
 
     @property
     def probability_any(self) -> float | None:
-        """Probability of at least one such earthquake in the period; None without a law."""
+        """Probability of any failure in the period; None without a dependence model."""
         return self.at_least[0].probability if self.at_least else None
 
     @classmethod
@@ -128,7 +128,7 @@ class JointRate:
 
     @classmethod
     def mean(cls, parts: Sequence[JointRate], weights: FloatArray) -> JointRate:
-        """Return the weighted mean over branches of a logic tree; all know the law, or none."""
+        """Return the weighted mean over branches, of which all or none have a dependence model."""
 
         def meant(values: Iterable[Any]) -> float:
             return float(sum(w * value for w, value in zip(weights, values, strict=True)))
@@ -163,24 +163,24 @@ class JointRate:
             "annual_rate_any": self.annual_rate_any,
             "annual_rate_any_ci": None if ends is None else list(ends),
             "probability_any": self.probability_any,
-            "annual_rate_at_least": [dict(vars(one)) for one in self.at_least] or None,
+            "annual_rate_at_least": [dict(vars(rate)) for rate in self.at_least] or None,
             "joint_law": self.joint_law,
             "bounds": {name: dict(values) for name, values in self.bounds.items()},
         }
 
 
 def joint_at_sites(
-    each: Sequence[tuple[Indices, KernelBlocks, Rates]],
+    group_rates: Sequence[tuple[Indices, KernelBlocks, Rates]],
     mass: SiteMass,
     at_least: Sequence[int] | None,
     years: float,
     level: float,
     count: FloatArray,
 ) -> tuple[tuple[JointRate | None, ...], tuple[str, ...]]:
-    """Return how often earthquakes fail several blocks of each site, and what is to be said.
+    """Return the annual rates of joint failure of the blocks of each site, and the warnings.
 
     Args:
-        each: blocks of each model with their rates.
+        group_rates: blocks of each model with their rates.
         at_least: numbers of failures whose rates are wanted; None for usual ones. What the blocks
             of a site do not reach is left out, unless those of no site do.
         years: period of the probabilities [a].
@@ -194,8 +194,8 @@ def joint_at_sites(
     # model that is stored with the fragility model.
     sites = mass.mass.shape[0]
     number = np.zeros(sites, dtype=np.intp)
-    for places, blocks, _ in each:
-        number += np.bincount(blocks.site, count[places], sites).astype(np.intp)
+    for indices, blocks, _ in group_rates:
+        number += np.bincount(blocks.site, count[indices], sites).astype(np.intp)
     most = int(np.max(number))
     for least in at_least or ():
         if isinstance(least, bool) or not 1 <= least <= most:
@@ -204,17 +204,19 @@ def joint_at_sites(
     result: list[JointRate | None] = [None] * sites
     why: dict[str, None] = {}
     for site in np.flatnonzero(number > 1).tolist():
-        here = []
-        for places, blocks, rates in each:
+        site_blocks = []
+        for indices, blocks, rates in group_rates:
             rows = np.flatnonzero(blocks.site == site)
             if rows.size:  # identical blocks of a row have azimuths of their own
-                repeats = count[places[rows]].astype(np.intp)
+                repeats = count[indices[rows]].astype(np.intp)
                 if number[site] <= MOST_REPEATED:
                     rows = np.repeat(rows, repeats)
-                here.append((blocks.only(rows), rates.gradient[:, rows].sum(axis=1)))
+                site_blocks.append((blocks.only(rows), rates.gradient[:, rows].sum(axis=1)))
         counts = [k for k in ((1, *at_least) if at_least else USUAL_COUNTS) if k <= number[site]]
-        unknown = _unknown([blocks for blocks, _ in here], int(number[site]))
-        result[site] = _of_site(here, mass, site, counts, years, level, known=not unknown)
+        unknown = _unknown([blocks for blocks, _ in site_blocks], int(number[site]))
+        result[site] = _of_site(
+            site_blocks, mass, site, counts, years, level, has_dependence=not unknown
+        )
         if unknown:
             why[unknown] = None
     if not any(result):
@@ -231,9 +233,9 @@ def joint_at_sites(
     )
 
 
-def _unknown(here: Sequence[KernelBlocks], number: int) -> str:
-    """Return why it is not known what so many blocks of a site share; empty where it is."""
-    models = {blocks.model.name: blocks.model for blocks in here}
+def _unknown(groups: Sequence[KernelBlocks], number: int) -> str:
+    """Return the reason why the dependence of blocks is unknown; empty where it is known."""
+    models = {blocks.model.name: blocks.model for blocks in groups}
     if any(model.dependence is None or model.method.block.size is None
            for model in models.values()):  # fmt: skip
         return UNKNOWN_TO_MODEL
@@ -245,36 +247,36 @@ def _unknown(here: Sequence[KernelBlocks], number: int) -> str:
 
 
 def _of_site(
-    here: Sequence[tuple[KernelBlocks, FloatArray]],
+    site_blocks: Sequence[tuple[KernelBlocks, FloatArray]],
     mass: SiteMass,
     site: int,
     counts: Sequence[int],
     years: float,
     level: float,
     *,
-    known: bool,
+    has_dependence: bool,
 ) -> JointRate:
-    model, blocks = here[0][0].model, [some for some, _ in here]
+    model, blocks = site_blocks[0][0].model, [group for group, _ in site_blocks]
     # The interval is that of the direction in parameter space along which the sum of the rates
     # changes most: one step down and one up, applied to all blocks together.
     steps: list[FloatArray | float] = [0.0]
-    law = model.dependence if known else None
+    law = model.dependence if has_dependence else None
     if law is not None:
-        step = error_step(model, np.sum([own for _, own in here], axis=0), level)
+        step = error_step(model, np.sum([gradient for _, gradient in site_blocks], axis=0), level)
         steps = [0.0, -step, step]
     tables = np.stack(
         [
-            np.concatenate([probabilities(some, mass.grid, step) for some in blocks])
+            np.concatenate([probabilities(group, mass.grid, step) for group in blocks])
             for step in steps
         ]
     )
-    own = mass.mass[site]
-    branches = mass.branches[:, site][mass.weight > 0.0] if mass.branches.size else own[None]
+    site_mass = mass.mass[site]
+    branches = mass.branches[:, site][mass.weight > 0.0] if mass.branches.size else site_mass[None]
     weights = mass.weight[mass.weight > 0.0]
     parts, ends = [], None
     if law is not None:
         where = _placement(blocks)
-        rate = joint_rates(tables, own, where, law).rate[0]
+        rate = joint_rates(tables, site_mass, where, law).rate[0]
         ends = float(rate[1:].min()), float(rate[1:].max())
     for branch in branches:
         bounds = [float(p @ branch) for p in any_fails(tables[0])]
@@ -283,11 +285,11 @@ def _of_site(
     return JointRate.mean(parts, weights) if len(parts) > 1 else parts[0]
 
 
-def _placement(here: Sequence[KernelBlocks]) -> Placement:
-    """Return the blocks of a site as those of unknown azimuths, by their medians."""
-    block = here[0].model.method.block
+def _placement(groups: Sequence[KernelBlocks]) -> Placement:
+    """Return the placement of the blocks of a site, with unknown azimuths, by their medians."""
+    block = groups[0].model.method.block
     medians = {
-        name: np.concatenate([blocks.numbers[name][blocks.weight.size // 2] for blocks in here])
+        name: np.concatenate([blocks.numbers[name][blocks.weight.size // 2] for blocks in groups])
         for name in block.names
     }
     placement = Placement.of_numbers(block, medians, polarity=UNKNOWN)

@@ -1,4 +1,4 @@
-"""How often a year so many of a site's blocks fail: P on nodes of the shaking against its mass.
+"""Annual rates of at least k failures at a site: P at nodes of the shaking times its rate density.
 
 Given Z every block fails from one level of the shaking on, that at which P_i = Φ(Z_i); this level
 is exceeded λ_i(Z_i) times a year. The rate of earthquakes with k failures or more is the mean over
@@ -35,7 +35,7 @@ _VALUES, _SAME, _MOST_PAIRED = 1 << 19, 1e-9, 1000
 
 
 class JointRates(NamedTuple):
-    """How often earthquakes fail so many blocks or more, for each of some tables of P.
+    """Annual rates of earthquakes in which at least k blocks fail, for several tables of P.
 
     Args:
         counts: the numbers of failures k, rising.
@@ -57,7 +57,7 @@ def joint_rates(
     *,
     seed: int = 0,
 ) -> JointRates:
-    """Return how often a year so many blocks of one site fail.
+    """Return the annual rates of earthquakes in which at least k blocks of one site fail.
 
     All tables answer by the same points, so that what they differ by is no scatter.
 
@@ -70,11 +70,11 @@ def joint_rates(
     """
     ks, n = sorted(set(counts)), blocks.size
     least, most = (-1.0, 1.0) if n > _MOST_PAIRED else least_and_greatest(blocks, law)
-    each = probability @ mass
-    total = each.sum(axis=1)
+    block_rates = probability @ mass
+    total = block_rates.sum(axis=1)
     error = np.zeros(len(ks))
     if n == 1:
-        rate = each.T
+        rate = block_rates.T
     elif most < _SAME and least > -_SAME:
         rate = np.stack([at_least(table, ks) @ mass for table in probability], axis=1)
     elif least > 1.0 - _SAME:
@@ -94,7 +94,7 @@ def joint_rates(
 
 
 def at_least(probability: FloatArray, counts: Sequence[int]) -> FloatArray:
-    """Return P that k or more of independent blocks fail, counts x nodes.
+    """Return the probability that at least k independent blocks fail, counts x nodes.
 
     Args:
         probability: P, blocks x nodes.
@@ -108,13 +108,15 @@ def at_least(probability: FloatArray, counts: Sequence[int]) -> FloatArray:
 
 
 def _both(probability: FloatArray, blocks: Placement, law: Dependence) -> FloatArray:
-    """Return P that both of two blocks fail, shape (nodes,)."""
-    one, other = probability
-    some = np.flatnonzero(np.minimum(one, other) > 0.0)
-    both, first = np.zeros(one.size), np.zeros_like(some)
-    a, b = ndtri(one[some]), ndtri(other[some])
-    both[some] = one[some] * other[some] + pair_excess(a, b, blocks, first, first + 1, law)
-    return np.clip(both, 0.0, np.minimum(one, other))
+    """Return the probability that both of two blocks fail, shape (nodes,)."""
+    p_first, p_second = probability
+    nodes = np.flatnonzero(np.minimum(p_first, p_second) > 0.0)
+    both, first = np.zeros(p_first.size), np.zeros_like(nodes)
+    a, b = ndtri(p_first[nodes]), ndtri(p_second[nodes])
+    both[nodes] = p_first[nodes] * p_second[nodes] + pair_excess(
+        a, b, blocks, first, first + 1, law
+    )
+    return np.clip(both, 0.0, np.minimum(p_first, p_second))
 
 
 def _by_points(
@@ -145,7 +147,7 @@ def _by_points(
 
 @kernel
 def _rates_of_levels(probability: FloatArray, above: FloatArray, levels: FloatArray) -> FloatArray:
-    """Return how often a year P reaches each of some rising levels, blocks x levels."""
+    """Return the annual rates at which P reaches increasing levels, blocks x levels."""
     n, nodes = probability.shape
     result = np.zeros((n, levels.size))
     for i in range(n):
@@ -161,13 +163,13 @@ def _rates_of_levels(probability: FloatArray, above: FloatArray, levels: FloatAr
                 break
             # between the middles of two cells the rate is straight
             last = above[k + 1] if k + 1 < nodes else 0.0
-            own = 0.5 * (above[k] + last)
+            after = 0.5 * (above[k] + last)
             if k == 0:
                 result[i, j] = above[0]
             else:
                 before = 0.5 * (above[k - 1] + above[k])
                 t = (level - low) / (high - low)
-                result[i, j] = before + t * (own - before)
+                result[i, j] = before + t * (after - before)
     return result
 
 
@@ -191,19 +193,19 @@ def _moments(
     most, end = counts.max(), levels.shape[1] - 1
     mean, product = np.zeros((REPLICATES, counts.size)), np.zeros((REPLICATES, counts.size))
     mean_sum, squares = np.zeros(REPLICATES), np.zeros(REPLICATES)
-    own, rates = np.empty((n, points)), np.empty(n)
+    block_rates, rates = np.empty((n, points)), np.empty(n)
     for turn in range(sides):  # each block faces each of its sides once
         for i in range(n):
             for point in range(points):
                 x = (z[(side[i, point] + turn) % sides, i, point] + _REACH) * _STEPS
                 x = min(max(x, 0.0), end - 1e-9)
                 j = int(x)
-                own[i, point] = levels[i, j] + (x - j) * (levels[i, j + 1] - levels[i, j])
+                block_rates[i, point] = levels[i, j] + (x - j) * (levels[i, j + 1] - levels[i, j])
         for point in range(points):
             r = point * REPLICATES // points
             total, greatest = 0.0, 0.0
             for i in range(n):
-                rates[i] = own[i, point]
+                rates[i] = block_rates[i, point]
                 total += rates[i]
                 greatest = max(greatest, rates[i])
             if most > 1:

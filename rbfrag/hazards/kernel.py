@@ -1,4 +1,4 @@
-"""Rates of failure of many blocks: P of each on the nodes of a grid against its site's mass."""
+"""Annual rates of failure of many blocks: P at grid nodes times the rate density of the site."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _EVERY = 8
 
 @dataclass(frozen=True, eq=False)
 class KernelBlocks:
-    """Blocks that one model of one measure answers for.
+    """Blocks of one model of a single intensity measure.
 
     Args:
         model: the model.
@@ -62,7 +62,7 @@ class KernelBlocks:
         numbers: Mapping[str, FloatArray],
         site: Indices,
     ) -> list[tuple[Indices, KernelBlocks]]:
-        """Return certain and uncertain blocks, each with where they stand among all.
+        """Return the blocks without and with parameter uncertainty, each with their indices.
 
         Args:
             numbers: fields of the blocks and their standard deviations, shape (m,) each.
@@ -78,28 +78,30 @@ class KernelBlocks:
             for name, value in numbers.items()
             if name not in block.sigmas
         }
-        own = block.filled(medians)
+        by_field = block.filled(medians)
         # what a block has of itself goes with what it may be, unless that has a scatter of its own
-        medians |= {name: own[name] for name in sigmas if name in own}
+        medians |= {name: by_field[name] for name in sigmas if name in by_field}
         # Uncertain blocks are averaged over a product grid of normal steps, one axis for each
         # parameter with a standard deviation; certain blocks need one point.
         uncertain = np.zeros(site.size, dtype=np.bool_)
         for sigma in sigmas.values():
             uncertain |= sigma > 0.0
         result = []
-        for places in (np.flatnonzero(~uncertain), np.flatnonzero(uncertain)):
-            if not places.size:
+        for indices in (np.flatnonzero(~uncertain), np.flatnonzero(uncertain)):
+            if not indices.size:
                 continue
-            own = {name: sigma[places] for name, sigma in sigmas.items() if sigma[places].any()}
-            axes = [scatter_steps(float(sigma.max())) for sigma in own.values()]
+            by_field = {
+                name: sigma[indices] for name, sigma in sigmas.items() if sigma[indices].any()
+            }
+            axes = [scatter_steps(float(sigma.max())) for sigma in by_field.values()]
             points, weight = normal_product(axes)
-            drawn = {name: value[places][None] for name, value in medians.items()}
-            for (name, sigma), z in zip(own.items(), points, strict=True):
+            drawn = {name: value[indices][None] for name, value in medians.items()}
+            for (name, sigma), z in zip(by_field.items(), points, strict=True):
                 law = fraction if name in block.fractions else lognormal
                 drawn[name] = law(z.reshape(-1, 1), drawn[name], sigma)
-            shape = weight.size, places.size
+            shape = weight.size, indices.size
             drawn = {n: np.broadcast_to(v, shape) for n, v in block.filled(drawn).items()}
-            result.append((places, cls(model, median, drawn, weight, site[places])))
+            result.append((indices, cls(model, median, drawn, weight, site[indices])))
         return result
 
     @property
@@ -108,31 +110,33 @@ class KernelBlocks:
         return self.site.size
 
     def only(self, chosen: Indices) -> KernelBlocks:
-        """Return some of the blocks."""
-        numbers = {name: each[:, chosen] for name, each in self.numbers.items()}
+        """Return a selection of the blocks."""
+        numbers = {name: values[:, chosen] for name, values in self.numbers.items()}
         return KernelBlocks(self.model, self.median, numbers, self.weight, self.site[chosen])
 
     def moved(self, step: FloatArray | float) -> KernelBlocks:
-        """Return the blocks by a model whose parameters are so much greater."""
+        """Return the blocks with a step added to the parameters of their model."""
         parameters = tuple(np.add(self.model.parameters, step).tolist())
         return replace(self, model=replace(self.model, parameters=parameters))
 
     def values(self, u: FloatArray) -> dict[str, Any]:
-        """Return what the formula reads at u, of a shape that broadcasts with draws x blocks."""
+        """Return the inputs of the model at u, of a shape that broadcasts with draws x blocks."""
         block, term = self.model.method.block, self.model.term
-        given: dict[str, Any] = {name: each[..., None] for name, each in self.numbers.items()}
-        given[term.inputs[0]] = self.median * np.exp(u)
-        return block.completed(given, term, arrays())
+        inputs: dict[str, Any] = {
+            name: numbers[..., None] for name, numbers in self.numbers.items()
+        }
+        inputs[term.inputs[0]] = self.median * np.exp(u)
+        return block.completed(inputs, term, arrays())
 
     def forbidden(self, values: Mapping[str, Any]) -> NDArray[np.bool_]:
-        """Return where mechanics says that nothing fails."""
+        """Return where failure is impossible by mechanics."""
         result = np.zeros((self.weight.size, self.size, 1), dtype=np.bool_)
         for bound in self.model.bounds(values):
             result = result | bound.holds(values)
         return result
 
     def allowed_from(self, grid: Grid) -> FloatArray:
-        """Return u from which on mechanics lets each fail, draws x blocks, within the grid."""
+        """Return the u above which failure is possible, draws x blocks, within the grid."""
         shape = (self.weight.size, self.size)
         low = np.full(shape, grid.u[0] - grid.step)
         high = np.full(shape, grid.u[-1] + grid.step)
@@ -146,7 +150,7 @@ class KernelBlocks:
 
 
 class NodeTable(NamedTuple):
-    """P of m blocks on nodes, and how it changes with the parameters.
+    """P of m blocks at grid nodes, and its derivatives by the parameters.
 
     Args:
         probability: P, m x nodes.
@@ -162,7 +166,7 @@ class NodeTable(NamedTuple):
 def table_of(
     blocks: KernelBlocks, grid: Grid, first: int, allowed: FloatArray, *, slopes: bool = True
 ) -> NodeTable:
-    """Return P of the blocks on the nodes of a grid from one on.
+    """Return P of the blocks at the grid nodes from a first node on.
 
     Where P jumps at what mechanics allows, the two nodes about the jump get what makes a sum over
     nodes of a smooth mass right to the second order: with the jump t steps below its next node,
@@ -181,15 +185,15 @@ def table_of(
             # P just above the jump: to P itself, one more node
             at, at_slopes, _ = _evaluated(blocks, allowed[..., None] + 1e-9, slopes=slopes)
             _smooth_jumps(grid, first, allowed[0], p[0], at[0, :, 0])
-            for own, one in zip(by_parameter, at_slopes, strict=True):
-                _smooth_jumps(grid, first, allowed[0], own[0], one[0, :, 0])
+            for slope, slope_at_jump in zip(by_parameter, at_slopes, strict=True):
+                _smooth_jumps(grid, first, allowed[0], slope[0], slope_at_jump[0, :, 0])
         outside = _outside(blocks, values, u.size)
 
-    def mean(each: FloatArray) -> FloatArray:
-        return each[0] if draws == 1 else np.tensordot(blocks.weight, each, axes=1)
+    def mean(table: FloatArray) -> FloatArray:
+        return table[0] if draws == 1 else np.tensordot(blocks.weight, table, axes=1)
 
     return NodeTable(
-        mean(p), tuple(mean(each) for each in by_parameter) if slopes else None, mean(outside)
+        mean(p), tuple(mean(slope) for slope in by_parameter) if slopes else None, mean(outside)
     )
 
 
@@ -220,16 +224,16 @@ def _smooth_jumps(
 
 
 def _outside(blocks: KernelBlocks, values: Mapping[str, Any], size: int) -> FloatArray:
-    """Return where blocks and shaking lie outside the ranges, by every few nodes."""
-    some = np.arange(_EVERY // 2, size + _EVERY // 2, _EVERY)
-    some = np.minimum(some, size - 1)
+    """Return where blocks and shaking lie outside the fitted range, by every eighth node."""
+    nodes = np.arange(_EVERY // 2, size + _EVERY // 2, _EVERY)
+    nodes = np.minimum(nodes, size - 1)
     thin = {
-        name: value[..., some] if np.shape(value)[-1:] == (size,) and size > 1 else value
+        name: value[..., nodes] if np.shape(value)[-1:] == (size,) and size > 1 else value
         for name, value in values.items()
     }
     model = blocks.model
     model.with_ratios(thin)
-    outside = np.zeros((blocks.weight.size, blocks.size, some.size), dtype=np.bool_)
+    outside = np.zeros((blocks.weight.size, blocks.size, nodes.size), dtype=np.bool_)
     for finding in outside_domain(model, thin):
         outside |= finding.holds
     if model.spread is not None:
@@ -238,7 +242,7 @@ def _outside(blocks: KernelBlocks, values: Mapping[str, Any], size: int) -> Floa
 
 
 class Rates(NamedTuple):
-    """What the kernel gives of m blocks.
+    """Annual rates of failure of m blocks.
 
     Args:
         rate: annual rate of failure of each [1/a].
@@ -261,7 +265,7 @@ class Rates(NamedTuple):
 
 
 class RatePart(NamedTuple):
-    """Blocks of some sites, as they travel to a worker.
+    """Blocks of some sites, as sent to a worker.
 
     Args:
         number: place of the part in the order of all.
@@ -279,7 +283,7 @@ class RatePart(NamedTuple):
 
 
 class PartRates(NamedTuple):
-    """The rates of a part."""
+    """The rates of one part of the work."""
 
     number: int
     rates: Rates
@@ -290,13 +294,13 @@ Run = Callable[[Iterator[RatePart], int], Iterator[PartRates]]
 
 
 def rate_part(part: RatePart) -> PartRates:
-    """Return the rates of a part; a function of a module, for worker processes."""
+    """Return the rates of one part; a module-level function, for worker processes."""
     blocks = KernelBlocks(FragilityModel.from_row(part.row), **part.blocks)
     return PartRates(part.number, rates(blocks, part.mass, part.level))
 
 
 def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = None) -> Rates:
-    """Return the annual rates of failure of some blocks.
+    """Return the annual rates of failure of blocks.
 
     The parts of the work do not depend on who does them, nor does the answer.
 
@@ -309,9 +313,11 @@ def rates(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run | None = 
     allowed = blocks.allowed_from(mass.grid)
     k, b = len(blocks.model.parameters), mass.branches.shape[0]
     rows = np.zeros((6 + k + b, blocks.size))
-    for some, first in chunks(blocks, mass.grid, allowed):
-        own = blocks.only(some)
-        rows[:, some] = sums_of(own, table_of(own, mass.grid, first, allowed[:, some]), mass, first)
+    for indices, first in chunks(blocks, mass.grid, allowed):
+        group = blocks.only(indices)
+        rows[:, indices] = sums_of(
+            group, table_of(group, mass.grid, first, allowed[:, indices]), mass, first
+        )
     gradient = rows[3 : 3 + k]
     return Rates(
         rows[0], half_width(blocks.model.errors, gradient, level), gradient, rows[1], rows[2],
@@ -323,30 +329,32 @@ def _in_parts(blocks: KernelBlocks, mass: SiteMass, level: float, run: Run) -> R
     order = np.argsort(blocks.site, kind="stable")
     parts = np.split(order, np.arange(_BLOCKS_OF_A_PART, order.size, _BLOCKS_OF_A_PART))
 
-    def given() -> Iterator[RatePart]:
-        for number, some in enumerate(parts):
-            own = blocks.only(some)
-            low, high = int(own.site.min()), int(own.site.max()) + 1
+    def work_parts() -> Iterator[RatePart]:
+        for number, indices in enumerate(parts):
+            group = blocks.only(indices)
+            low, high = int(group.site.min()), int(group.site.max()) + 1
             columns = {
-                "median": own.median, "numbers": own.numbers, "weight": own.weight,
-                "site": own.site - low,
+                "median": group.median, "numbers": group.numbers, "weight": group.weight,
+                "site": group.site - low,
             }  # fmt: skip
-            here = of_sites(mass, slice(low, high))
-            yield RatePart(number, own.model.row, columns, here, level)
+            site_mass = of_sites(mass, slice(low, high))
+            yield RatePart(number, group.model.row, columns, site_mass, level)
 
-    each = sorted(run(given(), len(parts)))
-    joined = (np.concatenate(values, axis=-1) for values in zip(*(r for _, r in each), strict=True))
+    results = sorted(run(work_parts(), len(parts)))
+    joined = (
+        np.concatenate(values, axis=-1) for values in zip(*(r for _, r in results), strict=True)
+    )
     back = np.argsort(order)
     return Rates(*(values[..., back] for values in joined))
 
 
 def half_width(errors: ParameterErrors, gradient: FloatArray, level: float) -> FloatArray:
-    """Return Student's quantile times the standard error of what has these derivatives, (m,)."""
+    """Return the half-width of a confidence interval by the delta method, shape (m,)."""
     return np.asarray(errors.half_width(list(gradient), quantiles_of(level), arrays()))
 
 
 def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> FloatArray:
-    """Return an end of the interval of rates, rate · exp(side · half/rate), by the delta method.
+    """Return an end of the confidence interval: rate · exp(side · half/rate) (delta method).
 
     Args:
         half: Student's quantile times the standard error of the rate.
@@ -358,7 +366,7 @@ def interval_end(rate: FloatArray, half: FloatArray | float, side: float) -> Flo
 
 
 def error_step(model: FragilityModel, gradient: FloatArray, level: float) -> FloatArray:
-    """Return how far the parameters go to the upper end of the interval of some number, shape (k,).
+    """Return the step of the parameters to the upper end of the interval of a quantity, shape (k,).
 
     The step is along V g, the direction of the ellipse of errors in which the number changes most.
 
@@ -373,7 +381,7 @@ def error_step(model: FragilityModel, gradient: FloatArray, level: float) -> Flo
 
 
 def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | float = 0.0) -> FloatArray:
-    """Return P of the blocks on all nodes of a grid, m x nodes, never falling.
+    """Return P of the blocks at all nodes of a grid, made non-decreasing, m x nodes.
 
     Args:
         step: what is added to the model's parameters.
@@ -384,7 +392,7 @@ def probabilities(blocks: KernelBlocks, grid: Grid, step: FloatArray | float = 0
 
 
 def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tuple[Indices, int]]:
-    """Yield blocks that are worked on together, and the first node at which one of them may fail.
+    """Yield groups of blocks, and the first node at which one of a group may fail.
 
     Blocks that begin to fail at like levels go together.
     """
@@ -400,17 +408,17 @@ def chunks(blocks: KernelBlocks, grid: Grid, allowed: FloatArray) -> Iterator[tu
 
 
 def sums_of(blocks: KernelBlocks, table: NodeTable, mass: SiteMass, first: int) -> list[FloatArray]:
-    """Return rate, error, part from outside, gradient, rates in branches, and P at the ends.
+    """Return rate, error, part outside the fitted range, gradient, branch rates, and P at the ends.
 
     Args:
         first: the first node of the table.
     """
 
     def against(masses: FloatArray, values: FloatArray) -> FloatArray:
-        own = masses[:, first:]
-        if own.shape[0] == 1:
-            return np.asarray(values @ own[0])
-        return np.asarray(np.einsum("mn,mn->m", values, own[blocks.site]))
+        node_mass = masses[:, first:]
+        if node_mass.shape[0] == 1:
+            return np.asarray(values @ node_mass[0])
+        return np.asarray(np.einsum("mn,mn->m", values, node_mass[blocks.site]))
 
     # the mass of single events has negative parts, by cubic interpolation between nodes
     rate = np.maximum(against(mass.mass, table.probability), 0.0)
@@ -432,7 +440,7 @@ def sums_of(blocks: KernelBlocks, table: NodeTable, mass: SiteMass, first: int) 
 
 
 def _off_by(values: FloatArray) -> FloatArray:
-    """Return what every second value differs by from the cubic through those between.
+    """Return the difference of every second value from the cubic through its neighbours.
 
     That is the error of a grid of twice the step.
     """
@@ -450,7 +458,7 @@ def curve_contributions(
     shaking: LevelShaking,
     blocks: Sequence[KernelBlocks],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return which shaking the mean rate of some blocks comes from.
+    """Return the contributions of the levels of a curve to the mean rate of the blocks.
 
     Args:
         branches: curves of one site.
@@ -465,10 +473,10 @@ def curve_contributions(
     curves, weight = [branches[i] for i in used], weight[used]
     mass = curve_mass([[curve] for curve in curves], weight, shaking)
     grid, total = mass.grid, np.zeros(mass.grid.size)
-    for some in blocks:
-        p = table_of(some, grid, 0, some.allowed_from(grid), slopes=False).probability
+    for group in blocks:
+        p = table_of(group, grid, 0, group.allowed_from(grid), slopes=False).probability
         total += p.sum(axis=0)
-    mean = mass.smoothing.of(total / sum(some.size for some in blocks))
+    mean = mass.smoothing.of(total / sum(group.size for group in blocks))
     part = weight @ under(curves, grid, beyond=False) * mean
     low, high = min(c.levels[0] for c in curves), max(c.levels[-1] for c in curves)
     starts = np.flatnonzero((grid.u > np.log(low)) & (grid.u < np.log(high)))

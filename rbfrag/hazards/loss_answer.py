@@ -43,7 +43,7 @@ _LABEL_WIDTH = 28
 
 @dataclass(frozen=True)
 class Exceedance:
-    """How often a number of failures, or a loss, is reached.
+    """Annual rate of exceedance of a number of failures, or of a loss.
 
     Args:
         value: the number of failures, or the loss.
@@ -110,7 +110,7 @@ class Exceedance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LossAnswer(Result):
-    """What an event set, or a scenario, does to a portfolio of blocks.
+    """Failures and losses of a portfolio of blocks under an event set or a scenario.
 
     Its table is that of the events (`to_frame`).
 
@@ -171,23 +171,23 @@ class LossAnswer(Result):
 
     def error(self, values: FloatArray) -> float:
         """Return the standard error of `mean`: that of a sum over a Poisson number of events."""
-        own = values - self.mean(values) if self.events.is_scenario else values
-        return float(np.sqrt(((self.events.weight * own) ** 2).sum()))
+        deviations = values - self.mean(values) if self.events.is_scenario else values
+        return float(np.sqrt(((self.events.weight * deviations) ** 2).sum()))
 
     @property
     def has_losses(self) -> bool:
-        """Whether the blocks state what a failure costs."""
+        """True if the blocks have losses."""
         return self.portfolio.loss is not None
 
     @property
     def kinds(self) -> list[str]:
-        """How the blocks of each row fail that can be used."""
+        """Failure kind of each answered row."""
         _, first = np.unique(self.portfolio.row, return_index=True)
         return [self.portfolio.models[i].kind for i in self.portfolio.model[first].tolist()]
 
     @property
     def modes(self) -> list[str]:
-        """Failure mode of the blocks of each of these rows."""
+        """Failure mode of each answered row."""
         return [mode_of_kind(kind) for kind in self.kinds]
 
     @property
@@ -197,7 +197,7 @@ class LossAnswer(Result):
 
     @property
     def average_annual_loss(self) -> float | None:
-        """Mean loss a year, or given the event; None where no loss is stated."""
+        """Mean loss per year, or given the event; None without losses."""
         return self.mean(self.loss) if self.has_losses else None
 
     @property
@@ -308,13 +308,13 @@ class LossAnswer(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
         events, scenario = self.events, self.events.is_scenario
-        stated: list[tuple[str, str, FloatArray]] = [
+        quantities: list[tuple[str, str, FloatArray]] = [
             ("average_annual_failures", "expected_failures", self.failures),
             ("annual_rate_any", "probability_any", self.any_fails[0]),
             *([("average_annual_loss", "expected_loss", self.loss)] if self.has_losses else []),
         ]
         means: dict[str, Any] = {}
-        for annual, given_event, values in stated:
+        for annual, given_event, values in quantities:
             mean = getattr(self, annual)
             error = None if mean is None else self.error(values)
             means |= {annual: mean, f"{annual}_error": error}
@@ -327,9 +327,9 @@ class LossAnswer(Result):
         means["uncertainty"] = [
             row for name, mean in self.uncertainty.items() for row in mean.as_dicts(name)
         ]
-        what = "probability_any" if scenario else "annual_rate_any"
+        key = "probability_any" if scenario else "annual_rate_any"
         bounds = {
-            name.replace(" ", "_"): {what: self.mean(values)}
+            name.replace(" ", "_"): {key: self.mean(values)}
             for name, values in zip((DEPENDENT, INDEPENDENT), self.bounds, strict=True)
         }
         duration = events.duration
@@ -364,10 +364,10 @@ class LossAnswer(Result):
     def _exceedance(
         self, key: str, name: str, curves: Mapping[str, tuple[Exceedance, ...]]
     ) -> dict[str, Any]:
-        """Return the curve that answers; where only bounds are known an empty one and both."""
+        """Return the exceedance curve; an empty one and both bounds without a dependence model."""
         scenario = self.events.is_scenario
         lists = {
-            law: [one.as_dict(name, scenario=scenario) for one in curve]
+            law: [point.as_dict(name, scenario=scenario) for point in curve]
             for law, curve in curves.items()
         }
         if len(lists) <= 1:
@@ -415,7 +415,7 @@ class LossAnswer(Result):
         return rows
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
-        """Return the table of events, one row each, also of those that shook no site."""
+        """Return the table of events, one row each, including events without shaking at a site."""
         events = self.events
         columns: dict[str, NDArray[Any]] = {
             "event_id": events.event_id,
@@ -434,6 +434,6 @@ class LossAnswer(Result):
         if len(self.laws) == 1:
             return {name: values[0]}
         return {
-            f"{name}_{law.replace(' ', '_')}": own
-            for law, own in zip(self.laws, values, strict=True)
+            f"{name}_{law.replace(' ', '_')}": row
+            for law, row in zip(self.laws, values, strict=True)
         }

@@ -1,4 +1,4 @@
-"""How many blocks fail a year by an event set, how often any does, and what it costs."""
+"""Failures and losses of a portfolio of blocks under an event set, with exceedance curves."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rbfrag.hazards.event_counts import (
     PAIRS_AT_ONCE,
     SAMPLES_AT_ONCE,
     Curves,
+    EventBatch,
     EventYears,
     PartCounts,
-    SomeYears,
     count_years,
     laws_of,
     shift_error,
@@ -40,7 +40,7 @@ from rbfrag.results.numbers import percent
 from rbfrag.solver.results import FloatArray
 from rbfrag.vocabulary.quantities import QUANTITIES
 
-Run = Callable[[Iterator[SomeYears], int, EventYears], Iterator[PartCounts]]
+Run = Callable[[Iterator[EventBatch], int, EventYears], Iterator[PartCounts]]
 """Does the parts of the work by `count_years` and yields the results in any order.
 
 Given are the parts, their number, and what all have in common.
@@ -64,7 +64,7 @@ def event_losses(
     run: Run | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> LossAnswer:
-    """Return how many blocks fail by an event set, how often any does, and what it costs.
+    """Return expected failures, the rate of any failure, and losses under an event set.
 
     Means are exact: sums of P over the events. What several blocks do together is sampled, by the
     copula that is stored with the model: in each event one draw of what the earthquake shares, of
@@ -91,20 +91,20 @@ def event_losses(
     groups = _groups(events, portfolio, samples) if samples or means is None else []
     none = _only(events, np.empty(0, dtype=np.intp))
     common = EventYears(-1, portfolio, none, *ends, samples, seed, shifted)
-    parts = (SomeYears(number, _only(events, group)) for number, group in enumerate(groups))
-    do: Run = run or (lambda work, _, shared: (count_years(shared, some) for some in work))
-    done = 0
+    parts = (EventBatch(number, _only(events, group)) for number, group in enumerate(groups))
+    do: Run = run or (lambda work, _, shared: (count_years(shared, batch) for batch in work))
+    events_done = 0
     results: dict[int, PartCounts] = {}
     for result in do(parts, len(groups), common) if groups else ():
         results[result.number] = result
-        done += groups[result.number].size
+        events_done += groups[result.number].size
         if on_progress is not None:
-            on_progress(done, sum(group.size for group in groups))
+            on_progress(events_done, sum(group.size for group in groups))
     return _answer(events, portfolio, ends, groups, results, means, samples, seed, level)
 
 
 def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
-    """Return the events that shake a site with blocks, in parts of whole years."""
+    """Return the events that shake a site with blocks, grouped by complete years."""
     at_site = np.bincount(portfolio.site, minlength=len(events.site_ids))
     pairs = np.bincount(events.event, at_site[events.site], minlength=events.event_id.size)
     order = np.lexsort((events.event_id, events.year, events.realization))
@@ -121,7 +121,7 @@ def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArra
 
 
 def _only(events: EventSet, group: NDArray[np.intp]) -> EventSet:
-    """Return some of the events with their rows."""
+    """Return a subset of the events with their rows."""
     place = np.full(events.event_id.size, -1)
     place[group] = np.arange(group.size)
     rows = np.flatnonzero(place[events.event] >= 0)
@@ -138,7 +138,7 @@ def _only(events: EventSet, group: NDArray[np.intp]) -> EventSet:
 
 
 def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
-    """Return the numbers of failures and the losses that curves are given for."""
+    """Return the numbers of failures and the losses at which exceedance is evaluated."""
     weight = portfolio.weight[portfolio.weight > 0.0]
     most = float(portfolio.weight @ portfolio.count)
     if not weight.size:
@@ -175,7 +175,7 @@ def _answer(
         [results[i] for i in range(len(groups))],
     )
 
-    def whole(name: str, *shape: int) -> FloatArray:
+    def gather(name: str, *shape: int) -> FloatArray:
         values = np.zeros((*shape, n))
         for group, part in zip(groups, order, strict=True):
             values[..., group] = getattr(part, name)
@@ -185,15 +185,15 @@ def _answer(
         blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
         unknown = np.full(portfolio.size, np.nan)
         means = EventMeans(
-            whole("failures"), whole("loss"), whole("bounds", 2), blocks, unknown, np.nan, np.nan
+            gather("failures"), gather("loss"), gather("bounds", 2), blocks, unknown, np.nan, np.nan
         )
-    any_fails = whole("any_fails", len(laws))
-    variance = whole("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
+    any_fails = gather("any_fails", len(laws))
+    variance = gather("loss_variance", len(laws)) if order else np.full((len(laws), n), np.nan)
     if not order:  # known without samples alone where no law matters, as of single blocks
-        one = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
-        any_fails = means.bounds if len(laws) > 1 else one
+        any_bounds = means.bounds[:1] if portfolio.count.sum() < 2 else np.full((1, n), np.nan)
+        any_fails = means.bounds if len(laws) > 1 else any_bounds
     curves = [
-        Curves.whole(parts) if parts else None
+        Curves.merge(parts) if parts else None
         for parts in ([part.counts for part in order], [part.losses for part in order])
     ]
     exceedance, loss_exceedance = (
@@ -203,7 +203,7 @@ def _answer(
         for curve, end in zip(curves, ends, strict=True)
     )
     of_any = curves[0].events[0, :, 0] if curves[0] and ends[0].size else np.empty(0)
-    stated = {
+    quantities = {
         "average_annual_failures": (means.failures, means.failures_half),
         "average_annual_loss": (means.loss, means.loss_half),
         "annual_rate_any": (
@@ -212,7 +212,7 @@ def _answer(
         ),
     }
     if portfolio.loss is None:
-        del stated["average_annual_loss"]
+        del quantities["average_annual_loss"]
     return LossAnswer(
         events, portfolio, samples, seed, level, laws,
         failures=means.failures,
@@ -225,7 +225,7 @@ def _answer(
             name: MeanUncertainty.of(
                 events, values, half, level, are_probabilities=name == "annual_rate_any"
             )
-            for name, (values, half) in stated.items()
+            for name, (values, half) in quantities.items()
             if name != "annual_rate_any" or (len(laws) == 1 and not np.isnan(values).any())
         },
         exceedance=exceedance,
@@ -236,7 +236,7 @@ def _answer(
 
 
 def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
-    """Return the portfolio by models one standard deviation away along each axis of their errors.
+    """Return the portfolio with models one standard deviation away along each principal axis.
 
     Two of each principal axis of each model's covariance, to either side.
     """
@@ -254,7 +254,7 @@ def shifted_portfolios(portfolio: Portfolio) -> tuple[Portfolio, ...]:
 
 
 def _half_of(rates: FloatArray, laws: int, level: float) -> float:
-    """Return how far the interval of a rate reaches, as a part of it; rates as `shift_error`."""
+    """Return the relative half-width of the interval of a rate; rates as for `shift_error`."""
     if laws > 1 or rates.size < 2:
         return np.nan
     return float(shift_error(rates) * quantiles_of(level).normal)
@@ -263,7 +263,7 @@ def _half_of(rates: FloatArray, laws: int, level: float) -> float:
 def _curve(
     events: EventSet, curve: Curves | None, ends: FloatArray, law: int, laws: int, level: float
 ) -> tuple[Exceedance, ...]:
-    """Return the numbers that are reached at all, each with its intervals."""
+    """Return the exceedance curve up to the largest value reached, with intervals."""
     if curve is None:
         return ()
     effective = events.effective_years
@@ -288,7 +288,7 @@ def _curve(
 
 
 def _of_rows(events: EventSet, portfolio: Portfolio, means: EventMeans) -> FloatArray:
-    """Return the rate of each row of the table, its error, its loss, and its interval's half."""
+    """Return rate, standard error, loss and half-width of the interval of each row."""
     blocks, number = means.blocks, portfolio.count * portfolio.weight
     cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
     result = np.empty((4, portfolio.size))
@@ -318,12 +318,12 @@ def _scenario_quantiles(
     weight = np.repeat(events.weight, samples)
     result = np.empty((laws, 2, len(QUANTILES)))
     for law in range(laws):
-        for what in range(2):
-            values = drawn[law, :, what].ravel()
+        for column in range(2):
+            values = drawn[law, :, column].ravel()
             order = np.argsort(values, kind="stable")
             reached = np.cumsum(weight[order]) / weight.sum()
             at = [np.searchsorted(reached, q - 1e-12) for q in QUANTILES]
-            result[law, what] = values[order[at]]
+            result[law, column] = values[order[at]]
     return result
 
 
@@ -380,16 +380,16 @@ def _warnings(
 
 
 def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> Iterator[Diagnostic]:
-    """Yield a warning where blocks fail at shaking that the engine may have left out.
+    """Yield a warning where blocks fail under shaking that may be below the cut-off of the engine.
 
     Its minimum_intensity stands in no file; few rows lie below it.
     """
-    here = np.isin(events.site, portfolio.site)
-    if not here.any() or events.is_scenario:
+    is_at_block = np.isin(events.site, portfolio.site)
+    if not is_at_block.any() or events.is_scenario:
         return
     name = portfolio.measures[0]
     measure, unit = describe.measures([name]), QUANTITIES[name].unit
-    thin = {n: np.full(1, np.quantile(v[here], _THIN)) for n, v in events.measures.items()}
+    thin = {n: np.full(1, np.quantile(v[is_at_block], _THIN)) for n, v in events.measures.items()}
     p, _ = portfolio.probability(np.arange(portfolio.size), thin, (0.0, 0.0, 0.0))
     if p.max() > NOTABLE:
         yield Diagnostic(

@@ -1,4 +1,4 @@
-"""How often a year shaking lies about each of equally spaced levels, at some sites.
+"""Annual rate density of shaking at equally spaced levels of some sites.
 
 A rate of failure is a sum over u = ln(level),
 
@@ -36,7 +36,7 @@ _BESIDE = 2  # nodes that cubic interpolation reads on either side
 
 
 class Grid(NamedTuple):
-    """Nodes at whole multiples of a step of u = ln(level).
+    """Grid nodes at integer multiples of a step of u = ln(level).
 
     Args:
         step: the step.
@@ -50,7 +50,7 @@ class Grid(NamedTuple):
 
     @classmethod
     def over(cls, step: float, low: float, high: float, shift: int = 0) -> Grid:
-        """Return the grid for u between two values and so many nodes more on either side."""
+        """Return the grid that covers a range of u, with extra nodes on either side."""
         first = math.floor(low / step) - _BESIDE - shift
         return cls(step, first, math.ceil(high / step) + _BESIDE + 1 + shift - first)
 
@@ -75,7 +75,7 @@ class Grid(NamedTuple):
         return start, np.stack([1.0 - (x - start), x - start])
 
     def spread(self, u: FloatArray, *, linear: bool = False) -> csr_array:
-        """Return the matrix that puts masses at u on the nodes, shape (size, number of u)."""
+        """Return the matrix that distributes masses at u to the nodes, (size, number of u)."""
         start, weights = self.linear(u) if linear else self.cubic(u)
         rows = (start + np.arange(weights.shape[0])[:, None]).ravel()
         columns = np.tile(np.arange(u.size), weights.shape[0])
@@ -83,7 +83,7 @@ class Grid(NamedTuple):
 
 
 class Smoothing(NamedTuple):
-    """Scatter about a level: masses a whole number of nodes apart.
+    """Dispersion about a level, as weights at nodes a constant number of nodes apart.
 
     Args:
         every: nodes between two of them.
@@ -95,11 +95,11 @@ class Smoothing(NamedTuple):
 
     @property
     def reach(self) -> int:
-        """Nodes to the outermost one."""
+        """Distance to the outermost weight, in nodes."""
         return self.every * (self.weight.size // 2)
 
     def of(self, values: FloatArray) -> FloatArray:
-        """Return values on nodes, the last axis, with the scatter; beyond its ends there is none.
+        """Return node values (last axis) smoothed by the dispersion; zero beyond the ends.
 
         The scatter is the same to both sides, so that this smooths a mass and a probability alike.
         """
@@ -117,7 +117,7 @@ class Smoothing(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CurveEnds:
-    """Where the curves of some sites end, as unit masses at levels of them.
+    """First and last levels of the curves of sites, as unit masses.
 
     Args:
         group: which of the rows each site has, shape (sites,).
@@ -139,7 +139,7 @@ class CurveEnds:
 
 @dataclass(frozen=True, eq=False)
 class SiteMass:
-    """Mass of some sites, and of each of some branches of their logic tree.
+    """Rate density at sites, for the mean and for each logic-tree branch.
 
     Args:
         mass: the weighted mean over the branches, with scatter [1/a], sites x nodes.
@@ -159,7 +159,7 @@ class SiteMass:
 
 
 def smoothing_of(shaking: LevelShaking) -> tuple[float, Smoothing]:
-    """Return the step of the grid for what levels are to a model, and the scatter on it."""
+    """Return the step of the grid and the dispersion for the shaking of a model."""
     if shaking.shift.size == 1:
         return STEP, Smoothing(1, np.ones(1))
     apart = math.log(shaking.shift[1] / shaking.shift[0])
@@ -176,7 +176,7 @@ NODES_A_SHIFT = 8
 def curve_mass(
     branches: Sequence[Sequence[HazardCurve]], weight: FloatArray, shaking: LevelShaking
 ) -> SiteMass:
-    """Return the mass under the hazard curves of some sites.
+    """Return the rate density under the hazard curves of sites.
 
     Shaking beyond the last level counts as that level, the least that it can be; below the first
     level nothing is counted.
@@ -186,12 +186,12 @@ def curve_mass(
         weight: weights of the branches, which sum to 1.
     """
     step, smoothing = smoothing_of(shaking)
-    curves = [curve for each in branches for curve in each]
+    curves = [curve for branch in branches for curve in branch]
     highest = (c.levels[-1] if c.end_level is None else c.end_level for c in curves)
     low = math.log(min(float(curve.levels[0]) for curve in curves))
     grid = Grid.over(step, low, math.log(max(highest)), smoothing.reach)
-    masses = np.stack([under(each, grid) for each in branches])
-    masses = np.stack([smoothing.of(each) for each in masses])
+    masses = np.stack([under(branch, grid) for branch in branches])
+    masses = np.stack([smoothing.of(mass) for mass in masses])
     return SiteMass(
         grid,
         np.tensordot(weight, masses, axes=1),
@@ -203,16 +203,16 @@ def curve_mass(
 
 
 def _alike(curves: Sequence[HazardCurve]) -> Iterator[tuple[Indices, HazardCurve]]:
-    """Yield the sites whose curves have the same levels, and one of their curves."""
+    """Yield groups of sites whose curves have the same levels, each with one of the curves."""
     groups: dict[bytes, list[int]] = {}
     for i, curve in enumerate(curves):
         groups.setdefault(curve.levels.tobytes(), []).append(i)
-    for places in groups.values():
-        yield np.array(places, dtype=np.intp), curves[places[0]]
+    for indices in groups.values():
+        yield np.array(indices, dtype=np.intp), curves[indices[0]]
 
 
 def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> FloatArray:
-    """Return the mass under the curves, without scatter, sites x nodes.
+    """Return the rate density under the curves, without dispersion, sites x nodes.
 
     Two points of Gauss to each step of the grid: a rule that is alike in each step leaves a mass as
     smooth as the curve. Cardinal functions of cubic interpolation are negative beyond the nodes
@@ -224,31 +224,31 @@ def under(curves: Sequence[HazardCurve], grid: Grid, *, beyond: bool = True) -> 
         beyond: count shaking beyond the last level as that level.
     """
     mass = np.zeros((len(curves), grid.size))
-    for places, curve in _alike(curves):
+    for indices, curve in _alike(curves):
         u = np.log(curve.levels)
         inner = grid.u[(grid.u > u[0]) & (grid.u < u[-1])]
         edges = np.concatenate([u[:1], inner, u[-1:]])
         half = 0.5 * np.diff(edges)
         points = ((edges[:-1] + half)[:, None] + half[:, None] * _GAUSS).ravel()
-        rates = np.stack([curves[i].annual_rate for i in places.tolist()], axis=1)
+        rates = np.stack([curves[i].annual_rate for i in indices.tolist()], axis=1)
         cubic = grid.spread(points)
         change, touched = grid.spread(points, linear=True) - cubic, abs(cubic).T
         last = grid.spread(u[-1:], linear=True).toarray()
-        for start in range(0, places.size, _SITES_AT_ONCE):
-            some = slice(start, start + _SITES_AT_ONCE)
-            log_rate = PchipInterpolator(u, np.log(rates[:, some]))
+        for start in range(0, indices.size, _SITES_AT_ONCE):
+            batch = slice(start, start + _SITES_AT_ONCE)
+            log_rate = PchipInterpolator(u, np.log(rates[:, batch]))
             density = np.maximum(-log_rate(points, 1), 0.0) * np.exp(log_rate(points))
             density *= np.repeat(half, 2)[:, None]
-            own, near = cubic @ density, np.zeros(density.shape, dtype=np.bool_)
-            while (new := (touched @ (own < 0.0) > 0.0) & ~near).any():
+            node_mass, near = cubic @ density, np.zeros(density.shape, dtype=np.bool_)
+            while (new := (touched @ (node_mass < 0.0) > 0.0) & ~near).any():
                 near |= new
                 points_near = np.flatnonzero(new.any(axis=1))
-                own += change[:, points_near] @ (density * new)[points_near]
-            own = np.maximum(own, 0.0) + float(beyond) * last * rates[-1:, some]
-            total = rates[:1, some] - float(not beyond) * rates[-1:, some]
+                node_mass += change[:, points_near] @ (density * new)[points_near]
+            node_mass = np.maximum(node_mass, 0.0) + float(beyond) * last * rates[-1:, batch]
+            total = rates[:1, batch] - float(not beyond) * rates[-1:, batch]
             # neither the rule of Gauss nor rounding may make the whole exceed the first level
-            sums = np.maximum(own.sum(axis=0), TINY)
-            mass[places[some]] = (own * (total * (1.0 - ROUNDING) / sums)).T
+            sums = np.maximum(node_mass.sum(axis=0), TINY)
+            mass[indices[batch]] = (node_mass * (total * (1.0 - ROUNDING) / sums)).T
     return mass
 
 
@@ -268,22 +268,22 @@ def _ends(
     )
 
     def unit(levels: Sequence[float | None]) -> FloatArray:
-        known = np.array([1.0 if level is None else level for level in levels])
-        rows = grid.spread(np.log(known), linear=True).toarray().T
+        values = np.array([1.0 if level is None else level for level in levels])
+        rows = grid.spread(np.log(values), linear=True).toarray().T
         rows[[level is None for level in levels]] = 0.0
         return smoothing.of(rows)
 
     first, last, end = zip(*keys, strict=True)
     return CurveEnds(
         group, unit(first), unit(last), unit(end), np.array([level is None for level in end]),
-        weight @ [[float(curve.annual_rate[-1]) for curve in each] for each in branches],
+        weight @ [[float(curve.annual_rate[-1]) for curve in branch] for branch in branches],
     )  # fmt: skip
 
 
 def event_mass(
     events: EventSet, name: str, sites: Indices, shaking: LevelShaking
 ) -> tuple[SiteMass, FloatArray, FloatArray]:
-    """Return the mass of an event set at some sites, and u of each of its rows.
+    """Return the rate density of an event set at sites, and u of each row.
 
     Args:
         name: the measure.
@@ -301,11 +301,11 @@ def event_mass(
     seen = np.isfinite(u) & (place[events.site] >= 0)
     ends = (u[seen].min(), u[seen].max()) if seen.any() else (0.0, 0.0)
     grid = Grid.over(step, float(ends[0]), float(ends[1]), smoothing.reach)
-    each = np.zeros((2, sites.size, grid.size))
-    add_mass(each, place, events.site, events.event, events.weight, u, *grid)
-    whole = smoothing.of(each[0])
-    empty = np.empty((0, *whole.shape))
-    return SiteMass(grid, whole, empty, np.ones(1), smoothing), each[1], u
+    masses = np.zeros((2, sites.size, grid.size))
+    add_mass(masses, place, events.site, events.event, events.weight, u, *grid)
+    site_mass = smoothing.of(masses[0])
+    empty = np.empty((0, *site_mass.shape))
+    return SiteMass(grid, site_mass, empty, np.ones(1), smoothing), masses[1], u
 
 
 @kernel
@@ -320,7 +320,7 @@ def add_mass(
     first: int,
     size: int,
 ) -> None:
-    """Add weights of events, and their squares, to the nodes about the shaking of each row.
+    """Add the weights of events, and their squares, to the nodes near the shaking of each row.
 
     Args:
         mass: what is added to, 2 x sites x nodes.
@@ -332,14 +332,14 @@ def add_mass(
         step: of the grid, as are `first` and `size`.
     """
     for row in range(u.size):
-        own = place[site[row]]
-        if own < 0 or not np.isfinite(u[row]):
+        site_row = place[site[row]]
+        if site_row < 0 or not np.isfinite(u[row]):
             continue
         start, a, b, c, d = cubic_at(u[row], step, first, size)
         w = weight[event[row]]
         for node, part in ((0, a), (1, b), (2, c), (3, d)):
-            mass[0, own, start + node] += part * w
-            mass[1, own, start + node] += part * w * w
+            mass[0, site_row, start + node] += part * w
+            mass[1, site_row, start + node] += part * w * w
 
 
 @inner_kernel
@@ -355,7 +355,7 @@ def cubic_at(
 
 
 def of_sites(mass: SiteMass, sites: slice) -> SiteMass:
-    """Return the mass of some of the sites."""
+    """Return the rate density of a range of sites."""
     ends = mass.ends
     if ends is not None:
         ends = replace(ends, group=ends.group[sites], rate=ends.rate[sites])

@@ -1,4 +1,4 @@
-"""Intensity measure types as OpenQuake names them."""
+"""Intensity measure types by their OpenQuake names."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class IntensityType:
-    """What the levels of a file measure.
+    """Intensity measure of the levels of a file.
 
     Args:
         measure: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
@@ -34,12 +34,12 @@ class IntensityType:
 
     @property
     def imt(self) -> str:
-        """The name as OpenQuake writes it."""
+        """Name in OpenQuake."""
         return f"SA({self.period_s})" if self.measure == "sa_g" else MEASURES[self.measure].imt
 
 
 def openquake_type(imt: str, where: str) -> IntensityType:
-    """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g]."""
+    """Return the type of an OpenQuake intensity measure: PGA [g], PGV [cm/s], SA(T) [g]."""
     name = imt.strip()
     for measure, about in MEASURES.items():
         if about.imt and about.imt == name.upper() and about.period_s is None:
@@ -59,7 +59,7 @@ def openquake_type(imt: str, where: str) -> IntensityType:
 
 
 def requested_measure(imt: str, *, alone: bool = False) -> tuple[str, IntensityType]:
-    """Return the measure that is asked for, as `predict` calls it, and its meaning.
+    """Return the requested measure, by its name in `predict`, and its type.
 
     Args:
         alone: accept only what a model reads alone.
@@ -67,15 +67,15 @@ def requested_measure(imt: str, *, alone: bool = False) -> tuple[str, IntensityT
     kind = openquake_type(imt, "imt")
     name = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
     if name is None or (alone and name not in ALONE):
-        periods = (each for each in SPECTRAL if not alone or SPECTRAL[each] in ALONE)
-        known = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in periods)])
-        text = f"imt = {imt}: no model reads it{' alone' if alone else ''}: use one of {known}"
+        periods = (period for period in SPECTRAL if not alone or SPECTRAL[period] in ALONE)
+        options = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in periods)])
+        text = f"imt = {imt}: no model reads it{' alone' if alone else ''}: use one of {options}"
         raise InputError(text, fields=("imt",))
     return name, kind
 
 
 def is_read(imt: str) -> bool:
-    """Return whether models read a measure, as OpenQuake names it."""
+    """Return whether a model uses a measure, given by its OpenQuake name."""
     try:
         requested_measure(imt)
     except InputError:

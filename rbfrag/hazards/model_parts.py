@@ -1,4 +1,4 @@
-"""Blocks by the model that answers for them under hazard curves."""
+"""Blocks grouped by the model that predicts their failure under hazard curves."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from rbfrag.solver.results import FloatArray
 
 
 class RateKeywords(BlockKeywords[V], CurveKeywords, AnsweringFields, total=False):
-    """What blocks are asked about under hazard curves, and by which model."""
+    """Keywords of blocks, hazard curves and models for annual rates."""
 
 
 class ModelPart(NamedTuple):
-    """Blocks that one model answers for.
+    """Blocks of one model.
 
     Args:
-        places: where they stand among all, shape (m,).
+        indices: where they stand among all, shape (m,).
         numbers: what the model reads of them, by field, shape (m,) each.
     """
 
-    places: NDArray[np.intp]
+    indices: NDArray[np.intp]
     numbers: Mapping[str, FloatArray]
     model: FragilityModel
 
 
 def parts_by_model(
-    given: Mapping[str, Any], shaking: LevelShaking, answering: AnsweringFields
+    inputs: Mapping[str, Any], shaking: LevelShaking, answering: AnsweringFields
 ) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
-    """Return blocks by the model that answers for them.
+    """Return the blocks grouped by model.
 
     Returns:
         The parts, what is to be said of the blocks, and of each why it cannot be used, empty for
@@ -48,28 +48,30 @@ def parts_by_model(
         InputError: blocks that are described twice or in part, or are of one kind without a model.
         UnknownModelError: no model of that name, or of the one kind that there is.
     """
-    blocks, whole = blocks_of_arrays(given)
-    reason = block_reasons_of(blocks, whole)
+    blocks, size = blocks_of_arrays(inputs)
+    reason = block_reasons_of(blocks, size)
     parts = []
     for group in blocks.groups:
-        places = np.arange(whole) if group.places is None else group.places
+        indices = np.arange(size) if group.indices is None else group.indices
         try:
             chosen = model_for(answering, (*group.numbers, shaking.name), group.kind)
         except (InputError, UnknownModelError) as error:
             if len(blocks.groups) == 1:
                 raise
-            reason[places] = np.where(reason[places] == "", str(error), reason[places])
+            reason[indices] = np.where(reason[indices] == "", str(error), reason[indices])
             continue
-        own = np.flatnonzero(reason[places] == "")
-        if own.size:
-            values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
+        accepted = np.flatnonzero(reason[indices] == "")
+        if accepted.size:
+            values = {
+                n: np.broadcast_to(v, indices.shape)[accepted] for n, v in group.numbers.items()
+            }
             _refuse_unknown_magnitudes(values[chosen.method.block.strength], shaking)
-            parts.append(ModelPart(places[own], values, chosen))
+            parts.append(ModelPart(indices[accepted], values, chosen))
     return parts, blocks.remarks, reason
 
 
 def _refuse_unknown_magnitudes(strength: FloatArray, shaking: LevelShaking) -> None:
-    """Refuse blocks that may fail at a PGA whose magnitudes are not known."""
+    """Reject blocks that may fail at a PGA below the range of the disaggregation."""
     start, weakest = shaking.magnitudes_from_g, float(strength.min())
     if start is not None and start > weakest:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Blocks at the sites of an event set: what fails them, what it costs, what they share."""
+"""Blocks at the sites of an event set: parameters, losses and dependence."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Portfolio:
-    """Blocks in n rows, sorted by their site: of each the like blocks that a row of a table is of.
+    """Blocks in n rows, sorted by site; each row holds the identical blocks of one table row.
 
     Args:
         block_ids: names of the rows of the table that the blocks are of.
@@ -95,22 +95,22 @@ class Portfolio:
         # the order of the table.
         sites = _site_indices(columns, site_ids)
         kinds = columns["kind"].tolist()
-        chosen = {one: models[one] for one in dict.fromkeys(kinds)}
-        places = {one: i for i, one in enumerate(chosen)}
+        chosen = {kind: models[kind] for kind in dict.fromkeys(kinds)}
+        model_index = {kind: i for i, kind in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
         row = np.argsort(sites, kind="stable")
         loss = numbers("loss", 0.0) * weight if "loss" in columns else None
-        blocks = [chosen[one].method.block for one in kinds]
-        stated = numbers_in(columns)
+        blocks = [chosen[kind].method.block for kind in kinds]
+        inputs = numbers_in(columns)
         reads = {name for block in set(blocks) for name in (*block.names, *block.options)}
 
         def sigma(of: Sequence[str | None]) -> FloatArray:
-            """Return the standard deviation of each row's own size or strength."""
+            """Return the standard deviation of each row's size or strength."""
             names = np.array([f"{name}_sigma" for name in of])
             result = np.zeros(n)
-            for name in {*names.tolist()} & {*stated}:
-                own = names == name
-                result[own] = np.nan_to_num(stated[name][own])
+            for name in {*names.tolist()} & {*inputs}:
+                rows = names == name
+                result[rows] = np.nan_to_num(inputs[name][rows])
             return result[row]
 
         return cls(
@@ -120,17 +120,17 @@ class Portfolio:
             count=count.astype(np.int64)[row],
             site=sites[row],
             numbers={
-                name: np.asarray(stated[name], dtype=np.float64)[row]
-                for name in sorted(reads & {*stated})
+                name: np.asarray(inputs[name], dtype=np.float64)[row]
+                for name in sorted(reads & {*inputs})
             },
             size_sigma=sigma([block.size for block in blocks]),
             strength_sigma=sigma([block.strength for block in blocks]),
             weight=weight[row],
             loss=None if loss is None else loss[row],
             loss_sigma=numbers("loss_sigma", 0.0)[row],
-            model=np.array([places[one] for one in kinds], dtype=np.int64)[row],
-            models=tuple(one.row for one in chosen.values()),
-            measures=tuple(dict.fromkeys(n for one in chosen.values() for n in one.term.inputs)),
+            model=np.array([model_index[kind] for kind in kinds], dtype=np.int64)[row],
+            models=tuple(model.row for model in chosen.values()),
+            measures=tuple(dict.fromkeys(n for m in chosen.values() for n in m.term.inputs)),
             component=component,
         )
 
@@ -145,19 +145,19 @@ class Portfolio:
 
     @property
     def mean_loss(self) -> FloatArray | None:
-        """What a failure costs on average, shape (n,): median · exp(sigma²/2)."""
+        """Mean loss of a failure, shape (n,): median · exp(sigma²/2)."""
         return None if self.loss is None else self.loss * np.exp(0.5 * self.loss_sigma**2)
 
     @cached_property
     def dependence(self) -> Dependence | None:
-        """What the failures of one earthquake share; None where that is not known."""
-        one = self.answering[0]
-        known = len(self.models) == 1 and one.method.block.size is not None
-        return one.dependence if known else None
+        """Dependence model of failures in one earthquake; None where it is unknown."""
+        model = self.answering[0]
+        has_dependence = len(self.models) == 1 and model.method.block.size is not None
+        return model.dependence if has_dependence else None
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What the models take for granted, each text once."""
+        """Assumptions of the models, each text once."""
         texts: list[str] = []
         for model in self.answering:
             block = model.method.block
@@ -168,19 +168,19 @@ class Portfolio:
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether a block's own parameters scatter."""
+        """True if parameters of the blocks are uncertain."""
         return bool(self.size_sigma.any() or self.strength_sigma.any())
 
-    def placement(self, some: NDArray[np.intp]) -> Placement:
-        """Return some of the blocks as those of one earthquake, of unknown azimuths."""
-        numbers = {name: values[some] for name, values in self.numbers.items()}
-        block, site = self.answering[0].method.block, self.site[some]
+    def placement(self, indices: NDArray[np.intp]) -> Placement:
+        """Return the placement of selected blocks in one earthquake, with unknown azimuths."""
+        numbers = {name: values[indices] for name, values in self.numbers.items()}
+        block, site = self.answering[0].method.block, self.site[indices]
         placement = Placement.of_numbers(block, numbers, site=site, polarity=UNKNOWN)
         assert placement is not None
         return placement
 
     def scatter_points(self) -> tuple[FloatArray, FloatArray]:
-        """Return standard normal points of component, ln p² and ln k_r, shape (k, 3), and weights.
+        """Return quadrature points of component, ln p² and ln k_r, shape (k, 3), and their weights.
 
         What does not scatter has the one point 0.
         """
@@ -191,29 +191,29 @@ class Portfolio:
 
     @cached_property
     def answering(self) -> tuple[FragilityModel, ...]:
-        """The models, ready to answer."""
+        """The models with their formulas."""
         return tuple(FragilityModel.from_row(row) for row in self.models)
 
-    def numbers_of(self, model: FragilityModel, some: NDArray[np.intp]) -> dict[str, FloatArray]:
-        """Return what a model reads of some blocks, with its standard deviations, shape (m,)."""
+    def numbers_of(self, model: FragilityModel, indices: NDArray[np.intp]) -> dict[str, FloatArray]:
+        """Return the model inputs of selected blocks, with standard deviations, shape (m,)."""
         block = model.method.block
         read = {*self.numbers} & {*block.names, *block.options}
-        numbers = {name: self.numbers[name][some] for name in read}
+        numbers = {name: self.numbers[name][indices] for name in read}
         for name, sigma in ((block.size, self.size_sigma), (block.strength, self.strength_sigma)):
             if name is not None and sigma.any():
-                numbers[f"{name}_sigma"] = sigma[some]
+                numbers[f"{name}_sigma"] = sigma[indices]
         return numbers
 
     def probability(
         self,
-        some: NDArray[np.intp],
+        indices: NDArray[np.intp],
         shaking: Mapping[str, FloatArray],
         points: tuple[FloatArray | float, FloatArray | float, FloatArray | float],
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Return P of some blocks, and whether they are in the ranges fitted, shapes (..., m).
+        """Return P of selected blocks, and whether they are in the fitted range, (..., m).
 
         Args:
-            some: indices of m blocks.
+            indices: indices of m blocks.
             shaking: values of the measures, by name, of a shape that broadcasts with (..., m).
             points: standard normal values of the component's scatter, of ln p² and of ln k_r, of
                 shapes that broadcast likewise.
@@ -221,27 +221,27 @@ class Portfolio:
         xi, z_p, z_k = points
         shift = np.exp(self.component.sigma * np.asarray(xi))
         values = {n: shaking[n] * shift / self.component.ratio(n) for n in self.measures}
-        factors = np.exp(self.size_sigma[some] * z_p), np.exp(self.strength_sigma[some] * z_k)
-        shape = np.broadcast_shapes(*(each.shape for each in (*values.values(), *factors)))
+        factors = np.exp(self.size_sigma[indices] * z_p), np.exp(self.strength_sigma[indices] * z_k)
+        shape = np.broadcast_shapes(*(array.shape for array in (*values.values(), *factors)))
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
         for number, model in enumerate(self.answering):
-            own, block = self.model[some] == number, model.method.block
-            if not own.any():
+            selected, block = self.model[indices] == number, model.method.block
+            if not selected.any():
                 continue
 
-            def of_these(value: Any, own: Any = own) -> Any:
-                return np.broadcast_to(value, shape)[..., own]
+            def of_these(value: Any, selected: Any = selected) -> Any:
+                return np.broadcast_to(value, shape)[..., selected]
 
             part = {name: of_these(values[name]) for name in model.term.inputs}
             for name in {*self.numbers} & {*block.names, *block.options}:
-                part[name] = self.numbers[name][some][own]
+                part[name] = self.numbers[name][indices][selected]
             for scattered, factor in zip((block.size, block.strength), factors, strict=True):
                 if scattered is not None:
                     part[scattered] = part[scattered] * of_these(factor)
             answer = array_answer(model, block.filled(part), interval=False)
-            p[..., own], in_domain[..., own] = answer.probability, answer.in_domain
+            p[..., selected], in_domain[..., selected] = answer.probability, answer.in_domain
         if np.isnan(p).any():
-            wrong = int(some[np.argwhere(np.isnan(p))[0][-1]])
+            wrong = int(indices[np.argwhere(np.isnan(p))[0][-1]])
             raise InputError(
                 f"block {self.block_ids[self.row[wrong]]}: model "
                 f"{self.models[self.model[wrong]].name!r} has no probability for "

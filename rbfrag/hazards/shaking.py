@@ -1,4 +1,4 @@
-"""What the levels of a hazard curve are to a model: its measure, a factor, and a scatter."""
+"""Interpretation of the levels of a hazard curve by a model: measure, factor and dispersion."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NOTABLE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class LevelShaking:
-    """How a model reads a level of a curve: as the measure at level · shift, with weights.
+    """Levels of a curve as a measure of a model: level · shift, with weights.
 
     Args:
         name: what `predict` calls the measure.
@@ -48,8 +48,8 @@ class LevelShaking:
     magnitudes_from_g: float | None = None
 
     @classmethod
-    def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> LevelShaking:
-        """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
+    def of(cls, curve: HazardCurve, **meaning: Unpack[CurveKeywords]) -> LevelShaking:
+        """Return the interpretation of a curve's levels; arguments as for :func:`rbfrag.hazard`."""
         if curve.magnitudes_from_g is not None:
             single = cls.about(
                 "pgv_m_s", component_named(SINGLE_COMPONENT), warnings=curve.warnings
@@ -57,9 +57,9 @@ class LevelShaking:
             return replace(single, magnitudes_from_g=curve.magnitudes_from_g)
         warnings = list(curve.warnings)
         name, factor, spread = _measure(
-            curve, stated.get("convert"), stated.get("convert_sigma"), warnings
+            curve, meaning.get("convert"), meaning.get("convert_sigma"), warnings
         )
-        component = component_of(curve, stated.get("component"))
+        component = component_of(curve, meaning.get("component"))
         if component is None:
             warnings.append(SINGLE_CURVE)
             component = component_named(SINGLE_COMPONENT)
@@ -78,7 +78,7 @@ class LevelShaking:
         warnings: tuple[str, ...] = (),
         ratio: float | None = None,
     ) -> LevelShaking:
-        """Return what a measure of a component is to a model.
+        """Return the interpretation of a measure of a given component.
 
         Args:
             factor: what it is multiplied by.
@@ -102,7 +102,7 @@ SINGLE_CURVE = Diagnostic(
 
 
 def component_of(curve: HazardCurve, name: str | None) -> Component | None:
-    """Return the horizontal component of a curve; None where neither user nor file names it."""
+    """Return the horizontal component of a curve; None where neither user nor file gives it."""
     name = curve.component or None if name is None else name
     return None if name is None else component_named(name)
 
@@ -110,7 +110,7 @@ def component_of(curve: HazardCurve, name: str | None) -> Component | None:
 def _measure(
     curve: HazardCurve, convert: str | None, sigma: float | None, warnings: list[str]
 ) -> tuple[str, float, float]:
-    """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
+    """Return the name in `predict`, the factor from the unit of the curve, and the dispersion."""
     # A curve of SA can serve models of PGV by a published conversion PGV = factor · SA(T), whose
     # scatter is integrated like that of the component.
     if convert is None:
@@ -156,8 +156,8 @@ def _measure(
 def _no_model(curve: HazardCurve) -> str:
     also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
     converted = f", or turn it into PGV with convert {' or '.join(also)}" if also else ""
-    wanted = f"give a curve of one of {ANSWERED}{converted}"
-    return f"{curve.source}: no model reads {curve.imt} alone: {wanted}"
+    advice = f"give a curve of one of {ANSWERED}{converted}"
+    return f"{curve.source}: no model reads {curve.imt} alone: {advice}"
 
 
 def ends_in_words(
@@ -168,7 +168,7 @@ def ends_in_words(
     above_at_most: FloatArray,
     below: FloatArray,
 ) -> Iterator[str]:
-    """Yield where shaking beyond the ends of curves may matter; of several the worst is named.
+    """Yield warnings where shaking beyond the ends of curves may matter; the worst case is named.
 
     Args:
         curves: the curve of each site.

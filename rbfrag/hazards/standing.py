@@ -1,4 +1,4 @@
-"""How likely blocks are to stand after an age: failures as a Poisson process, age and rate unsure.
+"""Survival probability of standing blocks: Poisson failures with uncertain age and rate.
 
     S(f) = E[exp(-f λ T)]
 
@@ -30,7 +30,7 @@ _DOUBLINGS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Age:
-    """How long blocks have stood: a lognormal law of given mean and standard deviation.
+    """Age of standing blocks: a lognormal distribution with given mean and standard deviation.
 
     Lognormal rather than normal and cut at zero: an exposure age is a concentration over a
     production rate, whose errors multiply; and a normal law gives weight to rocks that have stood
@@ -46,7 +46,7 @@ class Age:
 
     @classmethod
     def of(cls, mean: float, sd: float = 0.0) -> Age:
-        """Return the law of an age.
+        """Return the lognormal distribution of an age.
 
         Args:
             mean: mean age [a], above 0.
@@ -80,7 +80,7 @@ class Standing:
 
     @classmethod
     def of(cls, annual_rate: ArrayLike, weight: ArrayLike, age: Age) -> Standing:
-        """Return the survival of rates that are each possible.
+        """Return the survival for a discrete distribution of rates.
 
         Args:
             annual_rate: rates at which any block fails [1/a], shape (k,).
@@ -93,7 +93,7 @@ class Standing:
 
     @classmethod
     def mixed(cls, parts: list[Standing], weight: ArrayLike) -> Standing:
-        """Return the survival where one of several hazards is right, with these probabilities."""
+        """Return the survival as a mixture over several hazards with given probabilities."""
         with np.errstate(divide="ignore"):
             logs = np.log(np.asarray(weight, dtype=np.float64))
         return cls(
@@ -102,7 +102,7 @@ class Standing:
         )
 
     def log_probability(self, factor: float = 1.0) -> float:
-        """Return ln of the probability that all stand if every hazard rate is so many times."""
+        """Return ln of the survival probability for all hazard rates times a factor."""
         return float(logsumexp(self.log_weight - factor * self.failures))
 
     @property
@@ -111,7 +111,7 @@ class Standing:
         return min(math.exp(self.log_probability()), 1.0)
 
     def factor(self, probability: float) -> float | None:
-        """Return the factor on the hazard rates at which all stand with a probability.
+        """Return the factor on the hazard rates that gives a survival probability.
 
         None where no factor makes survival so improbable: nothing fails, or may fail, ever.
         """
@@ -134,7 +134,7 @@ class Standing:
 
 
 def weights_given_standing(parts: list[Standing], weight: ArrayLike) -> FloatArray:
-    """Return weights of hazards after all blocks have stood (Bayes): w S/Σ w S.
+    """Return the posterior weights of hazards given that all blocks stand (Bayes): w S/Σ w S.
 
     Args:
         weight: their weights before, which sum to 1, shape (n,).

@@ -1,4 +1,4 @@
-"""Blocks of one site, and how often any of them fails, by each law of joint failure.
+"""Blocks of one site, and the annual rate of any failure by dependence model.
 
 Blocks may be uncertain: draws of their parameters, with weights, each make a set of blocks.
 """
@@ -56,7 +56,7 @@ Normals = Callable[[int, np.random.Generator], FloatArray]
 
 
 def normals_by_law(law: Dependence | None, where: Placement | None, n: int) -> dict[str, Normals]:
-    """Return how the normals of n blocks of one earthquake are drawn, by the name of the law.
+    """Return samplers of the standard normals of n blocks in one earthquake, by dependence model.
 
     Args:
         law: the copula; None where it is not known, which leaves the bounds.
@@ -75,7 +75,7 @@ def normals_by_law(law: Dependence | None, where: Placement | None, n: int) -> d
 
 @dataclass(frozen=True, eq=False)
 class AnyRate:
-    """How often any of some blocks fails under one hazard curve.
+    """Annual rate of any failure among blocks under one hazard curve.
 
     Args:
         annual_rate: rates [1/a], laws x draws x bands; the bands are the rate and the two ends of
@@ -95,7 +95,7 @@ class AnyRate:
 
 @dataclass(frozen=True, eq=False)
 class FragilityBlocks:
-    """Blocks of which the caller gives P at each level, a row for each block."""
+    """Blocks with a user-supplied fragility function, one row of P per block."""
 
     fragility: Fragility
     count: int
@@ -104,11 +104,11 @@ class FragilityBlocks:
 
     @property
     def laws(self) -> tuple[str, ...]:
-        """Names of the laws by which they fail together; the first answers."""
+        """Names of the dependence models; the first one gives the answer."""
         return _laws(self.count)
 
     def rate(self, curve: HazardCurve) -> AnyRate:
-        """Return how often any of them fails under a curve."""
+        """Return the annual rate of any failure under a curve."""
         result = failure_rate(curve, lambda x: _by_law(np.atleast_2d(self.fragility(x))))
         ends = result.annual_rate, result.above, result.above_at_most, result.below
         texts = ends_in_words([curve], _FIRST_SITE, *(values[:1] for values in ends))
@@ -119,7 +119,7 @@ class FragilityBlocks:
 
 @dataclass(frozen=True, eq=False)
 class ModelBlocks:
-    """Blocks of one kind, as certain or uncertain as they are, and the model that answers for them.
+    """Blocks of one kind, with or without parameter uncertainty, and their fragility model.
 
     Args:
         numbers: what the model reads of them, by field, draws x blocks each.
@@ -140,25 +140,25 @@ class ModelBlocks:
     @classmethod
     def of(
         cls,
-        given: Mapping[str, Any],
+        inputs: Mapping[str, Any],
         shaking: LevelShaking,
         *,
         draws: int,
         seed: int,
         answering: AnsweringFields,
     ) -> ModelBlocks:
-        """Return the blocks of medians and standard deviations."""
-        stated = dict(given)
-        for sigma in [name for name in stated if name.endswith("_sigma")]:
+        """Return blocks with given medians and standard deviations."""
+        fields = dict(inputs)
+        for sigma in [name for name in fields if name.endswith("_sigma")]:
             of = sigma.removesuffix("_sigma")
             # what a block has of itself is not known before its model is
-            if of not in (*NUMBERS, *stated) and np.any(stated.pop(sigma)):
+            if of not in (*NUMBERS, *fields) and np.any(fields.pop(sigma)):
                 raise InputError(f"{sigma} requires {of}: give its mean")
-        if all(name == "kind" or name.endswith("_sigma") for name in stated):
+        if all(name == "kind" or name.endswith("_sigma") for name in fields):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
         # All blocks that survive together must be of one model: their parameters are shared by all
         # earthquakes of their age.
-        parts, remarks, reason = parts_by_model(stated, shaking, answering)
+        parts, remarks, reason = parts_by_model(fields, shaking, answering)
         refuse_elements(reason, ALL_STAND, BLOCK)
         if len(parts) > 1:
             kinds = " and ".join(part.model.row.kind for part in parts)
@@ -167,26 +167,26 @@ class ModelBlocks:
             )
         (part,) = parts
         size, block = reason.size, part.model.method.block
-        order = np.argsort(part.places)
-        values = {name: each[order] for name, each in part.numbers.items()}
-        for name in stated:
-            if name.endswith("_sigma") and name not in block.sigmas and np.any(stated[name]):
+        order = np.argsort(part.indices)
+        values = {name: array[order] for name, array in part.numbers.items()}
+        for name in fields:
+            if name.endswith("_sigma") and name not in block.sigmas and np.any(fields[name]):
                 kind = part.model.row.kind
                 raise InputError(f"{name} cannot be combined with kind {kind}: omit it")
         numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
-        medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
+        medians = {name: np.asarray(array) for name, array in block.filled(numbers).items()}
         scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}
         # A block's own parameters are the same in all earthquakes, so survival is averaged over
         # them after the Poisson term: E[exp(-λ T)], not exp(-E[λ] T).
         z, weight = _standard_draws(
             [values.get(sigma, np.zeros(size)) for sigma in scatters.values()], draws, seed
         )
-        drawn = {name: each[None] for name, each in medians.items()}
+        drawn = {name: array[None] for name, array in medians.items()}
         for (name, sigma), points in zip(scatters.items(), z, strict=True):
             law = fraction if name in block.fractions else lognormal
             drawn[name] = law(points, medians[name], values.get(sigma, np.zeros(size)))
-        whole = (weight.size, size)
-        drawn = {name: np.broadcast_to(each, whole) for name, each in drawn.items()}
+        shape = (weight.size, size)
+        drawn = {name: np.broadcast_to(array, shape) for name, array in drawn.items()}
         level = answering.get("level", LEVEL)
         return cls(drawn, weight, medians, shaking, part.model, level, remarks)
 
@@ -197,41 +197,41 @@ class ModelBlocks:
 
     @property
     def laws(self) -> tuple[str, ...]:
-        """Names of the laws by which they fail together; the first answers."""
-        known = self.count > 1 and None not in (self.model.dependence, self.placement())
-        return (COPULA, *_laws(self.count)) if known else _laws(self.count)
+        """Names of the dependence models; the first one gives the answer."""
+        has_dependence = self.count > 1 and None not in (self.model.dependence, self.placement())
+        return (COPULA, *_laws(self.count)) if has_dependence else _laws(self.count)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the model and the curve's meaning take for granted."""
+        """Assumptions of the model and of the interpretation of the curve."""
         block = self.model.method.block
         assumed = block.support if self.model.kind == block.kind else ""
         notes = (Diagnostic(assumed, "support_assumed"),) if assumed else ()
         return (*self.remarks, *self.shaking.warnings, *notes, *self.model.notes)
 
     def placement(self) -> Placement | None:
-        """Return the blocks as those of one site with unknown azimuths; None without a size."""
+        """Return the placement of the blocks, with unknown azimuths; None without a size."""
         return Placement.of_numbers(self.model.method.block, self.medians, polarity=UNKNOWN)
 
     def rate(self, curve: HazardCurve) -> AnyRate:
-        """Return how often any of them fails under a curve."""
+        """Return the annual rate of any failure under a curve."""
         mass = curve_mass([[curve]], np.ones(1), self.shaking)
         k, m = self.weight.size, self.count
-        numbers = {name: each.reshape(1, -1) for name, each in self.numbers.items()}
+        numbers = {name: values.reshape(1, -1) for name, values in self.numbers.items()}
         site = np.zeros(k * m, dtype=np.intp)
         blocks = KernelBlocks(self.model, self.shaking.median, numbers, np.ones(1), site)
-        each = rates(blocks, mass, self.level)
-        rate, outside = (self._mean(values) for values in (each.rate, each.outside))
-        first, last, end = (self._mean(values) for values in each.ends)
+        draw_rates = rates(blocks, mass, self.level)
+        rate, outside = (self._mean(values) for values in (draw_rates.rate, draw_rates.outside))
+        first, last, end = (self._mean(values) for values in draw_rates.ends)
         beyond = float(curve.annual_rate[-1])
         most = beyond * (np.ones(m) if curve.end_level is None else end)
         sites = np.zeros(m, dtype=np.intp)
         warnings = ends_in_words([curve], sites, rate, beyond * last, most, first)
         if m == 1:
-            ends = (interval_end(each.rate, each.half, side) for side in (-1.0, 1.0))
-            by_law = np.stack([each.rate, *ends], axis=1)[None]
+            ends = (interval_end(draw_rates.rate, draw_rates.half, side) for side in (-1.0, 1.0))
+            by_law = np.stack([draw_rates.rate, *ends], axis=1)[None]
         else:
-            by_law = self._together(blocks, mass, each)
+            by_law = self._together(blocks, mass, draw_rates)
         share = outside.sum() / max(float(rate.sum()), np.finfo(np.float64).tiny)
         mean = float(self.weight @ by_law[0, :, 0])
         above = min(float((most - beyond * last).sum()), beyond)
@@ -241,19 +241,19 @@ class ModelBlocks:
         """Return the mean over the draws, shape (m,)."""
         return np.asarray(self.weight @ values.reshape(self.weight.size, -1))
 
-    def _together(self, blocks: KernelBlocks, mass: SiteMass, each: Rates) -> FloatArray:
-        """Return how often any of several blocks fails, laws x draws x bands."""
-        k, m, own = self.weight.size, self.count, mass.mass[0]
-        gradient = each.gradient @ np.repeat(self.weight, m)
+    def _together(self, blocks: KernelBlocks, mass: SiteMass, draw_rates: Rates) -> FloatArray:
+        """Return the annual rate of any failure among several blocks, laws x draws x bands."""
+        k, m, site_mass = self.weight.size, self.count, mass.mass[0]
+        gradient = draw_rates.gradient @ np.repeat(self.weight, m)
         step = error_step(self.model, gradient, self.level)
         moved = [probabilities(blocks, mass.grid, part) for part in (0.0, -step, step)]
         p = np.stack([part.reshape(k, m, -1) for part in moved], axis=1)
-        laws = [_by_law(one) @ own for one in p.reshape(k * 3, m, -1)]
+        laws = [_by_law(table) @ site_mass for table in p.reshape(k * 3, m, -1)]
         by_law = np.stack(laws, axis=1).reshape(-1, k, 3)
         law, where = self.model.dependence, self.placement()
         if law is None or where is None:
             return by_law
-        joint = joint_rates(p.reshape(k * 3, m, -1), own, where, law).rate
+        joint = joint_rates(p.reshape(k * 3, m, -1), site_mass, where, law).rate
         return np.concatenate([joint.reshape(1, k, 3), by_law])
 
 
@@ -270,7 +270,7 @@ def _laws(count: int) -> tuple[str, ...]:
 
 
 def _by_law(p: FloatArray) -> FloatArray:
-    """Return P that any fails by the laws that need no estimate, in rows; blocks are rows of p."""
+    """Return P of any failure by the bounding dependence models, in rows; rows of p are blocks."""
     return p if p.shape[0] == 1 else np.stack(any_fails(p))
 
 
@@ -287,8 +287,8 @@ def _standard_draws(
         return [np.zeros((1, m)) for _ in sigmas], np.ones(1)
     if m == 1:
         steps = [normal_steps(_SIGMA_POINTS if s.any() else 1, _SIGMA_REACH) for s in sigmas]
-        each, weight = normal_product(steps)
-        return [z[:, None] for z in each], weight
+        normals, weight = normal_product(steps)
+        return [z[:, None] for z in normals], weight
     if isinstance(draws, bool) or not 1 <= draws <= 2**16:
         raise InputError(f"draws = {draws}: give a number from 1 to 65536")
     from scipy.special import ndtri
@@ -300,5 +300,5 @@ def _standard_draws(
     )
     z = ndtri(points[:draws])
     place = {i: slice(k * m, (k + 1) * m) for k, i in enumerate(uncertain)}
-    each = [z[:, place[i]] if i in place else np.zeros((draws, m)) for i in range(len(sigmas))]
-    return each, np.full(draws, 1.0 / draws)
+    normals = [z[:, place[i]] if i in place else np.zeros((draws, m)) for i in range(len(sigmas))]
+    return normals, np.full(draws, 1.0 / draws)

@@ -1,4 +1,4 @@
-"""Standing blocks as evidence about hazard: `survival`."""
+"""Survival of standing blocks as a test of seismic hazard: `survival`."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _NOT_IN_JSON = ("standing", "annual_rate_beyond")
 
 @dataclass(frozen=True, eq=False)
 class BranchSurvival:
-    """What one hazard curve says of the blocks.
+    """Survival of the blocks under one hazard curve.
 
     Args:
         name: the branch or statistic that the curve is of, or where it comes from.
@@ -85,7 +85,7 @@ class BranchSurvival:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurvivalAnswer(Result):
-    """What blocks that stand say of seismic hazard.
+    """Test of seismic hazard by the survival of standing blocks.
 
     Args:
         probability_standing: probability that all blocks stand after the age, if the hazard is
@@ -147,7 +147,7 @@ class SurvivalAnswer(Result):
 
     @property
     def mode(self) -> str:
-        """Failure mode of the blocks; empty for a fragility of the caller's."""
+        """Failure mode of the blocks; empty for a user-supplied fragility function."""
         return mode_of_kind(self.kind or "")
 
     @property
@@ -272,7 +272,7 @@ def survival(
     seed: int = 0,
     **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> SurvivalAnswer:
-    """Return how likely blocks of one site are to stand after an age, if a hazard is right.
+    """Return the survival probability of blocks of one site after an age, given the seismic hazard.
 
     S(f) = E[exp(-f T ∫ P(any fails | x) (-dλ))] over the age T and the blocks' own parameters,
     which are the same in all earthquakes; earthquakes come as a Poisson process. The factors are
@@ -307,28 +307,30 @@ def survival(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    given, meaning, answering = parts_of(
+    inputs, meaning, answering = parts_of(
         numbers, question, BLOCKS, CurveKeywords.__optional_keys__, ANSWERING
     )
-    each, weight = branch_curves(curves, weights, meaning)
+    site_curves, weight = branch_curves(curves, weights, meaning)
     # ln S is computed, since S itself underflows for hazards that blocks clearly contradict.
     age = Age.of(age_years, age_sd_years)
-    known: ModelBlocks | None = None
+    model_blocks: ModelBlocks | None = None
     blocks: StandingBlocks
     if fragility is None:
-        require_kind(given)
-        shaking = LevelShaking.of(each[0], **meaning)
-        known = blocks = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
-    elif not given:
-        count = np.atleast_2d(fragility(each[0].levels)).shape[0]
+        require_kind(inputs)
+        shaking = LevelShaking.of(site_curves[0], **meaning)
+        model_blocks = blocks = ModelBlocks.of(
+            inputs, shaking, draws=draws, seed=seed, answering=answering
+        )
+    elif not inputs:
+        count = np.atleast_2d(fragility(site_curves[0].levels)).shape[0]
         blocks = FragilityBlocks(fragility, count)
     else:
         raise InputError("fragility describes the blocks: omit p2 and kr")
-    rates = [blocks.rate(curve) for curve in each]
+    rates = [blocks.rate(curve) for curve in site_curves]
     result = _Survival(rates, blocks.weight, age, weight)
     bands = rates[0].annual_rate.shape[2]
-    middle, least, most = (result.whole(band=band % bands) for band in (0, 2, 1))
-    places = {
+    middle, least, most = (result.mixture(band=band % bands) for band in (0, 2, 1))
+    law_index = {
         name: blocks.laws.index(name) for name in (INDEPENDENT, DEPENDENT) if blocks.count > 1
     }
     return SurvivalAnswer(
@@ -341,35 +343,37 @@ def survival(
         age_years=float(age_years),
         age_sd_years=float(age_sd_years),
         blocks=blocks.count,
-        hazard=curve_name(each[0]) if weight is None else "the weighted branches",
+        hazard=curve_name(site_curves[0]) if weight is None else "the weighted branches",
         joint_law=blocks.laws[0],
-        bounds={name.replace(" ", "_"): _numbers(result.whole(law)) for name, law in places.items()}
+        bounds={
+            name.replace(" ", "_"): _numbers(result.mixture(law)) for name, law in law_index.items()
+        }
         or None,
-        branches=result.branches(each),
-        kind=None if known is None else known.model.kind,
-        model=None if known is None else known.model.name,
-        term=None if known is None else known.model.term.name,
-        method=None if known is None else known.model.row.method,
-        imt=each[0].imt,
-        site=each[0].place,
+        branches=result.branches(site_curves),
+        kind=None if model_blocks is None else model_blocks.model.kind,
+        model=None if model_blocks is None else model_blocks.model.name,
+        term=None if model_blocks is None else model_blocks.model.term.name,
+        method=None if model_blocks is None else model_blocks.model.row.method,
+        imt=site_curves[0].imt,
+        site=site_curves[0].place,
         level=answering.get("level", LEVEL),
-        warnings=tuple(dict.fromkeys(_warnings(each, rates, blocks))),
+        warnings=tuple(dict.fromkeys(_warnings(site_curves, rates, blocks))),
         standing=middle,
         annual_rate_beyond=max(rate.beyond for rate in (rates[:1] if weight is None else rates)),
     )
 
 
-def require_kind(given: Mapping[str, Any]) -> None:
-    """Reject standing blocks of which it is not given whether they are free-standing.
+def require_kind(inputs: Mapping[str, Any]) -> None:
+    """Require that standing blocks are specified as free-standing or not.
 
     Most blocks that are studied are, and a backed block fails far more rarely.
 
     Args:
-        given: fields of the blocks, with ``kind``.
+        inputs: fields of the blocks, with ``kind``.
     """
-    kinds = given.get("kind")
-    stated = all(kinds) if isinstance(kinds, Sequence) else kinds is not None
-    if not stated and {"restitution", "ky", "ks", "kct"}.isdisjoint(given):
+    kinds = inputs.get("kind")
+    has_kind = all(kinds) if isinstance(kinds, Sequence) else kinds is not None
+    if not has_kind and {"restitution", "ky", "ks", "kct"}.isdisjoint(inputs):
         raise InputError(KIND_MISSING, fields=("kind",))
 
 
@@ -380,7 +384,7 @@ KIND_MISSING = (
 
 @dataclass(frozen=True, eq=False)
 class _Survival:
-    """Survival under some curves.
+    """Survival of the blocks under several hazard curves.
 
     Args:
         rates: how often any block fails under each.
@@ -395,13 +399,13 @@ class _Survival:
     weight: FloatArray | None
 
     def parts(self, law: int = 0, band: int = 0) -> list[Standing]:
-        """Return the survival under each curve, by a law of joint failure and an end of P."""
+        """Return the survival under each curve, by dependence model and end of the interval."""
         return [
             Standing.of(rate.annual_rate[law, :, band], self.draw_weight, self.age)
             for rate in self.rates
         ]
 
-    def whole(self, law: int = 0, band: int = 0) -> Standing:
+    def mixture(self, law: int = 0, band: int = 0) -> Standing:
         """Return the survival over all branches, or under the first curve without weights."""
         parts = self.parts(law, band)
         return (
@@ -410,19 +414,19 @@ class _Survival:
 
     @property
     def annual_rate(self) -> float:
-        """The rate that goes with it [1/a]."""
+        """Annual rate of any failure [1/a], weighted over the branches."""
         rates = [rate.mean for rate in self.rates]
         return rates[0] if self.weight is None else float(np.nan_to_num(self.weight) @ rates)
 
     def branches(self, curves: list[HazardCurve]) -> tuple[BranchSurvival, ...]:
-        """Return every curve's own answer."""
+        """Return the answer for each curve."""
         parts, n = self.parts(), len(curves)
         before: list[float | None] = [None] * n
         after: list[float | None] = [None] * n
         if self.weight is not None:
-            given = weights_given_standing(parts, np.nan_to_num(self.weight))
+            posterior = weights_given_standing(parts, np.nan_to_num(self.weight))
             for i in np.flatnonzero(~np.isnan(self.weight)).tolist():
-                before[i], after[i] = float(self.weight[i]), float(given[i])
+                before[i], after[i] = float(self.weight[i]), float(posterior[i])
         return tuple(
             BranchSurvival(
                 name=curve_name(curve),

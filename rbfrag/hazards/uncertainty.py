@@ -1,4 +1,4 @@
-"""Uncertainty of a rate of an event set by its sources, which are never added up."""
+"""Uncertainty of a rate of an event set by source; the three sources are not combined."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ that of the logic tree."""
 
 @dataclass(frozen=True)
 class MeanUncertainty:
-    """Uncertainty of a mean of an event set by its sources.
+    """Uncertainty of a mean of an event set, by source.
 
     Args:
         event_set_sampling: interval from the number of events: another event set as long gives
@@ -68,7 +68,7 @@ class MeanUncertainty:
         *,
         are_probabilities: bool = False,
     ) -> MeanUncertainty:
-        """Return the uncertainty of the weighted sum of some values.
+        """Return the uncertainty of a weighted sum of values over the events.
 
         Args:
             values: of each event, shape (n,).
@@ -151,7 +151,7 @@ def reached_interval(events: EventSet, rate: float, squares: float, level: float
 
 
 def branch_ends(events: EventSet, sums: FloatArray) -> Ends | None:
-    """Return the 5th and 95th percentile of the means of the realizations, by their weights.
+    """Return the 5 and 95 % quantiles of the means over the realizations, by their weights.
 
     None of a scenario and of one realization, and where event-set sampling makes more than half of
     the variance between them: they cannot be distinguished then.
@@ -171,7 +171,7 @@ def branch_ends(events: EventSet, sums: FloatArray) -> Ends | None:
 
 
 def _branch_rates(events: EventSet, sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the means of the realizations, their sampling variances, and the weights."""
+    """Return the mean of each realization, its sampling variance, and the weights."""
     weight = np.array(list(events.realization_weights.values()), dtype=np.float64)
     share = np.maximum(weight, np.finfo(np.float64).tiny)
     return sums[0] / share, sums[1] / share**2, weight
@@ -201,7 +201,7 @@ def rate_interval(rate: float, squares: float, widest: float, level: float) -> E
 
 
 def share_interval(share: float, variance: float, least: float, level: float) -> Ends:
-    """Return both ends of the interval of a mean probability over realisations.
+    """Return both ends of the interval of a mean probability over realizations.
 
     Wilson (1927), with as many realisations as give the variance. Probable inference, the law of
     succession, and statistical inference. Journal of the American Statistical Association 22(158),

@@ -1,4 +1,4 @@
-"""Run by Alembic: migrate over the connection that rbfrag hands it.
+"""Alembic environment: migrates over the connection that rbfrag passes.
 
 Developers run Alembic themselves to write a new migration; then ``-x db=PATH`` names
 the database that the schema is compared with.
@@ -28,9 +28,9 @@ def _run(connection: Connection) -> None:
         context.run_migrations()
 
 
-_given: Connection | None = context.config.attributes.get("connection")
-if _given is not None:
-    _run(_given)
+_shared: Connection | None = context.config.attributes.get("connection")
+if _shared is not None:
+    _run(_shared)
 else:
     _place = locate(context.get_x_argument(as_dictionary=True).get("db"))
     with unchecked_engine(_place, foreign_keys=False).begin() as _connection:

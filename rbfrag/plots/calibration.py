@@ -1,4 +1,4 @@
-"""Figure of calibration: what was predicted for unseen earthquakes, and what happened."""
+"""Calibration plot: predicted probabilities and observed fractions for held-out earthquakes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def plot_calibration(
     scores: Mapping[str, Mapping[str, float]] | None = None,
     data: str = "",
 ) -> canvas.Picture:
-    """Draw the share of blocks that toppled over the probability predicted for them.
+    """Draw the observed fraction of toppled blocks against the predicted probability.
 
     Each earthquake was predicted by a fit without it. On the diagonal a model is calibrated.
 
@@ -68,10 +68,10 @@ def plot_calibration(
 
 
 def _scores(scores: Mapping[str, float]) -> str:
-    known = (
+    labels = (
         ("log loss", "log_loss_held_out"),
         (r"for $k_r \geq 0.05$:", "log_loss_held_out_kr05"),
         ("Brier", "brier_held_out"),
     )
-    texts = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]
+    texts = [f"{name} {scores[key]:.3f}" for name, key in labels if key in scores]
     return f" ({', '.join(texts)})" if texts else ""

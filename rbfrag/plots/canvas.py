@@ -1,4 +1,4 @@
-"""The sheet of a figure and its file, numbers beside axes, clouds of points, modes.
+"""Figure creation and saving, axis numbers, point clouds, and colours of modes.
 
 Every figure refuses a path that cannot be written before it draws (InputError), and says which
 extra brings matplotlib where it is missing (MissingExtraError).
@@ -38,7 +38,7 @@ _Result = TypeVar("_Result")
 
 
 def in_own_style(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
-    """Let a function draw by matplotlib's defaults, not by the settings of whoever runs it.
+    """Return a function that draws with matplotlib's defaults, independent of the user's settings.
 
     Places and sizes of labels belong to these defaults; TeX, or a dark sheet under halos of
     white, would spoil them. A letter that the font lacks (Chinese names of stations) is an empty
@@ -59,7 +59,7 @@ def in_own_style(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
 
 
 def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
-    """Return an empty figure whose parts arrange themselves without overlap.
+    """Return an empty figure with a layout that avoids overlap.
 
     Args:
         width_in: width [inch].
@@ -78,7 +78,7 @@ Out = str | PathLike[str] | None
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure.
+    """A figure, saved or shown in a notebook.
 
     Args:
         path: its file; None of one in memory.
@@ -91,17 +91,17 @@ class Picture:
     warnings: tuple[str, ...] = ()
 
     def _repr_png_(self) -> bytes | None:
-        """Return what a notebook shows."""
+        """Return the PNG image for a notebook."""
         return self.png
 
 
 def plot_path(path: Out) -> Path | None:
-    """Return the path if a figure can be saved there; ask before long work."""
+    """Return the path after checking that a figure can be saved there; call it before long work."""
     return None if path is None else output_path(path, SUFFIXES, "plot file")
 
 
 def save_figure(figure: Figure, path: Out) -> Picture:
-    """Write a figure as PNG, PDF or SVG by the suffix of the path, whole or not at all.
+    """Write a figure as PNG, PDF or SVG by the suffix of the path, completely or not at all.
 
     Args:
         path: file to write; an existing file is replaced. None for a picture in memory.
@@ -125,7 +125,7 @@ _LIMIT_DIGITS = 9
 
 
 def freeze_layout(figure: Figure) -> None:
-    """Arrange the parts of a figure once and for all, the same each time.
+    """Fix the layout of a figure reproducibly.
 
     What arranges them solves equations in an order that changes from run to run, and differs in
     the last digits.
@@ -138,9 +138,9 @@ def freeze_layout(figure: Figure) -> None:
         parts += part.subfigs
         box = part.bbox_relative
         box.p0, box.p1 = (np.round(place, _LAYOUT_DIGITS) + 0.0 for place in (box.p0, box.p1))
-    for each in (figure, *parts):
-        if each.get_suptitle():
-            for text in each.texts:
+    for figure_part in (figure, *parts):
+        if figure_part.get_suptitle():
+            for text in figure_part.texts:
                 x, y = (round(float(place), _LAYOUT_DIGITS) for place in text.get_position())
                 text.set_position((x, y))
     for axes in figure.axes:
@@ -155,11 +155,11 @@ _MOST_DECADES = 1e5
 
 
 def written_numbers(axis: Axis, *digits: float) -> None:
-    """Write numbers of these leading digits beside a logarithmic axis, powers of ten if need be."""
+    """Label a logarithmic axis at given leading digits, with powers of ten where needed."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     class LeadingDigits(LogLocator):
-        """Of many decades the powers of ten alone: with other digits matplotlib shows nothing."""
+        """Locator with only powers of ten for many decades, as matplotlib shows no others."""
 
         def tick_values(self, vmin: float, vmax: float) -> Any:
             low, high = sorted((vmin, vmax))
@@ -180,24 +180,24 @@ def _number(value: float) -> str:
 
 
 def spread_out(
-    places: Sequence[float], apart: float, lowest: float = -math.inf, highest: float = math.inf
+    positions: Sequence[float], apart: float, lowest: float = -math.inf, highest: float = math.inf
 ) -> list[float]:
-    """Return rising places moved as little as keeps neighbours apart, in their order.
+    """Return increasing positions moved as little as possible to keep a minimum distance, in order.
 
     None lies below `lowest` or above `highest`, if there is space for all between.
     """
     from scipy.optimize import isotonic_regression
 
-    steps = apart * np.arange(len(places))
+    steps = apart * np.arange(len(positions))
     # labels that touch move as one group, to the mean of where its members belong
-    starts = isotonic_regression(np.asarray(places) - steps).x if len(places) else steps
-    highest -= (len(places) - 1) * apart
+    starts = isotonic_regression(np.asarray(positions) - steps).x if len(positions) else steps
+    highest -= (len(positions) - 1) * apart
     moved: list[float] = (np.minimum(np.maximum(starts, lowest), highest) + steps).tolist()
     return moved
 
 
 def logarithmic(axes: Axes, x: Sequence[float] = (), y: Sequence[float] = ()) -> None:
-    """Make both axes logarithmic, with numbers of these leading digits beside them."""
+    """Make both axes logarithmic, with labels at given leading digits."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis, digits in ((axes.xaxis, x), (axes.yaxis, y)):
@@ -206,20 +206,20 @@ def logarithmic(axes: Axes, x: Sequence[float] = (), y: Sequence[float] = ()) ->
 
 
 def light_grid(*axes: Axes, which: Literal["major", "both"] = "major") -> None:
-    """Draw thin lines behind the data."""
-    for each in axes:
-        each.grid(visible=True, which=which, lw=0.3, alpha=0.6)
+    """Draw a thin grid behind the data."""
+    for panel in axes:
+        panel.grid(visible=True, which=which, lw=0.3, alpha=0.6)
 
 
 def open_corner(axes: Axes) -> None:
-    """Leave out the frame above and at the right."""
+    """Hide the upper and right spines."""
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def grey_bars(
     axes: Axes, values: NDArray[np.float64], edges: NDArray[np.float64], *, flat: bool = False
 ) -> None:
-    """Draw a histogram, its bars upright or flat."""
+    """Draw a histogram with vertical or horizontal bars."""
     axes.hist(
         values, bins=edges.tolist(), orientation="horizontal" if flat else "vertical",
         color="#8a8a8a", edgecolor="white", linewidth=0.3,
@@ -227,7 +227,7 @@ def grey_bars(
 
 
 def legend_below(figure: Figure, columns: int) -> None:
-    """Put the labels of all axes below them."""
+    """Draw one legend for all axes below them."""
     figure.legend(loc="outside lower center", ncols=columns, fontsize=8.5, frameon=False)
 
 
@@ -249,7 +249,7 @@ def density(
     *,
     beside: Sequence[Axes] = (),
 ) -> None:
-    """Draw dots, or of many points hexagons shaded by their number; axes linear or logarithmic.
+    """Draw points, or for many points hexagons shaded by count; axes linear or logarithmic.
 
     Args:
         axes: where to draw; their scales are set before.
@@ -271,10 +271,10 @@ def density(
     # Neither white for a single block nor so dark that a line disappears.
     greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
     log = axes.get_xscale() == "log"
-    left, right, bottom, top = np.log10([*across, *up]) if log else (*across, *up)
+    x_left, x_right, bottom, top = np.log10([*across, *up]) if log else (*across, *up)
     scale: Literal["log", "linear"] = "log" if log else "linear"
     cells = axes.hexbin(
-        x, y, gridsize=(_CELLS_ACROSS, _CELLS_UP), extent=(left, right, bottom, top),
+        x, y, gridsize=(_CELLS_ACROSS, _CELLS_UP), extent=(x_left, x_right, bottom, top),
         xscale=scale, yscale=scale, mincnt=1, cmap=greys, linewidths=0.2,
     )  # fmt: skip
     axes.set_xlim(*across)
@@ -307,5 +307,5 @@ MODE_LINES: dict[ModeName, str] = {
 
 
 def mode_title(mode: str) -> str:
-    """Return the name of a mode or kind for people."""
+    """Return the display name of a mode or kind."""
     return mode.replace("_", " ")

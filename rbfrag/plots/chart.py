@@ -1,4 +1,4 @@
-"""Design chart: the probability that a block topples, to be read by hand."""
+"""Design chart of the probability of toppling, for reading by hand."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def draw_chart(
 def _known_ranges(
     model: FragilityModel, held: HeldMeasures
 ) -> tuple[tuple[float, float], tuple[float, float] | None]:
-    """Return the ranges of the intensity and of y that were fitted, with what is held."""
+    """Return the fitted ranges of the intensity and of y, for the held variables."""
     domain = model.row.domain
     fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
     low, high = (max(float(edge), 1e-4) for edge in fitted_x)
@@ -145,25 +145,25 @@ def _known_ranges(
 
 
 def _vertical_range(
-    lines: dict[float, np.ndarray], known: tuple[float, float] | None
+    lines: dict[float, np.ndarray], fitted: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Return the ordinates that hold the lines, but not far beyond what is known."""
+    """Return the ordinate range that shows the lines, limited near the fitted range."""
     drawn = np.concatenate(list(lines.values()))
     drawn = drawn[np.isfinite(drawn)]
     bottom, top = 0.8 * float(drawn.min()), 1.25 * float(drawn.max())
-    if known is None:
+    if fitted is None:
         return max(bottom, 1e-4 * top), top
-    return max(bottom, known[0] / _SPAN), min(top, max(_SPAN * known[1], 2.0 * bottom))
+    return max(bottom, fitted[0] / _SPAN), min(top, max(_SPAN * fitted[1], 2.0 * bottom))
 
 
 def _digits(ratio: float, size_pt: float, apart_pt: float) -> tuple[float, ...]:
-    """Return the leading digits of the numbers that an axis has space for."""
+    """Return the leading digits of axis labels that fit the available space."""
     usual = (1.0, 2.0, 5.0)
     return usual if size_pt > len(usual) * apart_pt * math.log10(ratio) else usual[:1]
 
 
 def _draw_kr_axis(axes: Axes, p2: float, digits: Sequence[float]) -> None:
-    """Add the axis of k_r for blocks of one size, right of the probabilities."""
+    """Add an axis of k_r for blocks of one size, right of the probabilities."""
     from matplotlib.ticker import NullLocator
 
     per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
@@ -177,51 +177,51 @@ def _draw_kr_axis(axes: Axes, p2: float, digits: Sequence[float]) -> None:
 
 
 def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> None:
-    """Write the probabilities right of the sheet, each joined to the end of its line."""
-    left, right = np.log(axes.get_xlim())
+    """Write the probabilities right of the axes, each joined to the end of its line."""
+    x_left, x_right = np.log(axes.get_xlim())
     bottom, top = np.log(axes.get_ylim())
     ends = []
     for probability, y in lines.items():
         inside = np.flatnonzero(np.isfinite(y) & (y > np.exp(bottom)) & (y < np.exp(top)))
         if inside.size:
             at = inside[-1]
-            across = float((np.log(x[at]) - left) / (right - left))
+            across = float((np.log(x[at]) - x_left) / (x_right - x_left))
             ends.append((float((np.log(y[at]) - bottom) / (top - bottom)), across, probability))
     ends.sort()
     width_pt, height_pt = _size_pt(axes)
     beside = 1.0 + _LABEL_OFF_PT / width_pt
-    places = canvas.spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
-    for place, (up, across, probability) in zip(places, ends, strict=True):
+    positions = canvas.spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
+    for position, (up, across, probability) in zip(positions, ends, strict=True):
         text = exact_percent(probability)
         axes.plot(
-            [across, beside - 0.005], [up, place], color=canvas.BLUE, lw=0.5,
+            [across, beside - 0.005], [up, position], color=canvas.BLUE, lw=0.5,
             transform=axes.transAxes, clip_on=False, label=f"_{text}",
         )  # fmt: skip
         axes.text(
-            beside, place, text, fontsize=8, va="center", color=canvas.BLUE,
+            beside, position, text, fontsize=8, va="center", color=canvas.BLUE,
             transform=axes.transAxes, fontweight="bold" if probability in _BOLD else "normal",
         )  # fmt: skip
 
 
 def _size_pt(axes: Axes) -> tuple[float, float]:
-    """Return width and height of axes before the figure is laid out [points]."""
+    """Return width and height of axes before the layout of the figure [points]."""
     box = axes.get_window_extent()
     return 72.0 * box.width / axes.figure.dpi, 72.0 * box.height / axes.figure.dpi
 
 
 def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:
-    left, right = axes.get_xlim()
+    x_left, x_right = axes.get_xlim()
     bottom, top = axes.get_ylim()
     shade: dict[str, Any] = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
-    axes.axvspan(left, across[0], **shade)
-    axes.axvspan(across[1], right, **shade)
+    axes.axvspan(x_left, across[0], **shade)
+    axes.axvspan(across[1], x_right, **shade)
     if up is not None:
         axes.axhspan(bottom, max(float(up[0]), bottom), **shade)
         axes.axhspan(min(float(up[1]), top), top, **shade)
 
 
 def _shade_where_not_fitted(axes: Axes, model: FragilityModel, held: HeldMeasures) -> None:
-    """Shade where block and motion, with what is held, are not of the fitted ones together."""
+    """Shade where the combination of block and motion lies outside the fitted range."""
     x, y = (np.geomspace(*ends, _NODES) for ends in (axes.get_xlim(), axes.get_ylim()))
     outside = np.where(_is_fitted(model, held, *np.meshgrid(x, y)), 0.0, 1.0)
     axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25, zorder=0.5)
@@ -230,7 +230,7 @@ def _shade_where_not_fitted(axes: Axes, model: FragilityModel, held: HeldMeasure
 def _is_fitted(
     model: FragilityModel, held: HeldMeasures, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """Return where intensities x and velocities y, of one shape, are of the fitted ones."""
+    """Return where intensities x and velocities y, of one shape, lie within the fitted range."""
     kr = np.nan_to_num(y) * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
     answers = array_answer(model, held.values(model, x, kr))
     fitted: np.ndarray = answers.in_domain & np.isfinite(y)

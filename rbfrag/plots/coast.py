@@ -18,7 +18,7 @@ _TURN_DEG = 360.0
 
 
 class Lines(NamedTuple):
-    """Lines on the globe, one after the other.
+    """Polylines on the globe, one after the other.
 
     Args:
         lonlat: their points [deg], shape (n, 2).
@@ -45,7 +45,7 @@ def world() -> Lines:
 
 
 def draw_coast(axes: Axes, west: float, east: float, south: float, north: float) -> int:
-    """Draw the coasts, and thinner the borders, of a part of the world.
+    """Draw the coasts, and with thinner lines the borders, of a region.
 
     Args:
         axes: axes of longitude and latitude.

@@ -1,4 +1,4 @@
-"""Figures of critical strengths: over frequency, and with vertical motion over that without.
+"""Figures of critical strengths: against frequency, and with against without vertical motion.
 
 In the linear model a pulse of amplitude A and duration t_p topples blocks of critical angle up
 to c·A, c a function of f = p t_p alone (docs/theory/toppling-spectrum.md, properties). Against
@@ -106,11 +106,11 @@ def plot_sensitivity(
     limit = float(table.search_limit[shown | censored].min())
     figure = canvas.new_figure(7.4, 5.6)
     axes = figure.add_subplot()
-    left, right = 0.8 * float(x.min()), 1.25 * float(x.max())
+    x_left, x_right = 0.8 * float(x.min()), 1.25 * float(x.max())
     bottom, top = 0.8 * min(limit, float(y.min())), 1.25 * max(1.0, float(y.max()))
     canvas.logarithmic(axes)
-    canvas.density(figure, axes, x, y, (left, right), (bottom, top))
-    line_x = np.geomspace(left, right, 300)
+    canvas.density(figure, axes, x, y, (x_left, x_right), (bottom, top))
+    line_x = np.geomspace(x_left, x_right, 300)
     for name in PULSES:
         style, colour = STYLES[name]
         above = int(np.sum(y > pulse_line(name, x)))
@@ -159,7 +159,7 @@ class VerticalPairs:
 
 
 def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -> VerticalPairs:
-    """Return the pairs of two tables; what is in one of them alone has no pair."""
+    """Return the pairs of two tables; values in only one of them have no pair."""
 
     def combinations(table: CombinationTable) -> pd.DataFrame:
         columns = {name: getattr(table, name) for name in ("motion_id", "polarity", "p2")}
@@ -169,8 +169,11 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
     vertical = combinations(with_vertical)
     pairs = vertical.merge(combinations(without), on=keys, suffixes=("_with", ""))
     first, second = pairs["row"].to_numpy(), pairs["row_with"].to_numpy()
-    one, other = without.status[first] == "found", with_vertical.status[second] == "found"
-    both = one & other
+    found_without, found_with = (
+        without.status[first] == "found",
+        with_vertical.status[second] == "found",
+    )
+    both = found_without & found_with
     a = without.kr_over_pga[first[both]]
     b = with_vertical.kr_over_pga[second[both]]
     return VerticalPairs(
@@ -179,13 +182,13 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
         with_vertical=b,
         p2=without.p2[first[both]],
         event_id=without.event_id[first[both]],
-        one_sided=int(np.sum(one != other)),
+        one_sided=int(np.sum(found_without != found_with)),
     )
 
 
 @canvas.in_own_style
 def plot_vertical(pairs: VerticalPairs, path: canvas.Out) -> canvas.Picture:
-    """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
+    """Draw the critical k_r/PGA with against without vertical motion, and their ratio.
 
     Ratios beyond the edges of the histogram are counted in its outermost bars.
 

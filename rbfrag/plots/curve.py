@@ -1,4 +1,4 @@
-"""Fragility curve of one block: probability of failure over the strength of the shaking."""
+"""Fragility curve of one block: probability of failure against an intensity measure."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def plot_curve(
     compared: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     sites: float | None = None,
 ) -> Picture:
-    """Draw the fragility curve of one block with the interval of P.
+    """Draw the fragility curve of one block with its confidence interval.
 
     P is the share of such blocks that fail over all earthquakes and sites with this shaking, its
     interval how well the data tell it. With `sites` a wide band is the share of like blocks that
@@ -97,14 +97,14 @@ def plot_curve(
         raise InputError(
             f"model {model.name!r} uses {' and '.join(model.term.inputs)}, not {varied}"
         )
-    others = [name for name in model.term.inputs if name != varied]
-    missing = [name for name in others if name not in (fixed or {})]
+    fixed_names = [name for name in model.term.inputs if name != varied]
+    missing = [name for name in fixed_names if name not in (fixed or {})]
     if missing:
         raise InputError(
             f"model {model.name!r} uses {' and '.join(model.term.inputs)}: give "
             f"{' and '.join(missing)} for the curve"
         )
-    held = {name: float((fixed or {})[name]) for name in others}
+    held = {name: float((fixed or {})[name]) for name in fixed_names}
     if len(compared or {}) > MOST_COMPARED:
         raise InputError(
             f"{len(compared or {})} fragility functions for comparison: the maximum is "
@@ -117,7 +117,7 @@ def plot_curve(
     y_m_s = _velocity_m_s(model, block)
     about_block = _SUBSCRIPT.sub(r"$\1_\2$", describe.labelled_values(block, 3))
     about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
-    conditions = ", ".join(_condition(name, held[name]) for name in others)
+    conditions = ", ".join(_condition(name, held[name]) for name in fixed_names)
     fitted = describe.fitted_data(model.row.diagnostics)
     model_name = f"model {describe.stored_model(model.row)}"
     axes.set_title(
@@ -131,7 +131,7 @@ def plot_curve(
 
 
 def _condition(name: str, value: float) -> str:
-    """Return a measure that is held at a value."""
+    """Return the text of a measure held constant."""
     symbol, period_s = QUANTITIES[name].symbol, MEASURES[name].period_s
     if period_s is not None:
         symbol = f"SA({period_s:.1f} s)"
@@ -162,7 +162,7 @@ def draw_curve(
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
     answer = array_answer(model, {**block, varied: x, **held}, level, sites=sites)
-    known = answer.in_domain
+    in_range = answer.in_domain
     percent = exact_percent(level)
     if sites is not None and not np.isnan(answer.event_low).all():
         axes.fill_between(
@@ -173,10 +173,10 @@ def draw_curve(
         x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,
         label=f"{percent} confidence interval",
     )  # fmt: skip
-    if not known.all():
+    if not in_range.all():
         outside = "outside the fitted range"
         axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
-    fitted = np.where(known, answer.probability, np.nan)
+    fitted = np.where(in_range, answer.probability, np.nan)
     axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: fraction over all earthquakes and sites")
     for i, (name, other) in enumerate((compared or {}).items()):
         colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
@@ -193,7 +193,7 @@ def draw_curve(
 
 
 def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | None:
-    """Return the velocity k g/p of a block [m/s]; None of one without a size."""
+    """Return the velocity k g/p of a block [m/s]; None for a block without a size."""
     of = model.method.block
     if of.size is None:
         return None
@@ -203,7 +203,7 @@ def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | 
 def _right_end(
     model: FragilityModel, block: Mapping[str, float], varied: str, held: Mapping[str, float]
 ) -> float:
-    """Where the curve has nearly reached its top, found by doubling."""
+    """Return the intensity at which the curve nearly reaches its maximum, found by doubling."""
     k, y_m_s = block[model.method.block.strength], _velocity_m_s(model, block)
     if y_m_s is None:
         y_m_s = 0.1 * k

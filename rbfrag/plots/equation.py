@@ -1,4 +1,4 @@
-"""The equation of a fitted model, with its coefficients, as figures print it."""
+"""Equation of a fitted model with its coefficients, as printed in figures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TERMS_A_LINE = 5
 
 
 def equation_lines(model: FragilityModel) -> list[str]:
-    """Return P of a model with its coefficients rounded, and what its symbols are with their units.
+    """Return the equation of P with rounded coefficients, and its symbols with their units.
 
     Args:
         model: a model of blocks known by p² and k_r.
@@ -21,14 +21,14 @@ def equation_lines(model: FragilityModel) -> list[str]:
     Returns:
         Lines of text with mathtext.
     """
-    form, known = model.form, model.row.coefficients
+    form, coefficients = model.form, model.row.coefficients
     factor = form.size_factor
     eta = r"\eta" if factor is None else r"\eta/h"
-    right = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, known), form.equation)
-    first, *others = right.split("\n")
+    right = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, coefficients), form.equation)
+    first, *further_lines = right.split("\n")
     lines = [rf"$P = {model.method.link.formula},\quad {eta} = {first}$"]
-    lines += [rf"${other}$" for other in others]
-    where = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, known), form.where)
+    lines += [rf"${other}$" for other in further_lines]
+    where = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, coefficients), form.where)
     if factor is not None:
         where = ",\\ ".join(part for part in (f"h = {factor.formula}", where) if part)
     if where:
@@ -57,25 +57,27 @@ def rounded(value: float, *, signed: bool = False) -> str:
     return f"-{text}" if value < 0.0 else text
 
 
-def _filled(what: str, form: Form, known: Mapping[str, float]) -> str:
-    if what == "sum":
-        return _sum(form, known)
-    if what.startswith("exp "):
-        return rounded(math.exp(known[what[4:]]))
-    if what.startswith("+"):
-        return rounded(known[what[1:]], signed=True)
-    return rounded(known[what])
+def _filled(placeholder: str, form: Form, coefficients: Mapping[str, float]) -> str:
+    if placeholder == "sum":
+        return _sum(form, coefficients)
+    if placeholder.startswith("exp "):
+        return rounded(math.exp(coefficients[placeholder[4:]]))
+    if placeholder.startswith("+"):
+        return rounded(coefficients[placeholder[1:]], signed=True)
+    return rounded(coefficients[placeholder])
 
 
-def _sum(form: Form, known: Mapping[str, float]) -> str:
-    """Return the sum over the parameters, a line for some of its terms at a time."""
+def _sum(form: Form, coefficients: Mapping[str, float]) -> str:
+    """Return the sum over the parameters, with a few terms per line."""
     text = ""
     count = 0
     for name, term in zip(form.parameters, form.terms, strict=True):
-        if not term or name not in known:
+        if not term or name not in coefficients:
             continue
         if count and count % _TERMS_A_LINE == 0:
             text += "\n"
-        text += rounded(known[name], signed=count > 0) + ("" if term == "1" else rf"\,{term}")
+        text += rounded(coefficients[name], signed=count > 0) + (
+            "" if term == "1" else rf"\,{term}"
+        )
         count += 1
     return text

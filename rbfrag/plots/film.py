@@ -1,4 +1,4 @@
-"""A block that moves on its planes under a record, as a film."""
+"""Animation of a block that moves on its planes under a record."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def film(
     exaggerate: float = 1.0,
     title: str = "",
 ) -> Path:
-    """Write a film of a block on its planes, as seen by somebody who moves with the ground.
+    """Write an animation of a block on its planes, in the frame of the moving ground.
 
     Args:
         path: .gif, .mp4 (by the program ffmpeg), or .html with buttons.
@@ -113,7 +113,7 @@ def film(
 
 
 def film_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path if a film can be made there; ask before long work."""
+    """Return the path after checking that an animation can be saved; call before long work."""
     target = output_path(path, SUFFIXES, "film")
     if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(
@@ -135,7 +135,7 @@ def _writer(suffix: str) -> AbstractMovieWriter:
 
 
 def _frame_times(response: Response, history: ResponseHistory) -> tuple[FloatArray, float]:
-    """Return the times of the frames, and how much faster than the earthquake they pass."""
+    """Return the times of the frames, and the playback speed relative to the earthquake."""
     first, last = float(history.time_s[0]), float(history.time_s[-1])
     if response.started_s is not None:
         moving = np.flatnonzero(np.diff(history.theta_rad) != 0.0)
@@ -152,7 +152,7 @@ def _frame_times(response: Response, history: ResponseHistory) -> tuple[FloatArr
 
 
 def _which(begins_s: Sequence[float], time_s: float) -> str:
-    """Return which motion of several it is."""
+    """Return the number of the motion in a sequence, as text."""
     if len(begins_s) < 2:
         return ""
     return f", motion {bisect_right(begins_s[1:], time_s) + 1} of {len(begins_s)}"
@@ -172,21 +172,21 @@ def _outlines(
         turned, centroid = history.turned_rad, history.centroid_m
     angle = exaggerate * np.interp(time_s, history.time_s, turned)
     moved = [np.interp(time_s, history.time_s, column) for column in centroid.T]
-    places = start + exaggerate * (np.stack(moved, axis=1) - start)
+    centroids = start + exaggerate * (np.stack(moved, axis=1) - start)
     arms = np.array(block.vertices_m) - start
-    corners: FloatArray = places[:, None, :] + _rotated(arms, angle)
+    corners: FloatArray = centroids[:, None, :] + _rotated(arms, angle)
     return corners
 
 
 def _rotated(arms: FloatArray, angle: FloatArray) -> FloatArray:
-    """Return arms turned by each of several angles, shape (angles, arms, 2)."""
+    """Return vectors rotated by each of several angles, shape (angles, arms, 2)."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = arms[:, 0], arms[:, 1]
     return np.stack([x * c - y * s, x * s + y * c], axis=2)
 
 
 def _to_slope(points: FloatArray, beta_deg: float) -> FloatArray:
-    """Turn the base frame by the dip: x horizontal out of the slope, y up."""
+    """Return points rotated from the base frame by the dip: x horizontal out of the slope, y up."""
     c, s = math.cos(math.radians(beta_deg)), math.sin(math.radians(beta_deg))
     x, y = points[..., 0], points[..., 1]
     return np.stack([x * c + y * s, y * c - x * s], axis=-1)
@@ -199,7 +199,7 @@ def _closed(outline: FloatArray) -> FloatArray:
 def _draw_scene(
     axes: Axes, block: Block, shown: FloatArray, beta_deg: float, back_fracture: bool
 ) -> None:
-    """Draw the planes and the block at rest, and frame all places of the block."""
+    """Draw the planes and the block at rest, with limits for all positions of the block."""
     low, high = shown.min(axis=(0, 1)), shown.max(axis=(0, 1))
     size = float((high - low).max())
     gamma = math.radians(block.gamma_deg)
@@ -218,7 +218,7 @@ def _draw_scene(
 
 
 def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any:
-    """Draw the ground below the scene; return the line that marks the present."""
+    """Draw the ground motion below the scene; return the line that marks the current time."""
     driving = history.k_h / (1.0 + history.k_v)
     axes.plot(history.time_s, driving, color=MOTION, lw=0.7, label="ground: $k_h/(1+k_v)$")
     if history.strength_g is not None:

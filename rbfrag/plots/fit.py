@@ -88,19 +88,23 @@ def plot_fit(
     figure = canvas.new_figure(7.6, 7.6 if binned else 6.2)
     expected = x
     x, y = x[shown], table.y_m_s[shown]
-    left, right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
+    x_left, x_right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
     lines = []
     for probability, *_ in _LINES:
-        line_x = np.geomspace(left, right, 400) if log else np.linspace(right / 400.0, right, 400)
+        line_x = (
+            np.geomspace(x_left, x_right, 400)
+            if log
+            else np.linspace(x_right / 400.0, x_right, 400)
+        )
         if alone:
             lines.append((line_x, failure_line(model, line_x, probability)))
         elif probability == 0.5:
             lines.append((line_x, line_x))
         else:
-            one = predicted_strengths(model, table, spectrum, probability)
-            there = np.isfinite(expected) & np.isfinite(one)
+            strengths = predicted_strengths(model, table, spectrum, probability)
+            there = np.isfinite(expected) & np.isfinite(strengths)
             reach = line_x[(line_x >= x.min()) & (line_x <= x.max())] if there.any() else line_x[:0]
-            lines.append((reach, smooth_line(expected[there], one[there], reach)))
+            lines.append((reach, smooth_line(expected[there], strengths[there], reach)))
     # The data fill the sheet; a line far above them may leave it.
     highest = float(np.nanmax(lines[0][1], initial=0.0))
     top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05
@@ -115,7 +119,7 @@ def plot_fit(
     beside = figure.add_subplot(grid[1, 1], sharey=axes)
     if log:
         canvas.logarithmic(axes)
-    canvas.density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
+    canvas.density(figure, axes, x, y, (x_left, x_right), (bottom, top), beside=[beside, above])
     if log:
         canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     for (_, style, colour, label), (line_x, line) in zip(_LINES, lines, strict=True):
@@ -129,7 +133,7 @@ def plot_fit(
         )
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     spaced = np.geomspace if log else np.linspace
-    canvas.grey_bars(above, x, spaced(left, right, _BARS + 1))
+    canvas.grey_bars(above, x, spaced(x_left, x_right, _BARS + 1))
     above.set_ylabel("blocks", fontsize=8)
     above.tick_params(labelbottom=False, labelsize=8)
     canvas.grey_bars(beside, y, spaced(bottom, top, _BARS + 1), flat=True)
@@ -165,8 +169,8 @@ def _draw_variance(
     residuals = y[order] - fitted.mean_m_s(model.parameters, bins.x)
     binned = bin_variances(bins, residuals**2, np.ones(x.size))
     log = axes.get_xscale() == "log"
-    left, right = axes.get_xlim()
-    line_x = np.geomspace(left, right, 400) if log else np.linspace(0.0, right, 400)
+    x_left, x_right = axes.get_xlim()
+    line_x = np.geomspace(x_left, x_right, 400) if log else np.linspace(0.0, x_right, 400)
     line = np.asarray(fitted.variance_m2_s2(model.parameters, line_x))
     ratio = np.asarray(fitted.variance_m2_s2(model.parameters, binned.centre)) / binned.variance
     off = ~((ratio > 0.5) & (ratio < 2.0))
@@ -177,7 +181,7 @@ def _draw_variance(
         canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0,))
     else:
         axes.set_ylim(0.0, 1.15 * max(float(binned.variance.max()), float(line[-1])))
-    axes.set_xlim(left, right)
+    axes.set_xlim(x_left, x_right)
     axes.set_xlabel(model.term.label)
     axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
     labels = [f"{off.size} bins", "fitted variance", f"{off.sum()} bins missed by a factor above 2"]

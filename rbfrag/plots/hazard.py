@@ -1,4 +1,4 @@
-"""Figure of an annual failure rate: which shaking it comes from."""
+"""Figure of an annual failure rate: contributions of the levels of shaking."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHOWN = 1e-3
 
 
 def measure_title(curve: HazardCurve) -> str:
-    """Return what the levels of a curve are, with their unit."""
+    """Return the measure of the levels of a curve, with its unit."""
     return AXIS.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
 
 
@@ -36,7 +36,7 @@ def plot_contribution(
     imt: str | None = None,
     site: str | None = None,
 ) -> canvas.Picture:
-    """Draw a hazard curve and, below it, where the failures of the first block come from.
+    """Draw a hazard curve and, below it, the contributions to the failure rate of the first block.
 
     Args:
         curve: hazard curve, or its file.
@@ -58,7 +58,7 @@ def plot_contribution(
 
 
 def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: HazardAnswer) -> None:
-    """Draw both parts of :func:`plot_contribution` into axes that share their abscissa."""
+    """Draw both parts of :func:`plot_contribution` into axes with a common abscissa."""
     top.loglog(curve.levels, curve.annual_rate, "o-", color="black", ms=3.5, lw=1.4)
     top.set_ylabel("annual rate of exceedance, λ [yr⁻¹]")
     rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
@@ -73,9 +73,9 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
     bottom.set_xlabel(measure_title(curve))
     seen = fractions > _SHOWN * max(float(fractions.max()), np.finfo(float).tiny)
     if seen.any():
-        left, right = edges[:-1][seen][0], edges[1:][seen][-1]
-        bottom.set_xlim(left, right)
-        inside = (curve.levels >= left) & (curve.levels <= right)
+        x_left, x_right = edges[:-1][seen][0], edges[1:][seen][-1]
+        bottom.set_xlim(x_left, x_right)
+        inside = (curve.levels >= x_left) & (curve.levels <= x_right)
         if inside.sum() > 1:
             rates = curve.annual_rate[inside]
             top.set_ylim(0.5 * rates.min(), 2.0 * rates.max())

@@ -1,4 +1,4 @@
-"""The islands of one motion: which blocks topple, which stay, and how far those rotate."""
+"""Islands of one motion: toppling and safe ranges of k_r/PGA, with the peak rotations."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def plot_islands(
     vertical: GroundMotion | None = None,
     title: str = "",
 ) -> canvas.Picture:
-    """Draw the map of outcomes over k_r/PGA with the peak rotations, and a part enlarged.
+    """Draw the map of outcomes over k_r/PGA with the peak rotations, and an enlarged part.
 
     The bands are what the search proved for whole intervals; the curve is peak rotations of
     single blocks, broken where they topple.
@@ -61,22 +61,22 @@ def plot_islands(
         raise InputError(f"nothing to draw: {why}; islands need a motion that lifts blocks")
     excited = excitation(motion, vertical, result.polarity)
     figure = canvas.new_figure(width_in=7.5, height_in=6.2)
-    whole, part = figure.subplots(2, 1)
+    overview, part = figure.subplots(2, 1)
     bottom = float(result.intervals.k_lo[0])
-    known = result.k_up_over_pga or bottom
-    top = min(max(1.25 * known, 2.0 * bottom), float(result.intervals.k_hi[-1]))
-    low, high, what = enlarged_range(result)
-    _panel(whole, excited, result, bottom, top, logarithmic=True)
+    upper = result.k_up_over_pga or bottom
+    top = min(max(1.25 * upper, 2.0 * bottom), float(result.intervals.k_hi[-1]))
+    low, high, caption = enlarged_range(result)
+    _panel(overview, excited, result, bottom, top, logarithmic=True)
     _panel(part, excited, result, low, high, logarithmic=False)
     for edge in (low, high):
-        whole.axvline(edge, color="black", lw=0.8, ls=":")
+        overview.axvline(edge, color="black", lw=0.8, ls=":")
     write_near(
-        whole, "enlarged below", (np.sqrt(low * high), 1.0), (0, 1), movable=False,
+        overview, "enlarged below", (np.sqrt(low * high), 1.0), (0, 1), movable=False,
         xycoords=("data", "axes fraction"), fontsize=8, annotation_clip=False,
     )  # fmt: skip
-    part.set_xlabel(f"$k_r$/PGA, {what}")
-    whole.set_xlabel("$k_r$/PGA")
-    _legend(whole, result)
+    part.set_xlabel(f"$k_r$/PGA, {caption}")
+    overview.set_xlabel("$k_r$/PGA")
+    _legend(overview, result)
     name = f"{title}{', reversed' if result.polarity == 'reverse' else ''}"
     name += ", with vertical motion" if vertical is not None else ""
     figure.suptitle(f"{as_written(name, 85)}\n{_verdict(result)}", fontsize=10)
@@ -84,7 +84,7 @@ def plot_islands(
 
 
 def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:
-    """Return the range of k_r/PGA to enlarge, and what it shows.
+    """Return the range of k_r/PGA to enlarge, and its description.
 
     Around the widest safe island below the critical value, or around that value itself.
     """
@@ -146,7 +146,7 @@ def _panel(
 def rotations(
     excited: Excitation, result: CriticalResult, low: float, high: float, *, logarithmic: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Run blocks from `low` to `high` and at both sides of the borders between.
+    """Return peak rotations of blocks from `low` to `high`, with extra blocks near the borders.
 
     Returns:
         k_r/PGA, rising, and peak rotations over the critical angle, NaN where blocks topple.

@@ -1,4 +1,4 @@
-"""Design chart of a kind of failure other than toppling: P over shaking and yield."""
+"""Design chart for kinds of failure other than toppling: P against shaking and yield."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _PERIODS_S = {"sa03_g": ("sa03_over_pga", 0.0), "sa10_g": ("v10_over_pgv", 1.0),
 
 @canvas.in_own_style
 def plot_kind_chart(
-    model: FragilityModel, path: canvas.Out, stated: Mapping[str, float]
+    model: FragilityModel, path: canvas.Out, options: Mapping[str, float]
 ) -> canvas.Picture:
-    """Draw lines of equal probability over the first measure of a model and the block's yield.
+    """Draw lines of equal probability against a model's first measure and the yield.
 
     What else the model reads is held at the middle of its fitted range; measures keep the middle
     ratio to the first. The caption says at what; what was not fitted is shaded.
@@ -36,7 +36,7 @@ def plot_kind_chart(
     Args:
         model: a model of any kind.
         path: file to write.
-        stated: what is held at other values, by field.
+        options: what is held at other values, by field.
 
     Raises:
         InputError: a value that is not above zero or not read, or a measure that does not go in
@@ -45,13 +45,13 @@ def plot_kind_chart(
     canvas.plot_path(path)
     names, domain = model.method.block.names, model.row.domain
     strength = next(name for name in names if name.startswith("k"))
-    first, *others = model.term.inputs
+    first, *other_names = model.term.inputs
     held = {name: math.sqrt(math.prod(domain[name])) for name in names if name != strength}
     held |= {"beta_deg": 0.0} if "beta_deg" in model.method.block.options else {}
-    if "magnitude" in others:
+    if "magnitude" in other_names:
         held["magnitude"] = sum(domain["magnitude"]) / 2.0
-    for name, value in stated.items():
-        if name not in held and name not in others:
+    for name, value in options.items():
+        if name not in held and name not in other_names:
             raise InputError(
                 f"{name} = {value:g} has no effect: model {model.name!r} does not use it, or it "
                 "is an axis; omit it",
@@ -59,26 +59,28 @@ def plot_kind_chart(
             )
         if not 0.0 < value < math.inf:
             raise InputError(f"{name} = {value:g} is not above zero", fields=(name,))
-    held |= stated
+    held |= options
     across = domain.get(first) or (0.02, 2.0)
     x = np.geomspace(max(across[0], 0.02), across[1], _NODES)
     y = np.geomspace(*(domain.get(strength) or (0.02, 1.0)), _NODES)
     xs, ys = np.meshgrid(x, y)
-    given: dict[str, Any] = {first: xs, strength: ys, **held}
+    inputs: dict[str, Any] = {first: xs, strength: ys, **held}
     ratios = []
-    for name in others:
-        if name not in given:
-            given[name], words = _in_proportion(name, first, xs, model)
+    for name in other_names:
+        if name not in inputs:
+            inputs[name], words = _in_proportion(name, first, xs, model)
             ratios.append(words)
-    answers = array_answer(model, {name: np.broadcast_to(v, xs.shape) for name, v in given.items()})
+    answers = array_answer(
+        model, {name: np.broadcast_to(v, xs.shape) for name, v in inputs.items()}
+    )
     figure = canvas.new_figure(7.4, 6.6)
     axes = figure.add_subplot()
     canvas.logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     outside = np.where(answers.in_domain, 0.0, 1.0)
     axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25)
     lines = axes.contour(x, y, answers.probability, CONTOURS, colors=canvas.BLUE, linewidths=1.1)
-    places = list(_label_places(x, y, answers.probability))
-    axes.clabel(lines, fmt=exact_percent, fontsize=8, manual=places)
+    label_points = list(_label_points(x, y, answers.probability))
+    axes.clabel(lines, fmt=exact_percent, fontsize=8, manual=label_points)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     about = QUANTITIES[first]
     axes.set_xlabel(f"{about.noun} [{about.unit}]")
@@ -92,22 +94,22 @@ def plot_kind_chart(
     return canvas.save_figure(figure, path)
 
 
-def _label_places(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Iterator[tuple[float, float]]:
-    """Yield a place on each line of the chart, one below the other and off the frame."""
+def _label_points(x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Iterator[tuple[float, float]]:
+    """Yield a label position on each line of the chart, staggered and away from the frame."""
     margin = _NODES // 12
-    for level, wanted in zip(CONTOURS, np.linspace(0.85, 0.15, len(CONTOURS)), strict=True):
+    for level, height in zip(CONTOURS, np.linspace(0.85, 0.15, len(CONTOURS)), strict=True):
         column = (p < level).sum(axis=1)
         inside = np.flatnonzero((column > margin) & (column < _NODES - margin))
         inside = inside[(inside > margin) & (inside < _NODES - margin)]
         if inside.size:
-            row = inside[np.abs(inside - wanted * _NODES).argmin()]
+            row = inside[np.abs(inside - height * _NODES).argmin()]
             yield float(x[column[row]]), float(y[row])
 
 
 def _in_proportion(
     name: str, first: str, x: np.ndarray, model: FragilityModel
 ) -> tuple[np.ndarray, str]:
-    """Return a measure that keeps the middle ratio to the first, and the ratio in words."""
+    """Return a measure at the middle fitted ratio to the first one, and the ratio as text."""
     domain, g = model.row.domain, STANDARD_GRAVITY_M_S2
 
     def middle(ratio: str) -> float:

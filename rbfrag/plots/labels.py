@@ -1,4 +1,4 @@
-"""Labels that can be read wherever they stand: a white halo, and a place off the lines; names.
+"""Readable labels: a white halo, positions off the lines, and safe names.
 
 A label is written beside its place of the data. When the figure is saved, where all is laid out,
 each label takes the first of the places around its point where it covers no line, no point and no
@@ -29,7 +29,7 @@ _OFF_THE_AXES, _ON_TEXT, _ON_LINE = 100.0, 20.0, 4.0
 
 
 def as_written(name: str, letters: int, lines: int = 3) -> str:
-    """Return a name out of a file for a figure: its letters alone, in a few lines.
+    """Return a name from a file for a figure: letters only, in a few lines.
 
     A dollar sign begins no formula, and a legend leaves out no name for its first underscore.
 
@@ -44,7 +44,7 @@ def as_written(name: str, letters: int, lines: int = 3) -> str:
 
 
 def halo(width: float = 2.5) -> dict[str, Any]:
-    """Return the style of a text with a white rim, for lines and shades to pass behind it.
+    """Return the style of a text with a white outline.
 
     Args:
         width: thickness of the rim [points].
@@ -63,7 +63,7 @@ def write_near(
     movable: bool = True,
     **style: Any,
 ) -> None:
-    """Write a text with a halo beside a place of the data.
+    """Write a text with a halo near a point of the data.
 
     Args:
         at: the place, in data coordinates unless `style` has ``xycoords``.
@@ -82,7 +82,7 @@ def write_near(
 
 
 def settle_labels(figure: Figure) -> None:
-    """Put every movable label of a figure where it covers least."""
+    """Move every movable label of a figure to where it covers least."""
     labels: list[Any] = figure.findobj(lambda artist: artist.get_label() == _MOVABLE)
     if not labels:
         return
@@ -90,20 +90,20 @@ def settle_labels(figure: Figure) -> None:
     settled: list[Bbox] = []
     for label in labels:
         axes = label.axes
-        others = [*settled, *(text.get_window_extent() for text in _fixed_texts(axes, labels))]
+        obstacles = [*settled, *(text.get_window_extent() for text in _fixed_texts(axes, labels))]
         lines = list(_lines(axes))
         best, least = label.xyann, math.inf
-        for rank, offset in enumerate(_places(label.xyann)):
+        for rank, offset in enumerate(_label_offsets(label.xyann)):
             _move(label, offset)
-            cost = rank * 0.1 + _cost(label.get_window_extent(), axes, others, lines)
+            cost = rank * 0.1 + _cost(label.get_window_extent(), axes, obstacles, lines)
             if cost < least:
                 best, least = offset, cost
         _move(label, best)
         settled.append(label.get_window_extent())
 
 
-def _places(offset: tuple[float, float]) -> Iterator[tuple[float, float]]:
-    """Yield offsets around a point, the given one and those like it first."""
+def _label_offsets(offset: tuple[float, float]) -> Iterator[tuple[float, float]]:
+    """Yield offsets around a point; the given offset and its mirror images come first."""
     x, y = offset
     reach = math.hypot(x, y)
     yield from dict.fromkeys([(x, y), (x, -y), (-x, y), (-x, -y)])
@@ -114,7 +114,7 @@ def _places(offset: tuple[float, float]) -> Iterator[tuple[float, float]]:
 
 
 def _alignment(offset: tuple[float, float]) -> dict[str, str]:
-    """Return how a text is aligned that begins at an offset, away from its point."""
+    """Return the alignment of a text that begins at an offset from its point."""
     x, y = offset
     small = 0.2 * math.hypot(x, y)
     return {
@@ -128,10 +128,10 @@ def _move(label: Annotation, offset: tuple[float, float]) -> None:
     label.set(**_alignment(offset))
 
 
-def _cost(box: Bbox, axes: Axes, others: Sequence[Bbox], lines: Sequence[Path]) -> float:
+def _cost(box: Bbox, axes: Axes, obstacles: Sequence[Bbox], lines: Sequence[Path]) -> float:
     frame, rim = axes.get_window_extent(), box.padded(1.5)
     outside = not (frame.contains(*box.min) and frame.contains(*box.max))
-    covered = sum(rim.overlaps(other) for other in others)
+    covered = sum(rim.overlaps(obstacle) for obstacle in obstacles)
     crossed = sum(
         path.intersects_bbox(rim, filled=False) or rim.count_contains(path.vertices) > 0
         for path in lines
@@ -147,7 +147,7 @@ def _fixed_texts(axes: Axes, labels: Sequence[Annotation]) -> Iterator[Text]:
 
 
 def _lines(axes: Axes) -> Iterator[Path]:
-    """Yield what is drawn as lines or points, in pixels."""
+    """Yield the lines and points of axes as paths, in pixels."""
     from matplotlib.path import Path
 
     for line in axes.lines:

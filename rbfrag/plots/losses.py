@@ -1,4 +1,4 @@
-"""Figure of how often numbers of failures, and losses, are reached by an event set."""
+"""Figure of the exceedance curves of failures and losses under an event set."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LOWEST = 0.05  # of one event in the effective time
 
 @canvas.in_own_style
 def plot_losses(answer: LossAnswer, out: canvas.Out = None) -> canvas.Picture:
-    """Draw the curves of exceedance of failures and, where there is one, of the loss.
+    """Draw the exceedance curves of failures and, if there are losses, of the loss.
 
     Bands are those of event-set sampling, of the parameters of the fragility and of the logic tree,
     each by itself. Of years, the sum is drawn next to the events; what happens less than once in
@@ -66,7 +66,7 @@ _BANDS: Mapping[str, Mapping[str, Any]] = {
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
     axes.set_yscale("log")
     drawn = [curve for curve in curves.values() if curve]
-    values = [one.value for curve in drawn for one in curve]
+    values = [point.value for curve in drawn for point in curve]
     if drawn and max(values) > 30.0:
         axes.set_xscale("log")
         digits = (1.0,) if max(values) > 30.0 * min(values) else (1.0, 2.0, 5.0)
@@ -78,10 +78,10 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
     for colour, (law, curve) in zip(_COLOURS, curves.items(), strict=False):
         if not curve:
             continue
-        x = [one.value for one in curve]
+        x = [point.value for point in curve]
         of = f" ({law})" if several else ""
         for source, style in _BANDS.items():
-            ends = [getattr(one, source) or (math.nan, math.nan) for one in curve]
+            ends = [getattr(point, source) or (math.nan, math.nan) for point in curve]
             low, high = zip(*ends, strict=True)
             if not all(map(math.isnan, low)):
                 level = LOGIC_TREE_LEVEL if source == "logic_tree" else answer.level
@@ -91,10 +91,10 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
                     if first and law == next(iter(curves)) else None,
                 )  # fmt: skip
         axes.plot(
-            x, [one.annual_rate for one in curve], "o-", color=colour, ms=3.0, lw=1.5,
+            x, [point.annual_rate for point in curve], "o-", color=colour, ms=3.0, lw=1.5,
             label=f"events{of}" if first else None,
         )  # fmt: skip
-        sums = [one.sum_of_year for one in curve if one.sum_of_year is not None]
+        sums = [point.sum_of_year for point in curve if point.sum_of_year is not None]
         if sums:
             axes.plot(
                 x, sums, "--", color=colour, lw=1.1,

@@ -1,4 +1,4 @@
-"""What a model says of many blocks, and the lines where it gives one probability."""
+"""Model predictions for many blocks, and lines of equal probability."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _ANY_TM_S = 0.05
 
 @dataclass(frozen=True)
 class HeldMeasures:
-    """Block size and measures that do not change over a figure.
+    """Block size and measures held constant in a figure.
 
     Args:
         p2: frequency parameter p² [1/s²].
         pga_g: PGA [g], or None for one in proportion to PGV.
         pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
         tm_s: mean period [s].
-        others: what else is known of the block.
+        block_inputs: what else is known of the block.
         words: what is held, for the caption; empty where nothing matters.
         size_is_given: whether the figure is of blocks of this size, and not of any.
     """
@@ -49,30 +49,32 @@ class HeldMeasures:
     tm_s: float = _ANY_TM_S
     words: str = ""
     size_is_given: bool = False
-    others: Mapping[str, float] = field(default_factory=dict)
+    block_inputs: Mapping[str, float] = field(default_factory=dict)
 
     def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
-        """Return the measures of motions of some intensities x [m/s], shape (n,)."""
-        first, *others = model.term.inputs
-        one = dict.fromkeys(model.term.inputs, 1.0)
-        one |= {"tm_s": self.tm_s, "p2": self.p2, "kr": 1.0}
+        """Return the measures of motions of given intensities x [m/s], shape (n,)."""
+        first, *other_names = model.term.inputs
+        unit_inputs = dict.fromkeys(model.term.inputs, 1.0)
+        unit_inputs |= {"tm_s": self.tm_s, "p2": self.p2, "kr": 1.0}
         # every term is in proportion to its first measure
-        unit = model.method.block.completed(one, model.term, SINGLE)["intensity_m_s"]
+        unit = model.method.block.completed(unit_inputs, model.term, SINGLE)["intensity_m_s"]
         measures = {first: x_m_s / unit}
-        if "pga_g" in others:
+        if "pga_g" in other_names:
             measures["pga_g"] = (
                 x_m_s / (self.pgv_over_pga_s * STANDARD_GRAVITY_M_S2)
                 if self.pga_g is None
                 else np.full(x_m_s.shape, self.pga_g)
             )
-        if "tm_s" in others:
+        if "tm_s" in other_names:
             measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
-        return measures | {name: np.full(x_m_s.shape, value) for name, value in self.others.items()}
+        return measures | {
+            name: np.full(x_m_s.shape, value) for name, value in self.block_inputs.items()
+        }
 
     def values(
         self, model: FragilityModel, x_m_s: FloatArray, kr: FloatArray
     ) -> dict[str, FloatArray | float]:
-        """Return these motions, and blocks of the size that is held with these k_r."""
+        """Return these motions, with blocks of the held size and given k_r."""
         return {"p2": self.p2, "kr": kr, **self.measures(model, x_m_s)}
 
 
@@ -83,7 +85,7 @@ def held_measures(
     pga_g: float | None = None,
     tm_s: float | None = None,
 ) -> HeldMeasures:
-    """Return what a figure of a model over one intensity holds.
+    """Return the variables held constant in a figure of a model against one intensity.
 
     What is not given is the middle, of the logarithms, of the range that was fitted: p², Tm, and
     PGV/(PGA g), to which PGA then keeps. Of a model that serves all sizes alike p² may be given for
@@ -134,7 +136,7 @@ def held_measures(
 
 
 def depends_on_size(model: FragilityModel) -> bool:
-    """Return whether P of a model depends on p² where y and the intensity are the same."""
+    """Return whether P of a model depends on p² at the same y and intensity."""
     if model.term.name not in ONE_NUMBER_TERMS:
         return True
     x = np.ones(_RATIOS.size)
@@ -190,14 +192,14 @@ def failure_line(
 
 
 def _of_probability(
-    probability: float, toppling: Callable[..., FloatArray], x_m_s: FloatArray, *others: FloatArray
+    probability: float, toppling: Callable[..., FloatArray], x_m_s: FloatArray, *columns: FloatArray
 ) -> FloatArray:
-    """Return y [m/s] where toppling(y, x, *others), which falls with y, has a given probability."""
+    """Return y [m/s] of given probability where toppling(y, x, *others) decreases with y."""
     ends = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
     root = find_root(
         lambda ln_y, *columns: toppling(np.exp(ln_y), *columns) - probability,
         ends,
-        args=(x_m_s, *others),
+        args=(x_m_s, *columns),
     )
     return np.asarray(np.exp(root.x), dtype=np.float64)
 
@@ -205,7 +207,7 @@ def _of_probability(
 def predicted_strengths(
     model: FragilityModel, table: CombinationTable, xp_m_s: FloatArray, probability: float
 ) -> FloatArray:
-    """Return the toppling velocity y [m/s] at which each motion topples a block so likely.
+    """Return the toppling velocity y [m/s] of given failure probability for each motion.
 
     Args:
         xp_m_s: toppling spectrum of each row [m/s], shape (n,).
@@ -215,22 +217,22 @@ def predicted_strengths(
     """
     stored = (name for name in INTENSITY if QUANTITIES[name].stored)
     columns = {name: table.measure(name) for name in ("p2", *stored)} | {"xp_m_s": xp_m_s}
-    given = {name: columns[name] for name in ("p2", *model.term.inputs)}
+    inputs = {name: columns[name] for name in ("p2", *model.term.inputs)}
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.sqrt(table.p2)
-        x = np.asarray(model.term.intensity_m_s({**given, "p": p}), dtype=np.float64)
-    known = np.isfinite(x) & (x > 0.0)
+        x = np.asarray(model.term.intensity_m_s({**inputs, "p": p}), dtype=np.float64)
+    valid = np.isfinite(x) & (x > 0.0)
     for name in model.term.inputs:
-        known &= np.isfinite(given[name])
-    given = {name: column[known] for name, column in given.items()}
+        valid &= np.isfinite(inputs[name])
+    inputs = {name: column[valid] for name, column in inputs.items()}
 
     def toppling(y_m_s: FloatArray, _: FloatArray, *columns: FloatArray) -> FloatArray:
-        one = dict(zip(given, columns, strict=True))
-        kr = y_m_s * np.sqrt(one["p2"]) / STANDARD_GRAVITY_M_S2
-        return array_answer(model, {**one, "kr": kr}, interval=False).probability
+        block_inputs = dict(zip(inputs, columns, strict=True))
+        kr = y_m_s * np.sqrt(block_inputs["p2"]) / STANDARD_GRAVITY_M_S2
+        return array_answer(model, {**block_inputs, "kr": kr}, interval=False).probability
 
     result = np.full(x.shape, np.nan)
-    result[known] = _of_probability(probability, toppling, x[known], *given.values())
+    result[valid] = _of_probability(probability, toppling, x[valid], *inputs.values())
     return result
 
 

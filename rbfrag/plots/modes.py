@@ -52,7 +52,7 @@ _HATCHED = (
 )
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
 _NARROW_G = 0.4
-_PLACES = 80
+_MOST_POSITIONS = 80
 _LINE_DEG, _LETTER_DEG = 6.6, 3.1
 _LEAST_AREA_DEG2 = 60.0
 """Of a line and a letter of a name on the chart, and of the least region with one."""
@@ -81,7 +81,7 @@ def plot_modes(
     ended: ShakenMass | None = None,
     **on_base: float,
 ) -> canvas.Picture:
-    """Draw which mode governs a block of given angles, and its yield acceleration.
+    """Draw the governing mode of blocks against their angles, and the yield acceleration.
 
     Dry and without a bond the modes do not depend on the dip of the base if there is a back
     fracture; the yield accelerations, and what is unstable or locked, do.
@@ -131,8 +131,8 @@ def plot_modes(
         title = _title(phi_deg, phi_back_deg, beta_deg, back_fracture, on_base, ended)
     figure.suptitle(title, fontsize=10)
     figure.draw_without_rendering()  # the extents of texts are known once the layout is
-    for lines, here in contours:
-        _write_values(chart, lines, here, names)
+    for lines, region in contours:
+        _write_values(chart, lines, region, names)
     return canvas.save_figure(figure, out)
 
 
@@ -148,11 +148,13 @@ def chart_cells(
     """
     a1, a3 = np.meshgrid(_CELLS, _CELLS)
     cells = _of_one_spacing(a1[a1 < a3], a3[a1 < a3], s1_m)
-    stated = {"phi_deg": phi_deg, "phi_back_deg": phi_back_deg, **strength}
-    known = {key: stated.get(key.split(".")[1]) for key in VARIABLES}
-    known |= {"base.dip_deg": beta_deg, "base.spacing_m": s1_m}
-    known |= {"block.size_factor": 1.0, "block.kv": 0.0}
-    drawn = {key: np.full(cells.size, each) for key, each in known.items() if each is not None}
+    inputs = {"phi_deg": phi_deg, "phi_back_deg": phi_back_deg, **strength}
+    parameters = {key: inputs.get(key.split(".")[1]) for key in VARIABLES}
+    parameters |= {"base.dip_deg": beta_deg, "base.spacing_m": s1_m}
+    parameters |= {"block.size_factor": 1.0, "block.kv": 0.0}
+    drawn = {
+        key: np.full(cells.size, value) for key, value in parameters.items() if value is not None
+    }
     drawn["back.dip_deg"] = beta_deg + cells.gamma_deg
     base_m = cells.half_s1_m * (cells.tan_alpha3 - cells.tan_alpha1)
     drawn["back.spacing_m"] = base_m * np.sin(np.radians(cells.gamma_deg))
@@ -160,7 +162,7 @@ def chart_cells(
 
 
 def _of_one_spacing(a1: FloatArray, a3: FloatArray, s1_m: float) -> BlockArray:
-    """Return blocks of given angles [deg] and of one spacing of the base fractures [m]."""
+    """Return blocks of given angles [deg] with the same spacing of the base fractures [m]."""
     return BlockArray.from_angles(a1, a3, 0.5 * s1_m / np.cos(np.radians(a3)))
 
 
@@ -221,7 +223,7 @@ def _pairs(
 
 
 class _Chart(NamedTuple):
-    """The sheet, the angles of its nodes [deg], which of them is a block, and what blocks do."""
+    """The axes, the angles of the nodes [deg], the mask of blocks, and their stability."""
 
     axes: Axes
     nodes: FloatArray
@@ -250,26 +252,26 @@ def _draw_regions(chart: _Chart) -> list[Patch]:
 
 
 def _draw_borders(chart: _Chart) -> None:
-    """Hatch what no motion decides about, and draw the borders of the modes."""
+    """Hatch unstable, locked and floating regions, and draw the borders of the modes."""
     axes, nodes = chart.axes, chart.nodes
     for code, hatch, _ in _HATCHED:
-        here = chart.in_state(code)
-        if here.any():
+        mask = chart.in_state(code)
+        if mask.any():
             axes.contourf(
-                nodes, nodes, here.astype(float), levels=[0.5, 1.5], colors="none",
+                nodes, nodes, mask.astype(float), levels=[0.5, 1.5], colors="none",
                 hatches=[hatch], zorder=2,
             ).set_edgecolor("#777777")  # fmt: skip
     for code in range(len(MODES)):
-        here = chart.of_mode(code)
-        if here.any():
+        mask = chart.of_mode(code)
+        if mask.any():
             axes.contour(
-                nodes, nodes, here.astype(float), levels=[0.5], colors="black", linewidths=1.2,
+                nodes, nodes, mask.astype(float), levels=[0.5], colors="black", linewidths=1.2,
                 zorder=3,
             )  # fmt: skip
 
 
 def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
-    """Colour the cells by the modes in which their blocks end; return what says so."""
+    """Colour the cells by the final modes of their blocks; return the legend entries."""
     from matplotlib.colors import to_rgba
     from matplotlib.patches import Patch
 
@@ -277,10 +279,10 @@ def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
     final, fails = ended.final_code[0], ended.code[0] == FAILS
     colours = np.ones((*a1.shape, 4))
     cells, patches = colours[a1 < a3], []
-    for text, here in (("fails", fails), ("stays", ~fails)):
-        for code in np.unique(final[here & (final != NO_MODE)]).tolist():
+    for text, mask in (("fails", fails), ("stays", ~fails)):
+        for code in np.unique(final[mask & (final != NO_MODE)]).tolist():
             colour = to_rgba(canvas.MODE_COLOURS[MODES[code]], _OPAQUE[text])
-            cells[here & (final == code)] = colour
+            cells[mask & (final == code)] = colour
             words = f"{text}: {MODES[code].replace('_', ' ')}"
             patches.append(Patch(facecolor=colour, label=words))
     colours[a1 < a3] = cells
@@ -290,20 +292,20 @@ def _draw_ends(chart: _Chart, ended: ShakenMass) -> list[Patch]:
 
 
 def _draw_yields(chart: _Chart) -> list[tuple[ContourSet, NDArray[np.bool_]]]:
-    """Draw the contours; return those of each mode and where it has them."""
+    """Draw the contours; return the contours and the region of each mode."""
     drawn: list[tuple[ContourSet, NDArray[np.bool_]]] = []
     values = chart.stability.yield_acceleration
     # Mode by mode: between topple and confined topple the yield jumps.
     for code, mode in enumerate(MODES):
-        here = chart.of_mode(code) & chart.in_state(STABLE)
-        if not here.any() or np.ptp(values[here]) < 1e-9:
+        region = chart.of_mode(code) & chart.in_state(STABLE)
+        if not region.any() or np.ptp(values[region]) < 1e-9:
             continue
         lines = chart.axes.contour(
-            chart.nodes, chart.nodes, np.ma.masked_where(~here, values),
-            levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
+            chart.nodes, chart.nodes, np.ma.masked_where(~region, values),
+            levels=_LEVELS if np.ptp(values[region]) > _NARROW_G else _FINE_LEVELS,
             colors=canvas.MODE_COLOURS[mode], linewidths=1.0, zorder=3,
         )  # fmt: skip
-        drawn.append((lines, here))
+        drawn.append((lines, region))
     return drawn
 
 
@@ -320,7 +322,7 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
             text += f"\n{values[0]:.3f} g"
         # Where no block is drawn, or at least where blocks are stable.
         areas = (stable & ~covered, stable, region)
-        tried = (_widest_point(here, letters) for letters in (text, "") for here in areas)
+        tried = (_widest_point(area, letters) for letters in (text, "") for area in areas)
         place = next((place for place in tried if place is not None), None)
         if place is None:
             continue
@@ -333,22 +335,22 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
 
 
 def _write_values(
-    chart: _Chart, lines: ContourSet, here: NDArray[np.bool_], texts: list[Text]
+    chart: _Chart, lines: ContourSet, region: NDArray[np.bool_], texts: list[Text]
 ) -> None:
-    """Write the values of contours where their region is widest, off all texts; append them.
+    """Write contour values at the widest points of their region, without overlap; append them.
 
     A line without such a place has no value beside it.
     """
     from scipy.ndimage import distance_transform_edt
 
     axes = chart.axes
-    to_rim: Any = distance_transform_edt(np.pad(here, 1))
+    to_rim: Any = distance_transform_edt(np.pad(region, 1))
     for level, path in zip(lines.levels, lines.get_paths(), strict=True):
-        places = np.asarray(path.vertices)
-        if not places.size:
+        points = np.asarray(path.vertices)
+        if not points.size:
             continue
-        places = places[:: max(1, len(places) // _PLACES)]
-        column, row = np.clip(((places + 90.0) / _STEP_DEG).astype(int), 0, len(here) - 1).T
+        points = points[:: max(1, len(points) // _MOST_POSITIONS)]
+        column, row = np.clip(((points + 90.0) / _STEP_DEG).astype(int), 0, len(region) - 1).T
         value = axes.text(
             0.0, 0.0, f"{level:g}", ha="center", va="center", fontsize=7.5,
             color=lines.get_edgecolor()[0], zorder=4, **halo(2.0),
@@ -356,11 +358,11 @@ def _write_values(
         value.set_in_layout(False)
         taken = [text.get_window_extent() for text in texts]
         for i in np.argsort(-to_rim[row + 1, column + 1], kind="stable"):
-            value.set_position(places[i])
+            value.set_position(points[i])
             box = value.get_window_extent().padded(_VALUE_APART_PX)
             corners = axes.transData.inverted().transform(box.corners())
             column_of, row_of = np.floor((corners + 90.0) / _STEP_DEG).astype(int).T
-            inside = (np.abs(corners) < 90.0).all() and here[row_of, column_of].all()
+            inside = (np.abs(corners) < 90.0).all() and region[row_of, column_of].all()
             if inside and not any(box.overlaps(other) for other in taken):
                 texts.append(value)
                 break
@@ -383,8 +385,8 @@ def _explain_hatches(chart: _Chart, patches: list[Patch]) -> None:
         ).set_zorder(8)  # fmt: skip
 
 
-def _widest_point(here: NDArray[np.bool_], text: str = "") -> tuple[int, int] | None:
-    """Return the place of a region furthest from its rim, of those where a text lies inside.
+def _widest_point(region: NDArray[np.bool_], text: str = "") -> tuple[int, int] | None:
+    """Return the point of a region furthest from its rim at which a text fits.
 
     None where it does not fit, or the region is too small for any.
     """
@@ -393,10 +395,10 @@ def _widest_point(here: NDArray[np.bool_], text: str = "") -> tuple[int, int] | 
     lines = text.splitlines()
     size = [_LINE_DEG * len(lines), _LETTER_DEG * max(map(len, lines), default=0)]
     steps = [max(1, round(length / _STEP_DEG)) for length in size]
-    fits = minimum_filter(here, size=steps, mode="constant")
-    if np.count_nonzero(here) * _STEP_DEG**2 < _LEAST_AREA_DEG2 or not fits.any():
+    fits = minimum_filter(region, size=steps, mode="constant")
+    if np.count_nonzero(region) * _STEP_DEG**2 < _LEAST_AREA_DEG2 or not fits.any():
         return None
-    distance: Any = distance_transform_edt(np.pad(here, 1))[1:-1, 1:-1] * fits
+    distance: Any = distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1] * fits
     widest = np.argwhere(distance > distance.max() - 0.5)
     # the middle of a band
     row, column = min(widest.tolist(), key=lambda place: math.dist(place, widest.mean(axis=0)))
@@ -406,7 +408,7 @@ def _widest_point(here: NDArray[np.bool_], text: str = "") -> tuple[int, int] | 
 def _draw_blocks(
     axes: Axes, nodes: FloatArray, a1: FloatArray, a3: FloatArray
 ) -> NDArray[np.bool_]:
-    """Draw the blocks; return where they cover the chart."""
+    """Draw the blocks; return the nodes that they cover."""
     edges = np.arange(-90.0, 90.0 + CELL_DEG, CELL_DEG)
     counts = np.histogram2d(a3, a1, bins=(edges, edges))[0]
     per_cell = np.searchsorted(edges, nodes) - 1

@@ -1,4 +1,4 @@
-"""The figures by what they show, in files or notebooks: `rbfrag.plot`."""
+"""Figures by subject, for files or notebooks: `rbfrag.plot`."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def chart(
     displacement_m: float | None = None,
     db: str | PathLike[str] | None = None,
 ) -> Picture:
-    """Draw lines of equal probability of toppling over intensity and block, to read by hand.
+    """Draw the design chart: lines of equal probability of toppling against intensity and block.
 
     Of other kinds than toppling: of failure over intensity and yield acceleration.
 
@@ -135,9 +135,9 @@ def chart(
 
         size = next((n for n in chosen.method.block.names if not n.startswith("k")), "p2")
         size = "p2" if size == "displacement_m" else size
-        stated = {size: p2, "pga_g": pga_g, "tm_s": tm_s, "displacement_m": displacement_m}
+        inputs = {size: p2, "pga_g": pga_g, "tm_s": tm_s, "displacement_m": displacement_m}
         return plot_kind_chart(
-            chosen, out, {name: value for name, value in stated.items() if value is not None}
+            chosen, out, {name: value for name, value in inputs.items() if value is not None}
         )
     if displacement_m is not None:
         raise InputError(
@@ -151,7 +151,7 @@ def chart(
 def planes(
     out: Out = None, *, face: str | None = None, base: str | None = None, back: str | None = None
 ) -> Picture:
-    """Draw a block's planes on a stereonet, and which planes are none of the face's section.
+    """Draw a block's planes on a stereonet, and mark planes that do not belong to the section.
 
     Args:
         out: as for :func:`fit`.
@@ -165,8 +165,8 @@ def planes(
     if face is None or base is None:
         name = "face" if face is None else "base"
         raise InputError(f"{name} is missing: give base and face as 25/102", fields=(name,))
-    stated = {"face": face, "base": base} | ({} if back is None else {"back": back})
-    return plot_planes({name: plane_of(text, name) for name, text in stated.items()}, out)
+    plane_texts = {"face": face, "base": base} | ({} if back is None else {"back": back})
+    return plot_planes({name: plane_of(text, name) for name, text in plane_texts.items()}, out)
 
 
 VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
@@ -174,7 +174,7 @@ VARIED = {"pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa10": "sa10_g"}
 
 
 class _OneCurve(TypedDict, total=False):
-    """Measures that are held, and what the curve is drawn into."""
+    """Keywords of the held measures and of the output of a curve."""
 
     out: Out
     sa_g: Mapping[float, float] | None
@@ -187,7 +187,7 @@ class FragilityCurveKeywords(
     _OneCurve,
     total=False,
 ):
-    """What a curve is of, what is held, and which model it is of."""
+    """Keywords of a fragility curve: block, held measures and model."""
 
 
 def curve(
@@ -200,7 +200,7 @@ def curve(
     compared: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
     **question: Unpack[FragilityCurveKeywords],
 ) -> Picture:
-    """Draw the fragility curve of one block over a measure of the shaking, with its interval.
+    """Draw the fragility curve of one block against an intensity measure, with its interval.
 
     Args:
         p2: frequency parameter p² of the block [1/s²], if it is not given by name.
@@ -215,7 +215,7 @@ def curve(
     """
     from rbfrag.plots.curve import plot_curve
 
-    numbers = [each for each in (p2, kr) if each is not None]
+    numbers = [number for number in (p2, kr) if number is not None]
     block, held, answering, drawing = parts_of(
         numbers, question, BLOCKS, INTENSITY, RANGE, _OneCurve.__optional_keys__
     )
@@ -234,10 +234,10 @@ def curve(
         chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
     if varied in held:
         raise InputError(f"{varied} is the axis of the curve: omit its value, or give another axis")
-    others = {} if compared is None else compared(varied)
+    comparisons = {} if compared is None else compared(varied)
     picture = plot_curve(
         chosen, group.numbers, drawing.get("out", out), over=varied, fixed=held,
-        level=answering.get("level", LEVEL), compared=others, sites=answering.get("sites"),
+        level=answering.get("level", LEVEL), compared=comparisons, sites=answering.get("sites"),
     )  # fmt: skip
     return replace(picture, warnings=blocks.remarks)
 
@@ -245,7 +245,7 @@ def curve(
 def sensitivity(
     out: Out = None, *, suite: str | None = None, db: str | PathLike[str] | None = None
 ) -> Picture:
-    """Draw critical k_r/PGA over the frequency ratio ω_m/p, with the lines of single pulses.
+    """Draw critical k_r/PGA against the frequency ratio ω_m/p, with the lines of single pulses.
 
     Args:
         out: as for :func:`fit`.
@@ -263,7 +263,7 @@ def sensitivity(
 def vertical(
     out: Out = None, *, suite: str | None = None, db: str | PathLike[str] | None = None
 ) -> Picture:
-    """Draw critical strengths with vertical motion and without it.
+    """Draw critical strengths with vertical motion against those without it.
 
     Args:
         out: as for :func:`fit`.
@@ -289,7 +289,7 @@ def calibration(
     seed: int = 0,
     db: str | PathLike[str] | None = None,
 ) -> Picture:
-    """Draw predicted and observed fractions that topple, with earthquakes held out in turn.
+    """Draw predicted probabilities against observed fractions, with earthquakes held out.
 
     Args:
         out: as for :func:`fit`.
@@ -305,7 +305,9 @@ def calibration(
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         names: Sequence[str | None] = models or [None]
         answers = [held_out_of(connection, name, seed=seed) for name in names]
-    bins, scores = ({each.name: getattr(each, of) for each in answers} for of in ("bins", "scores"))
+    bins, scores = (
+        {answer.name: getattr(answer, of) for answer in answers} for of in ("bins", "scores")
+    )
     return plot_calibration(bins, out, scores=scores, data=answers[0].outcomes)
 
 
@@ -318,7 +320,7 @@ def response(
     vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
 ) -> Picture:
-    """Draw acceleration against k_r(θ), and θ over the critical angle, in time.
+    """Draw acceleration against k_r(θ), and the ratio of θ to the critical angle, over time.
 
     Args:
         motion: horizontal ground motion, or its file.
@@ -340,7 +342,7 @@ def response(
 
 
 class _OfRockMass(Protocol):
-    """What :func:`rbfrag.rockmass` answers."""
+    """Answer of :func:`rbfrag.rockmass`."""
 
     @property
     def blocks(self) -> Realisations: ...
@@ -351,7 +353,7 @@ class _OfRockMass(Protocol):
 
 
 def rockmass(answer: _OfRockMass, out: Out = None) -> Picture:
-    """Draw the cumulative counts of blocks against PGA by mode; with a motion the shares that fail.
+    """Draw the cumulative counts of blocks against PGA by mode; with a motion those that fail.
 
     Args:
         answer: of :func:`rbfrag.rockmass`.
@@ -366,7 +368,7 @@ def rockmass(answer: _OfRockMass, out: Out = None) -> Picture:
 
 
 class _OfMap(Protocol):
-    """What :func:`rbfrag.shakemap` answers."""
+    """Answer of :func:`rbfrag.shakemap`."""
 
     @property
     def columns(self) -> Mapping[str, Any]: ...

@@ -1,4 +1,4 @@
-"""Figures of one response in time: acceleration against strength, and where the block went."""
+"""Figures of one response over time: acceleration against strength, and motion of the block."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def plot_response(
     reverse: bool = False,
     title: str = "",
 ) -> canvas.Picture:
-    """Draw one response as the dissertation reads it and write it to `path`.
+    """Draw one toppling response in the form of Gibson's dissertation and write it to `path`.
 
     The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength left
     at the present rotation, k_r(theta) = tan(theta_c - theta): the block accelerates
@@ -76,16 +76,16 @@ def plot_response(
 
 
 def _name_balance(axes: Axes, ratio: float, name: str) -> None:
-    """Write a name on the line of a rotation."""
+    """Write a name on the line of a rotation ratio."""
     at = (0.005, ratio)
     write_near(axes, name, at, (1, 3), ha="left", xycoords=("axes fraction", "data"), fontsize=8,
                color=STRENGTH, movable=False)  # fmt: skip
 
 
-def _name_time(axes: Axes, time_s: float, what: str, height: float) -> None:
-    """Write beside an upright line what happens there; above its place, or below it in the top."""
+def _name_time(axes: Axes, time_s: float, label: str, height: float) -> None:
+    """Write the event at a vertical line, above the position, or below it near the top."""
     write_near(
-        axes, f"{what} at {time_s:.2f} s", (time_s, height), (-3, 3 if height < 0.5 else -3),
+        axes, f"{label} at {time_s:.2f} s", (time_s, height), (-3, 3 if height < 0.5 else -3),
         xycoords=("data", "axes fraction"), rotation=90, fontsize=8,
     )  # fmt: skip
 
@@ -93,7 +93,7 @@ def _name_time(axes: Axes, time_s: float, what: str, height: float) -> None:
 def _panels(
     history: ResponseHistory, strength: FloatArray, label: str, least_top: float
 ) -> tuple[Figure, Axes, Axes]:
-    """Draw acceleration against strength; return the figure, its upper and its empty lower part."""
+    """Draw acceleration against strength; return the figure, its upper and its empty lower axes."""
     figure = canvas.new_figure(width_in=7.5, height_in=5.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
     driving = history.k_h / (1.0 + history.k_v)
@@ -114,7 +114,7 @@ def _title(name: str, reverse: bool, verdict: str) -> str:
 
 
 def _window(time_s: FloatArray, ratio: FloatArray, response: Response) -> tuple[float, float]:
-    """Show the whole motion of the block with a little rest on both sides."""
+    """Return the time range of the motion of the block, with a short rest on both sides."""
     if response.started_s is None:
         return float(time_s[0]), float(max(time_s[-1], time_s[0] + 1e-3))
     first = response.started_s - QUIET_BEFORE_S
@@ -153,8 +153,8 @@ def plot_motion(
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
         raise InputError("this response holds no displacements in time: use history=True")
-    known = np.isfinite(history.strength_g)
-    label = f"strength of the block{'' if known.all() else ', while its contacts hold'}"
+    has_strength = np.isfinite(history.strength_g)
+    label = f"strength of the block{'' if has_strength.all() else ', while its contacts hold'}"
     figure, upper, lower = _panels(
         history, history.strength_g, label, _least_top(history.strength_g)
     )
@@ -180,13 +180,13 @@ def plot_motion(
 
 
 def _least_top(strength_g: FloatArray) -> float:
-    """Return the first strength that is known; 0 where none is."""
-    known = strength_g[np.isfinite(strength_g)]
-    return float(known[0]) if known.size else 0.0
+    """Return the first finite strength; 0 where there is none."""
+    values = strength_g[np.isfinite(strength_g)]
+    return float(values[0]) if values.size else 0.0
 
 
 def _motion_window(history: ResponseHistory, response: Response) -> tuple[float, float]:
-    """Show the whole motion of the block with a little rest on both sides."""
+    """Return the time range of the motion of the block, with a short rest on both sides."""
     first, last = float(history.time_s[0]), float(history.time_s[-1])
     if response.started_s is None or response.stopped_s is None:
         return first, max(last, first + 1e-3)
@@ -194,7 +194,7 @@ def _motion_window(history: ResponseHistory, response: Response) -> tuple[float,
 
 
 def _around(largest: float, least: float) -> tuple[float, float]:
-    """Return limits that leave some air, and put zero at one height on both axes."""
+    """Return axis limits with a margin that put zero at the same height on both axes."""
     span = largest if largest > 0.0 else 1.0
     return min(-0.06 * span, 1.1 * least), 1.12 * span
 

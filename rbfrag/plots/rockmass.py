@@ -1,4 +1,4 @@
-"""Figures of a rock mass: cumulative counts against PGA, and what a motion brings down, by mode."""
+"""Figures of a rock mass: cumulative counts against PGA, and failures under a motion, by mode."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TITLE_WIDTH = 90
 
 @canvas.in_own_style
 def plot_rockmass(realisations: Realisations, path: canvas.Out) -> canvas.Picture:
-    """Draw the cumulative counts of blocks against PGA by mode, and the shares of the modes.
+    """Draw the cumulative counts of blocks against PGA by mode, and the fractions of the modes.
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
     compared; where two of them cross is marked.
@@ -120,7 +120,7 @@ PARTS = (
 
 @canvas.in_own_style
 def plot_failures(shaken: ShakenMass, path: canvas.Out, *, level: float = 0.95) -> canvas.Picture:
-    """Draw the share of the blocks that fail against the scale of the motion, by mode.
+    """Draw the fraction of blocks that fail against the scale of the motion, by mode.
 
     Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at
     the scale nearest to that. With one scale there is that alone.
@@ -130,7 +130,7 @@ def plot_failures(shaken: ShakenMass, path: canvas.Out, *, level: float = 0.95) 
     """
     canvas.plot_path(path)
     by_scale = failures(shaken, level)
-    bars_of = min(by_scale, key=lambda each: abs(np.log(each.scale)))
+    bars_of = min(by_scale, key=lambda result: abs(np.log(result.scale)))
     width_in = 1.9 + 0.75 * (1 + len(bars_of.modes))
     if len(by_scale) > 1:
         figure = canvas.new_figure(5.4 + width_in, 4.6)
@@ -146,20 +146,22 @@ def plot_failures(shaken: ShakenMass, path: canvas.Out, *, level: float = 0.95) 
 
 
 def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) -> None:
-    scales = [each.scale for each in by_scale]
+    scales = [result.scale for result in by_scale]
     # broad and below the others, because a mode alone may make up the whole of it
-    _draw_share(axes, scales, [each.total for each in by_scale], "all blocks", "-", "#404040", 4.0)
+    _draw_share(
+        axes, scales, [result.total for result in by_scale], "all blocks", "-", "#404040", 4.0
+    )
     for mode in by_scale[0].modes:
-        of_mode = [each.modes[mode] for each in by_scale]
+        of_mode = [result.modes[mode] for result in by_scale]
         label, line, colour = (
             canvas.mode_title(mode),
             canvas.MODE_LINES[mode],
             canvas.MODE_COLOURS[mode],
         )
         _draw_share(axes, scales, of_mode, label, line, colour, 1.8)
-    unknown = np.array([each.total.open_of_all for each in by_scale])
+    unknown = np.array([result.total.open_of_all for result in by_scale])
     if unknown.any():
-        fails = np.array([each.total.of_all.value for each in by_scale])
+        fails = np.array([result.total.of_all.value for result in by_scale])
         axes.fill_between(scales, 100.0 * fails, 100.0 * (fails + unknown), color=PARTS[2][2],
                           alpha=0.3, lw=0, label="not known")  # fmt: skip
     axes.set_xlim(0.0, 1.02 * scales[-1])
@@ -178,7 +180,7 @@ def _draw_share(
     colour: str, width: float,
 ) -> None:  # fmt: skip
     share, low, high = (
-        [100.0 * getattr(each.of_all, name) for each in failures]
+        [100.0 * getattr(result.of_all, name) for result in failures]
         for name in ("value", "low", "high")
     )
     axes.plot(scales, share, line, color=colour, lw=width, marker="o", ms=3.5, label=label)
@@ -193,14 +195,14 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
     at = np.arange(len(rows))
     bottom = np.zeros(len(rows))
     for part, label, colour in PARTS:
-        heights = np.array([100.0 * _part(each, part) / each.count for _, each in rows])
+        heights = np.array([100.0 * _part(result, part) / result.count for _, result in rows])
         if not heights.any():
             continue
         axes.bar(at, heights, width=0.7, bottom=bottom, color=colour, label=label)
         bottom += heights
-    for place, (_, each) in zip(at, rows, strict=True):
-        assert each.of_mode is not None
-        text = f"{percent(each.of_mode.value)}\nof {each.count}"
+    for place, (_, result) in zip(at, rows, strict=True):
+        assert result.of_mode is not None
+        text = f"{percent(result.of_mode.value)}\nof {result.count}"
         write_near(axes, text, (float(place), 100.0), (0, 3), movable=False, fontsize=8.5)
     _name_bars(axes, [mode for mode, _ in rows])
     axes.set_ylim(0.0, 113.0)
@@ -210,12 +212,12 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
 
 
-def _part(each: ModeFailures, part: str) -> int:
+def _part(result: ModeFailures, part: str) -> int:
     if part == "open":
-        return each.open
+        return result.open
     if part == "at_rest":
-        return each.outcomes["at_rest"] + each.outcomes["locked"]
-    return each.outcomes[part]
+        return result.outcomes["at_rest"] + result.outcomes["locked"]
+    return result.outcomes[part]
 
 
 def _shaken_title(shaken: ShakenMass, letters: int) -> str:

@@ -1,4 +1,4 @@
-"""Figure of the yield of a block that turns against its back plane, over the rotation."""
+"""Figure of the yield acceleration of a block that rotates against its back plane."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LINES = ("-", "--", ":", "-.")
 
 
 class YieldLine(NamedTuple):
-    """The yield over the rotation for one share.
+    """Yield acceleration against rotation for one fraction.
 
     Args:
         share: by how much of the block's rotation the back plane turns.
@@ -53,7 +53,7 @@ def plot_rotation(
     phi_back_deg: float | None = None,
     back_follows: Sequence[float] = SHARES,
 ) -> canvas.Picture:
-    """Draw the yield of a slump or a confined topple over its rotation.
+    """Draw the yield acceleration of a slump or a confined topple against its rotation.
 
     The figures 3.20a, 3.20b and 3.21 of Gibson's dissertation, for any block.
 
@@ -127,7 +127,7 @@ def _curves(
     phi_back_deg: float | None,
     shares: Sequence[float],
 ) -> tuple[Stability, list[tuple[float, FloatArray, FloatArray]]]:
-    """Return how the block stands, and of each share the rotations [deg] and the yields [g]."""
+    """Return the stability, and rotations [deg] and yields [g] for each fraction."""
     planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
     judged = stability(block, **planes)  # type: ignore[arg-type]
     if judged.mode not in BY_MODE:

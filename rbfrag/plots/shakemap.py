@@ -47,7 +47,9 @@ def plot_shakemap(
     if not np.isfinite(probability).any():
         raise InputError("no probability to draw")
     if shape is None:
-        lon, lat, probability = (each[np.isfinite(probability)] for each in (lon, lat, probability))
+        lon, lat, probability = (
+            column[np.isfinite(probability)] for column in (lon, lat, probability)
+        )
     west, east, south, north = _frame(lon, lat, probability, epicentre)
     middle = math.cos(math.radians(0.5 * (south + north)))
     wide = max((east - west) * middle, 1e-3)
@@ -92,7 +94,7 @@ def plot_shakemap(
 def _frame(
     lon: FloatArray, lat: FloatArray, probability: FloatArray, epicentre: tuple[float, float] | None
 ) -> tuple[float, float, float, float]:
-    """Return west, east, south, north around all that is coloured, within the places given."""
+    """Return west, east, south and north limits of all coloured locations, within the data."""
     shown = probability >= LEAST
     if not shown.any():
         shown = np.ones(lon.shape, dtype=bool)
@@ -112,10 +114,10 @@ def _frame(
 
 
 def _scale(axes: Axes, west: float, east: float, south: float, north: float, cos: float) -> None:
-    whole = (east - west) * cos * _KM_PER_DEGREE
-    if whole <= 0.0:
+    width_km = (east - west) * cos * _KM_PER_DEGREE
+    if width_km <= 0.0:
         return
-    target = 0.25 * whole
+    target = 0.25 * width_km
     unit = 10.0 ** math.floor(math.log10(target))
     length = max(step * unit for step in (1.0, 2.0, 5.0) if step * unit <= target)
     width = length / (_KM_PER_DEGREE * cos)

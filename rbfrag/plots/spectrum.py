@@ -1,4 +1,4 @@
-"""Figure of toppling spectra: what motions can topple, over the size of the block."""
+"""Figure of toppling spectra against the size of the block."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LOWEST_PART = 0.02
 
 
 def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
-    """Distance r3 from centroid to toe of a rectangular block of the given p² [m]."""
+    """Return the distance r3 from centroid to toe of a rectangular block of given p² [m]."""
     # the axis also asks for its two ends at zero and infinity
     with np.errstate(divide="ignore"):
         size: NDArray[np.float64] = 0.75 * STANDARD_GRAVITY_M_S2 / np.asarray(p2, dtype=np.float64)
@@ -46,7 +46,7 @@ def plot_spectrum(
     p2: Sequence[float] = (0.1, 30.0),
     names: Sequence[str] = (),
 ) -> canvas.Picture:
-    """Draw the toppling spectra of several motions with the PGV of each.
+    """Draw the toppling spectra of several motions with their PGV.
 
     Args:
         motions: up to eight motions or their files.
@@ -56,8 +56,8 @@ def plot_spectrum(
         names: names of the motions in the legend; their labels if empty.
     """
     canvas.plot_path(out)
-    given: Any = motions if isinstance(motions, list | tuple) else [motions]
-    records = [as_motion(each) for each in given]
+    sources: Any = motions if isinstance(motions, list | tuple) else [motions]
+    records = [as_motion(source) for source in sources]
     if not 1 <= len(records) <= MOST_MOTIONS:
         raise InputError(
             f"{len(records)} motions: a figure of spectra shows 1 to {MOST_MOTIONS} of them"
@@ -92,7 +92,7 @@ def plot_spectrum(
     above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
     above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
     canvas.written_numbers(above.xaxis, 1.0, 2.0, 5.0)
-    key = [(f"$X(p)$, {each}", LINES[each]) for each in polarities]
+    key = [(f"$X(p)$, {name}", LINES[name]) for name in polarities]
     for label, style in (*key, ("PGV, either polarity", ":")):
         axes.plot([], [], style, color="black", lw=1.2, label=label)
     canvas.legend_below(figure, 2)

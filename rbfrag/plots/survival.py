@@ -1,4 +1,4 @@
-"""Figure of what standing blocks say of a hazard: curves, survival over the factor, weights."""
+"""Figure of the survival of standing blocks: hazard curves, survival by factor, weights."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def plot_survival(
     imt: str | None = None,
     site: str | None = None,
 ) -> canvas.Picture:
-    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights.
+    """Draw hazard curves, the survival of the blocks against a factor on their rates, and weights.
 
     Args:
         curves: hazard curves, or their files.
@@ -56,7 +56,7 @@ def plot_survival(
         site: as for :func:`rbfrag.hazard`.
     """
     canvas.plot_path(out)
-    weighted = [one for one in answer.branches if one.weight is not None]
+    weighted = [branch for branch in answer.branches if branch.weight is not None]
     figure = canvas.new_figure(11.0 if weighted else 9.0, 4.6)
     ratios = (1.0, 1.0, 0.7) if weighted else (1.0, 1.0)
     panels = figure.subplots(1, len(ratios), width_ratios=ratios)
@@ -80,7 +80,7 @@ def _style(i: int, curves: int) -> dict[str, Any]:
 
 
 def _short(name: str) -> str:
-    """Return a name without the folders of a file."""
+    """Return a name without folders."""
     return as_written(name.rpartition("/")[2], 24, lines=2)
 
 
@@ -116,7 +116,11 @@ def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
             )
     axes.set_ylim(0.0, 100.0)
     canvas.written_numbers(axes.xaxis, 1.0)
-    near = [one for one in (answer.factor_5_percent, answer.factor_50_percent) if one is not None]
+    near = [
+        factor
+        for factor in (answer.factor_5_percent, answer.factor_50_percent)
+        if factor is not None
+    ]
     axes.set_xlim(max(min([0.1, *near]) / 3.0, 0.001), min(max([3.0, *near]) * 3.0, 1000.0))
     axes.set_xlabel("factor on all hazard rates")
     axes.set_ylabel("probability of standing [%]")
@@ -129,17 +133,19 @@ def _percent(standing: Standing) -> NDArray[np.float64]:
 
 
 def _draw_weights(axes: Axes, branches: Sequence[BranchSurvival]) -> None:
-    named = sorted(branches, key=lambda one: -(one.weight_given_standing or 0.0))[:_MOST_NAMED]
+    named = sorted(branches, key=lambda branch: -(branch.weight_given_standing or 0.0))[
+        :_MOST_NAMED
+    ]
     title = "branches"
     if len(named) < len(branches):
         branches, title = named, f"{_MOST_NAMED} of {len(branches)} branches"
     at = np.arange(len(branches))
-    before = [100.0 * (one.weight or 0.0) for one in branches]
-    after = [100.0 * (one.weight_given_standing or 0.0) for one in branches]
+    before = [100.0 * (branch.weight or 0.0) for branch in branches]
+    after = [100.0 * (branch.weight_given_standing or 0.0) for branch in branches]
     axes.barh(at - 0.2, before, 0.38, color="#bbbbbb", label="weight before")
     axes.barh(at + 0.2, after, 0.38, color=canvas.RED, label="weight given standing")
     size = 10.0 if len(branches) <= 5 else 8.0
-    axes.set_yticks(at, [_short(one.name) for one in branches], fontsize=size)
+    axes.set_yticks(at, [_short(branch.name) for branch in branches], fontsize=size)
     axes.invert_yaxis()
     axes.set_xlabel("weight [%]")
     axes.set_title(title, fontsize=10)

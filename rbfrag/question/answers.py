@@ -1,4 +1,4 @@
-"""The answers for many blocks, of which each kind has its own model."""
+"""Predictions for arrays of blocks; each kind of failure has its own model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rbfrag.fragility.model import AT_REST, FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given, with_remarks
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
-from rbfrag.question.blocks import Blocks, Refused, one_block
+from rbfrag.question.blocks import Blocks, InvalidBlocks, one_block
 from rbfrag.question.many import many_blocks
 from rbfrag.question.shapes import PLANE_TEXTS
 from rbfrag.results.diagnostic import Diagnostic, diagnostics
@@ -29,7 +29,7 @@ _COLUMNS = (
 
 
 def ask_many(
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     kind: str | Sequence[str | None] | None,
     mode: Sequence[str | None] | None,
     *,
@@ -41,10 +41,10 @@ def ask_many(
     sites: float | None,
     find: Callable[[Mapping[str, Any], str | None], FragilityModel],
 ) -> Prediction | PredictionArray:
-    """Return the answers for blocks that are described by shapes, or are of several kinds.
+    """Return the predictions for blocks given by their geometry, or of several kinds.
 
     Args:
-        given: fields of block and shaking: numbers or arrays.
+        inputs: fields of block and shaking: numbers or arrays.
         kind: how they fail, for all or one each.
         mode: failure modes that are stated, one each.
         rows: the arrays are columns of a table.
@@ -58,10 +58,10 @@ def ask_many(
     Raises:
         InputError: nothing of it can be answered for, or, if asked, an element.
     """
-    numbers = dict(given)
-    each = {"kind": kind, "mode": mode}
+    numbers = dict(inputs)
+    labels = {"kind": kind, "mode": mode}
     texts = {
-        n: np.zeros(len(v)) for n, v in each.items() if v is not None and not isinstance(v, str)
+        n: np.zeros(len(v)) for n, v in labels.items() if v is not None and not isinstance(v, str)
     }
     planes = {
         name: np.array(numbers.pop(name), dtype=object) for name in PLANE_TEXTS if name in numbers
@@ -78,55 +78,60 @@ def ask_many(
     if not rows:
         _refuse_unread(blocks, block)
     if weights is not None:
-        return _of_draws(blocks, given, level, weights, sites, size, find)
+        return _of_draws(blocks, inputs, level, weights, sites, size, find)
     refused, parts = list(blocks.refused), []
     for group in blocks.groups:
-        places = group.places
-        assert places is not None
-        own = {**group.numbers, **{n: v if v.size == 1 else v[places] for n, v in measures.items()}}
+        indices = group.indices
+        assert indices is not None
+        group_inputs = {
+            **group.numbers,
+            **{n: v if v.size == 1 else v[indices] for n, v in measures.items()},
+        }
         try:
-            chosen = find(own, group.kind)
-            own = chosen.method.block.filled(own) if rows else own
-            own = {n: np.broadcast_to(v, places.shape) for n, v in own.items()}
-            answer = answer_given(chosen, own, level, interval=interval, sites=sites)
+            chosen = find(group_inputs, group.kind)
+            group_inputs = chosen.method.block.filled(group_inputs) if rows else group_inputs
+            group_inputs = {n: np.broadcast_to(v, indices.shape) for n, v in group_inputs.items()}
+            answer = answer_given(chosen, group_inputs, level, interval=interval, sites=sites)
         except (InputError, ModelError) as error:
             if len(blocks.groups) == 1:
                 raise
-            refused.append(Refused(places, str(error), {}))
+            refused.append(InvalidBlocks(indices, str(error), {}))
             continue
         assert isinstance(answer, PredictionArray)
-        parts.append((places, with_remarks(answer, unused_measures(chosen, own))))
+        parts.append((indices, with_remarks(answer, unused_measures(chosen, group_inputs))))
     if nan == "raise":
         _refuse(refused, parts, blocks, shape)
     return _together(parts, refused, blocks, shape, level, index_of(numbers))
 
 
-def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
-    """Return blocks as answers read them, and their number.
+def blocks_of_arrays(inputs: Mapping[str, Any]) -> tuple[Blocks, int]:
+    """Return classified blocks, and their number.
 
     Args:
-        given: fields of the blocks, with ``kind``, ``block`` and ``back_fracture``: numbers, or
+        inputs: fields of the blocks, with ``kind``, ``block`` and ``back_fracture``: numbers, or
             arrays of shape (m,); None for what is not stated.
 
     Raises:
         InputError: arrays of different lengths, or a field that the blocks do not read.
     """
-    known = {name: value for name, value in given.items() if value is not None}
-    kind = known.pop("kind", None)
-    if "block" in known:
-        return one_block(known, kind), 1
-    each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
+    block_fields = {name: value for name, value in inputs.items() if value is not None}
+    kind = block_fields.pop("kind", None)
+    if "block" in block_fields:
+        return one_block(block_fields, kind), 1
+    kinds = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
     planes = {
-        name: np.array(known.pop(name), dtype=object) for name in PLANE_TEXTS if name in known
+        name: np.array(block_fields.pop(name), dtype=object)
+        for name in PLANE_TEXTS
+        if name in block_fields
     }
     each_text = {name: np.zeros(text.shape) for name, text in planes.items()}
-    values, shape = flat({**known, **each, **each_text})
+    values, shape = flat({**block_fields, **kinds, **each_text})
     size = int(np.prod(shape))
-    numbers: dict[str, Any] = {name: values[name] for name in known}
+    numbers: dict[str, Any] = {name: values[name] for name in block_fields}
     numbers |= {name: np.broadcast_to(text, shape).ravel() for name, text in planes.items()}
     blocks = many_blocks(numbers, size, kinds=kind)
-    if not each:  # of a table that states the kinds, others may read what these do not
-        _refuse_unread(blocks, known)
+    if not kinds:  # of a table that states the kinds, others may read what these do not
+        _refuse_unread(blocks, block_fields)
     return blocks, size
 
 
@@ -140,33 +145,33 @@ def _refuse_unread(blocks: Blocks, names: Collection[str]) -> None:
 
 
 def block_reasons_of(blocks: Blocks, size: int) -> NDArray[np.object_]:
-    """Return why blocks wait for no earthquake, shape (m,); empty texts for those that do."""
+    """Return why blocks cannot fail in an earthquake, shape (m,); an empty text where they can."""
     reasons = np.full(size, "", dtype=object)
-    for each in (*blocks.refused, *blocks.unstable):
-        reasons[each.places] = each.texts()
+    for invalid in (*blocks.refused, *blocks.unstable):
+        reasons[invalid.indices] = invalid.texts()
     for group in blocks.groups:
-        places = np.arange(size) if group.places is None else group.places
-        own = {n: np.broadcast_to(v, places.shape) for n, v in group.numbers.items()}
-        reasons[places] = block_reasons(block_of(own, group.kind), own)
+        indices = np.arange(size) if group.indices is None else group.indices
+        numbers = {n: np.broadcast_to(v, indices.shape) for n, v in group.numbers.items()}
+        reasons[indices] = block_reasons(block_of(numbers, group.kind), numbers)
     return reasons
 
 
 def _refuse(
-    refused: Sequence[Refused],
+    refused: Sequence[InvalidBlocks],
     parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
     blocks: Blocks,
     shape: tuple[int, ...],
 ) -> None:
-    """Refuse the first element that has no answer, and one that falls at rest."""
+    """Reject the first element without a prediction, or that is unstable at rest."""
     reasons: dict[int, str] = {}
-    for each in refused:
-        reasons |= dict(zip(each.places.tolist(), each.texts().tolist(), strict=True))
-    for places, answer in parts:
+    for invalid in refused:
+        reasons |= dict(zip(invalid.indices.tolist(), invalid.texts().tolist(), strict=True))
+    for indices, answer in parts:
         missing = np.flatnonzero(np.isnan(answer.probability) | (answer.reason == "unstable"))
         texts = answer.reason[missing].tolist()
-        reasons |= dict(zip(places[missing].tolist(), texts, strict=True))
-    for each in blocks.unstable:
-        reasons |= dict.fromkeys(each.places.tolist(), "unstable")
+        reasons |= dict(zip(indices[missing].tolist(), texts, strict=True))
+    for invalid in blocks.unstable:
+        reasons |= dict.fromkeys(invalid.indices.tolist(), "unstable")
     if reasons:
         first = min(reasons)
         where = tuple(int(i) for i in np.unravel_index(first, shape))
@@ -175,57 +180,57 @@ def _refuse(
 
 def _of_draws(
     blocks: Blocks,
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     level: float,
     weights: ArrayLike,
     sites: float | None,
     size: int,
     find: Callable[[Mapping[str, Any], str | None], FragilityModel],
 ) -> Prediction | PredictionArray:
-    """Return the one answer over draws of a block, all of which fail in one way."""
-    whole = [group for group in blocks.groups if group.places is not None]
-    if len(whole) != 1 or whole[0].places is None or whole[0].places.size != size:
-        at_rest = sum(each.places.size for each in blocks.unstable)
-        first = next((f": {each.texts()[0]}" for each in blocks.refused), "")
-        kinds = " and ".join(str(group.kind) for group in whole) or "none"
+    """Return one prediction averaged over draws of a block, all of one kind."""
+    groups = [group for group in blocks.groups if group.indices is not None]
+    if len(groups) != 1 or groups[0].indices is None or groups[0].indices.size != size:
+        at_rest = sum(invalid.indices.size for invalid in blocks.unstable)
+        first = next((f": {invalid.texts()[0]}" for invalid in blocks.refused), "")
+        kinds = " and ".join(str(group.kind) for group in groups) or "none"
         raise InputError(
             f"all draws of a block must have one kind, not {kinds}"
             + (f", {at_rest} are unstable at rest" if at_rest else "")
             + first
         )
-    (group,) = whole
-    own = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
-    chosen = find(own, group.kind)
-    answer = answer_given(chosen, own, level, weights=weights, sites=sites)
-    return with_remarks(answer, unused_measures(chosen, own))
+    (group,) = groups
+    group_inputs = {**group.numbers, **{name: inputs[name] for name in inputs if name in MEASURES}}
+    chosen = find(group_inputs, group.kind)
+    answer = answer_given(chosen, group_inputs, level, weights=weights, sites=sites)
+    return with_remarks(answer, unused_measures(chosen, group_inputs))
 
 
 def _together(
     parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
-    refused: Sequence[Refused],
+    refused: Sequence[InvalidBlocks],
     blocks: Blocks,
     shape: tuple[int, ...],
     level: float,
     index: Any,
 ) -> PredictionArray:
-    """Return the answers of several models as one, in the order of the blocks."""
+    """Combine the predictions of several models in the order of the blocks."""
     size = int(np.prod(shape))
     columns: dict[str, Any] = {}
     for name in _COLUMNS:
-        known = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
-        if known or name != "block_sd":
+        pieces = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
+        if pieces or name != "block_sd":
             columns[name] = column = np.full(size, np.nan)
-            for at, value in known:
+            for at, value in pieces:
                 column[at] = value
     in_domain = np.zeros(size, dtype=np.bool_)
     reasons: list[ReasonPart] = []
     for at, part in parts:
         in_domain[at] = part.in_domain
-        reasons += [(at[places], texts) for places, texts in part.reasons.parts]
-    reasons += [(each.places, each.texts) for each in refused]
+        reasons += [(at[indices], texts) for indices, texts in part.reasons.parts]
+    reasons += [(entry.indices, entry.texts) for entry in refused]
     ruled: list[ReasonPart] = [(at, partial(getattr, part, "how")) for at, part in parts]
     nothing = np.empty(0, dtype=np.intp)
-    unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
+    unstable = np.concatenate([nothing, *(entry.indices for entry in blocks.unstable)])
     at_rest: tuple[Diagnostic, ...] = ()
     if unstable.size:
         at_rest = (Diagnostic(AT_REST, "unstable_at_rest", rows=unstable),)
@@ -248,7 +253,9 @@ def _together(
 
     warnings = (in_order(w, at) for at, part in parts for w in diagnostics(part.warnings))
     codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes}
-    grid: dict[str, Any] = {n: each.reshape(shape) for n, each in codes.items() if each is not None}
+    grid: dict[str, Any] = {
+        n: entry.reshape(shape) for n, entry in codes.items() if entry is not None
+    }
     return PredictionArray(
         kind=named("kind"),
         in_domain=in_domain.reshape(shape),

@@ -1,4 +1,4 @@
-"""The shaking of an earthquake by magnitude, distance and ground, after Boore and others.
+"""Ground motion from magnitude, distance and Vs30: the model of Boore et al. (2014), BSSA14.
 
 Boore, D. M., Stewart, J. P., Seyhan, E. & Atkinson, G. M. (2014): NGA-West2 equations for
 predicting PGA, PGV, and 5% damped PSA for shallow crustal earthquakes. Earthquake Spectra 30(3),
@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from rbfrag.fragility.method import Numbers
+from rbfrag.fragility.method import ArrayNamespace
 
 MECHANISMS = ("unspecified", "strike-slip", "normal", "reverse")
 
 
 class _Coefficients(NamedTuple):
-    """Of one measure; e0 holds a value for each mechanism."""
+    """Coefficients of one intensity measure; e0 holds a value for each mechanism."""
 
     mh: float
     e0: tuple[float, float, float, float]
@@ -72,7 +72,7 @@ _ROCK_M_S = 760.0
 
 
 class Ordinate(NamedTuple):
-    """A measure of RotD50, whose logarithm is normal.
+    """Intensity measure of component RotD50 with a lognormal distribution.
 
     Args:
         median: its median in its unit.
@@ -84,15 +84,15 @@ class Ordinate(NamedTuple):
     tau: Any
     phi: Any
 
-    def sigma(self, ns: Numbers) -> Any:
+    def sigma(self, ns: ArrayNamespace) -> Any:
         """Return the total standard deviation."""
         return ns.sqrt(self.tau * self.tau + self.phi * self.phi)
 
 
 def bssa14(
-    measure: str, magnitude: Any, rjb_km: Any, vs30_m_s: Any, mechanism: Any, ns: Numbers
+    measure: str, magnitude: Any, rjb_km: Any, vs30_m_s: Any, mechanism: Any, ns: ArrayNamespace
 ) -> Ordinate:
-    """Return a measure of the shaking.
+    """Return the median of an intensity measure and its standard deviations.
 
     Args:
         measure: one of :data:`MEASURES`.
@@ -123,8 +123,10 @@ def bssa14(
     )  # fmt: skip
 
 
-def _on_rock(of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: Any, ns: Numbers) -> Any:
-    """Return the logarithm of a median at 760 m/s."""
+def _on_rock(
+    of: _Coefficients, magnitude: Any, rjb_km: Any, mechanism: Any, ns: ArrayNamespace
+) -> Any:
+    """Return the natural logarithm of the median for Vs30 = 760 m/s."""
     d = magnitude - of.mh
     below, above = ns.minimum(d, 0.0), ns.maximum(d, 0.0)
     e0 = of.e0[mechanism] if isinstance(mechanism, int) else mechanism.choose(of.e0)

@@ -1,4 +1,4 @@
-"""Horizontal component of the shaking: from the definition of the input to a single component.
+"""Conversion of intensity measures from their horizontal component to a single component.
 
 The fragility models are fitted on single components of any azimuth. A measure x of another
 definition is converted by
@@ -67,7 +67,7 @@ class Component:
         return result
 
     def ratio(self, measure: str) -> float:
-        """Return the ratio of a measure, by its name in `predict`; of T_m and magnitude 1."""
+        """Return the ratio for an intensity measure, by its name in `predict`."""
         if measure in _PERIODS:
             return self.spectral_ratio(_PERIODS[measure])
         if measure in ("pgv_m_s", "pgd_m"):
@@ -76,7 +76,7 @@ class Component:
         return float(self.spectral_ratio(0.01) ** AMPLIFIED.get(measure, 0))
 
     def in_words(self, subject: str) -> Diagnostic:
-        """Return the component of values, after "the measures are", for example."""
+        """Describe the component in a sentence, for example after "the curve is"."""
         if self.name == SINGLE_COMPONENT:
             return Diagnostic(f"{subject} of {self.title}, as the models are", "single_component")
         return Diagnostic(
@@ -121,7 +121,7 @@ SINGLE_ASSUMED = Diagnostic(
 
 
 def component_named(name: str) -> Component:
-    """Return the definition of that name.
+    """Return the component definition with this name.
 
     Raises:
         InputError: there is none; the message names the nearest.
@@ -162,7 +162,8 @@ def to_single_component(inputs: Mapping[str, Any], component: Any) -> dict[str, 
 
 
 def total_sigma(sigma: Any, component_sigma: Any) -> Any:
-    """Return the root of the sum of squares; what is no standard deviation stays, to be rejected.
+    """Return the root of the sum of squares; an invalid standard deviation stays, to be rejected
+    later.
 
     Args:
         sigma: standard deviation of ln amplification: a number, or an array.

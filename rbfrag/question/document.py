@@ -1,4 +1,4 @@
-"""The answer to a question about one block, with that of every suited model."""
+"""Prediction for one block, with those of all suitable models."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BESIDE_A_MOTION = (
 
 
 def answer_block(inputs: Mapping[str, Any], *, kind: str | None = None, **how: Any) -> Prediction:
-    """Return the answer for one block, given by its shape or its numbers.
+    """Return the prediction for one block, given by its geometry or its numbers.
 
     Args:
         inputs: fields of block and shaking.
@@ -72,7 +72,7 @@ def _answer_described(inputs: Mapping[str, Any], *, kind: str | None, **how: Any
 
 
 def answer_numbers(
-    given: Mapping[str, ArrayLike],
+    question: Mapping[str, ArrayLike],
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
@@ -88,10 +88,10 @@ def answer_numbers(
     gmm: str | PathLike[str] | None = None,
     component: str | None = None,
 ) -> Prediction:
-    """Return the answer of the best model, with those of all suited models.
+    """Return the prediction of the best model, with those of all suitable models.
 
     Args:
-        given: block and what is known of the motion, by the names of :func:`predict`.
+        question: block and what is known of the motion, by the names of :func:`predict`.
         kind: how the block fails; None for what it is given by.
         rotation_deg: rotation that counts as failure, where models of several are fitted [deg].
         sites: number of sites of one earthquake with such blocks; None for one block.
@@ -113,16 +113,16 @@ def answer_numbers(
         DatabaseError: the database cannot be read.
     """
     is_component_assumed = component is None and motion is None
-    source, inputs = (mechanism, gmm, component), given
-    if source != (None, None, None) or not SCENARIO.isdisjoint(given):
+    source, inputs = (mechanism, gmm, component), question
+    if source != (None, None, None) or not SCENARIO.isdisjoint(question):
         if motion is not None:
             fields = (*SCENARIO, "mechanism", "gmm", "component")
             raise InputError(BESIDE_A_MOTION, fields=fields)
         from rbfrag.question.scenario import SITE, Source, shaken
 
-        if source[:2] != (None, None) or not given.keys().isdisjoint(SITE):
+        if source[:2] != (None, None) or not question.keys().isdisjoint(SITE):
             is_component_assumed = False
-        given, further = shaken(given, Source(mechanism, gmm), model, db, component)
+        question, further = shaken(question, Source(mechanism, gmm), model, db, component)
         remarks = (*remarks, *further)
     answers: list[Prediction] = []
     unused: tuple[str, ...] = ()
@@ -133,7 +133,7 @@ def answer_numbers(
 
         answers = [
             predict_motion(
-                given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
+                question, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
                 model=model, level=level, db=db, sites=sites,
             )
         ]  # fmt: skip
@@ -141,21 +141,21 @@ def answer_numbers(
         options: dict[str, Any] = {"kind": kind, "rotation_deg": rotation_deg}
         try:
             models = (
-                suited_models(given, db, **options)
+                suited_models(question, db, **options)
                 if model is None
-                else [find_model(model, given, db, **options)]
+                else [find_model(model, question, db, **options)]
             )
         except InputError as error:
             # here the measures are fields of the question, which each door spells
             error.fields = error.fields or INTENSITY
             raise
         for suited_model in models:
-            answer = answer_given(suited_model, given, level, weights=weights, sites=sites)
+            answer = answer_given(suited_model, question, level, weights=weights, sites=sites)
             assert isinstance(answer, Prediction)
             answers.append(answer)
-        unused = unused_measures(models[0], given)
+        unused = unused_measures(models[0], question)
         if is_component_assumed and 0.0 < answers[0].probability < 1.0:
-            notes = (_as_rotd50(models[0], given, weights, answers[0].probability),)
+            notes = (_as_rotd50(models[0], question, weights, answers[0].probability),)
     warnings = diagnostics(remarks, unused, answers[0].warnings, notes)
     return _with_alternatives(with_values(answers[0], warnings=warnings), answers, inputs, sites)
 

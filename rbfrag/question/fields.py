@@ -1,4 +1,4 @@
-"""Types of the inputs for type checkers; what they mean stands in :mod:`rbfrag.vocabulary`."""
+"""Types of the inputs for type checkers; :mod:`rbfrag.vocabulary` has their meaning."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ V = TypeVar("V")
 
 
 class NumberFields(TypedDict, Generic[V], total=False):
-    """What says of a block all that a model of its kind reads of its shape."""
+    """Parameters of a block by kind of failure, which replace its geometry."""
 
     p2: V
     kr: V
@@ -32,14 +32,14 @@ class NumberFields(TypedDict, Generic[V], total=False):
 
 
 class FailureFields(TypedDict, Generic[V], total=False):
-    """What a model reads of a block beside its numbers or its shape."""
+    """Model inputs of a block in addition to its parameters or its geometry."""
 
     displacement_m: V
     restitution: V
 
 
 class ShapeFields(TypedDict, Generic[V], total=False):
-    """What describes the shape of a block."""
+    """Dimensions and angles of a block."""
 
     height_m: V
     width_m: V
@@ -52,7 +52,7 @@ class ShapeFields(TypedDict, Generic[V], total=False):
 
 
 class PlaneFields(TypedDict, Generic[V], total=False):
-    """What describes the planes of a block."""
+    """Dips and friction angles of the planes under and behind a block."""
 
     beta_deg: V
     phi_deg: V
@@ -60,7 +60,7 @@ class PlaneFields(TypedDict, Generic[V], total=False):
 
 
 class SpaceFields(TypedDict, total=False):
-    """What describes the planes of a block in space, as dip/dip direction."""
+    """Planes of a block in space, as dip/dip direction."""
 
     base: str | None
     back: str | None
@@ -68,7 +68,7 @@ class SpaceFields(TypedDict, total=False):
 
 
 class JointFields(TypedDict, Generic[V], total=False):
-    """What ends with the first slip of a block, and what is left then."""
+    """Joint properties of a block, and its residual friction after the first slip."""
 
     water_m: V
     jrc: V
@@ -78,7 +78,9 @@ class JointFields(TypedDict, Generic[V], total=False):
 
 
 class ScatterFields(TypedDict, Generic[V], total=False):
-    """How well a block is known: what is stated is the median, and P the mean over it."""
+    """Block uncertainty: standard deviations; the value is the median, and P the mean over the
+    distribution.
+    """
 
     p2_sigma: V
     kr_sigma: V
@@ -99,11 +101,11 @@ class BlockFields(
     ScatterFields[V],
     total=False,
 ):
-    """What may be said of a block: numbers, or its sides and planes."""
+    """Inputs of a block: parameters, or geometry and planes."""
 
 
 class MeasureFields(TypedDict, Generic[V], total=False):
-    """Measures of one horizontal component."""
+    """Intensity measures of one horizontal component."""
 
     pgv_m_s: V
     pga_g: V
@@ -117,7 +119,7 @@ class MeasureFields(TypedDict, Generic[V], total=False):
 
 
 class SceneFields(TypedDict, Generic[V], total=False):
-    """How well measures are known, and what stands for them: the scenario and the site."""
+    """Uncertainty of intensity measures, scenario and site."""
 
     pgv_sigma: V
     pga_sigma: V
@@ -132,24 +134,24 @@ class SceneFields(TypedDict, Generic[V], total=False):
 
 
 class ShakingFields(MeasureFields[V], SceneFields[V], total=False):
-    """What may be said of the shaking."""
+    """Inputs of the shaking."""
 
 
 class SourceFields(TypedDict, total=False):
-    """What is said of the earthquake of a scenario beside numbers."""
+    """Mechanism and ground-motion model of a scenario earthquake."""
 
     mechanism: str | None
     gmm: str | PathLike[str] | None
 
 
 class ComponentFields(TypedDict, total=False):
-    """Definition of the horizontal component that the measures are of."""
+    """Definition of the horizontal component of the intensity measures."""
 
     component: str | Sequence[str | None] | None
 
 
 class WholeFields(SpaceFields, total=False):
-    """What holds for all blocks of a question."""
+    """Inputs that hold for all blocks."""
 
     block: Block | None
     back_fracture: bool | None
@@ -160,13 +162,13 @@ class WholeFields(SpaceFields, total=False):
 
 
 class AtRestFields(TypedDict, total=False):
-    """What may be said of the ground under a block that no earthquake shakes."""
+    """Static inputs of a block without an earthquake."""
 
     kv: float | None
 
 
 class AnsweringFields(TypedDict, total=False):
-    """Which model answers, and how wide its interval is."""
+    """Model and confidence level."""
 
     model: Model | None
     level: float
@@ -174,19 +176,19 @@ class AnsweringFields(TypedDict, total=False):
 
 
 class RangeFields(AnsweringFields, total=False):
-    """Which model answers, and what the range of one earthquake is of."""
+    """Model, confidence level and number of sites of the prediction interval."""
 
     sites: float | None
 
 
 class RequestFields(RangeFields, SourceFields, ComponentFields, total=False):
-    """What is asked of blocks and their shaking."""
+    """Options of a prediction."""
 
     rotation_deg: float | None
 
 
 class RecordFields(TypedDict, Generic[V], total=False):
-    """What else may be said of the shaking."""
+    """Spectral accelerations and ground motions."""
 
     sa_g: Mapping[float, V] | None
     motion: MotionLike | None
@@ -194,7 +196,7 @@ class RecordFields(TypedDict, Generic[V], total=False):
 
 
 class ArrayFields(TypedDict, total=False):
-    """What is asked of arrays."""
+    """Options of arrays."""
 
     nan: Literal["propagate", "raise"]
     interval: bool
@@ -210,11 +212,11 @@ class QuestionFields(
     ArrayFields,
     total=False,
 ):
-    """What :func:`rbfrag.predict` may be asked."""
+    """Keywords of :func:`rbfrag.predict`."""
 
 
 class RowFields(TypedDict, total=False):
-    """What a row of a table says beside its block and its shaking."""
+    """Columns of a table in addition to block and shaking."""
 
     block_id: str
     site_id: str
@@ -234,6 +236,6 @@ class RowFields(TypedDict, total=False):
 
 
 class BlockKeywords(BlockFields[V], WholeFields, total=False):
-    """What the blocks are, as :func:`rbfrag.predict` has it; of many, each may state its kind."""
+    """Inputs of blocks, as in :func:`rbfrag.predict`; of several blocks, each may have its kind."""
 
     kind: str | Sequence[str | None] | None  # type: ignore[misc]

@@ -19,14 +19,15 @@ from rbfrag.question.table import columns_in
 SIGMAS = {measure: sigma for sigma, measure in SCATTERED.items()}
 """Measures, and the name of the standard deviation of each."""
 
-_WHAT = "a table of medians and sigmas"
+_CONTENT = "a table of medians and sigmas"
 _NEAREST_KM = 0.1
 
 Columns = dict[str, NDArray[np.float64]]
 
 
 def read_gmm_table(path: str | PathLike[str]) -> Columns:
-    """Return the columns of a table, by field and in the units of fields, shape (rows,).
+    """Return the columns of a ground-motion table, by field and in the units of the fields, shape
+    (rows,).
 
     Args:
         path: CSV with measures and their standard deviations (``pgv_m_s``, ``pgv_sigma``, …), of
@@ -36,14 +37,16 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
         InputError: the file cannot be read, or a value in it cannot be used.
     """
     rows = [
-        each for each in csv_rows(source_text(path, _WHAT), path) if any(map(str.strip, each[1]))
+        entry
+        for entry in csv_rows(source_text(path, _CONTENT), path)
+        if any(map(str.strip, entry[1]))
     ]
     if not rows:
         raise InputError(f"{path} is empty: give columns such as pgv_m_s and pgv_sigma")
     (_, header), *rest = rows
-    wanted = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
+    fields = {*SIGMAS, *SCATTERED, "pgv_tau", "rjb_km"}
     table = {}
-    for name, column in columns_in(header, path, wanted).columns.items():
+    for name, column in columns_in(header, path, fields).columns.items():
         place, values = header.index(column.header), []
         for line, row in rest:
             text = row[place] if place < len(row) else ""
@@ -53,8 +56,10 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
                 value = math.nan
             above = value > 0.0 if name in SIGMAS else value >= 0.0
             if not above or value > 1e9:
-                what = "a number above 0" if name in SIGMAS else "a number, 0 or more"
-                raise InputError(f"{path}, line {line}: {name} = {text[:40]!r} must be {what}")
+                requirement = "a number above 0" if name in SIGMAS else "a number, 0 or more"
+                raise InputError(
+                    f"{path}, line {line}: {name} = {text[:40]!r} must be {requirement}"
+                )
             values.append(column.factor * value)
         table[name] = np.array(values)
     if not rest or SIGMAS.keys().isdisjoint(table):
@@ -67,7 +72,7 @@ def read_gmm_table(path: str | PathLike[str]) -> Columns:
 
 
 def of_table(path: str | PathLike[str], rjb_km: Any, names: Collection[str]) -> dict[str, Ordinate]:
-    """Return measures at a distance: ln median and sigma between the rows over ln Rjb.
+    """Return intensity measures at a distance: ln median and sigma, interpolated over ln R_JB.
 
     Args:
         path: as for :func:`read_gmm_table`.
@@ -96,7 +101,7 @@ def of_table(path: str | PathLike[str], rjb_km: Any, names: Collection[str]) -> 
     def between(column: NDArray[np.float64]) -> Any:
         if not distances.size:
             return float(column[0])
-        over, place = (np.log(np.maximum(each, _NEAREST_KM)) for each in (distances, at))
+        over, place = (np.log(np.maximum(distance, _NEAREST_KM)) for distance in (distances, at))
         value = np.where(np.isnan(at), np.nan, np.interp(place, over, column))
         return float(value) if value.ndim == 0 else value
 

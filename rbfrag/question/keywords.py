@@ -1,4 +1,4 @@
-"""Keywords that answers about blocks share: what the blocks are, and which model answers."""
+"""Keywords that functions about blocks share: block inputs, model and confidence level."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEVEL = 0.95
 def parts_of(
     numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Collection[str]
 ) -> list[Any]:
-    """Return the keywords of a question by the parts that they belong to; None is not stated.
+    """Split keywords into the parts they belong to, without those that are None.
 
     Args:
         numbers: what is given without a name: p2 and kr.
@@ -31,24 +31,24 @@ def parts_of(
         InputError: p2 or kr is given twice, or there are more numbers than these.
         UnknownFieldError: a keyword of no part.
     """
-    known = {name for part in parts for name in part}
-    if not keywords.keys() <= known:
-        keywords = by_field_name(keywords, known)
+    fields = {name for part in parts for name in part}
+    if not keywords.keys() <= fields:
+        keywords = by_field_name(keywords, fields)
     first = dict(zip(("p2", "kr"), numbers, strict=False))
     if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
         raise InputError("p2 and kr are given twice, by position and by name: give each once")
-    whole = {name: value for name, value in {**first, **keywords}.items() if value is not None}
-    return [{n: v for n, v in whole.items() if n in part} for part in parts]
+    inputs = {name: value for name, value in {**first, **keywords}.items() if value is not None}
+    return [{n: v for n, v in inputs.items() if n in part} for part in parts]
 
 
 def model_for(
-    answering: AnsweringFields, given: Sequence[str], kind: str | None = None
+    answering: AnsweringFields, names: Sequence[str], kind: str | None = None
 ) -> FragilityModel:
-    """Return the model that answers for what is given; see :func:`find_model`.
+    """Return the model for the given inputs; see :func:`find_model`.
 
     Args:
         answering: which model.
-        given: names of what is known of block and motion.
+        names: names of what is known of block and motion.
         kind: how the block fails.
     """
-    return find_model(answering.get("model"), given, answering.get("db"), kind=kind)
+    return find_model(answering.get("model"), names, answering.get("db"), kind=kind)

@@ -1,4 +1,5 @@
-"""Many blocks, by numbers or by shape: how each fails, and what answers read of it.
+"""Classification of arrays of blocks: failure mode, kind and model inputs, from numbers or
+geometry.
 
 Each block that cannot be used keeps its reason, and one that fails at rest is known to fail.
 """
@@ -17,7 +18,7 @@ from rbfrag.fragility.lookup import block_of
 from rbfrag.question.blocks import (
     Blocks,
     Group,
-    Refused,
+    InvalidBlocks,
     kinds_by_numbers,
     read_by_some,
     requested_kind,
@@ -66,11 +67,11 @@ _IF_EMPTY = {"beta_deg": 0.0}
 
 _FACTS = tuple(KINDS.values())
 
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 
 def many_blocks(
-    given: Mapping[str, NDArray[np.float64]],
+    inputs: Mapping[str, NDArray[np.float64]],
     size: int,
     *,
     kinds: str | Sequence[str | None] | None = None,
@@ -78,10 +79,10 @@ def many_blocks(
     rows: bool = False,
     pga_g: NDArray[np.float64] | None = None,
 ) -> Blocks:
-    """Return blocks as answers read them, each with its kind.
+    """Classify arrays of blocks: the kind of each and the inputs of its model.
 
     Args:
-        given: fields that are stated, flat arrays of the number of blocks, or of one element for
+        inputs: fields that are stated, flat arrays of the number of blocks, or of one element for
             all; ``back_fracture`` is 0 where there is none.
         size: number of blocks.
         kinds: how they are asked to fail, one kind for all or one each; None or an empty text for
@@ -95,82 +96,86 @@ def many_blocks(
     Raises:
         InputError: they are described twice or in part.
     """
-    planes = given.keys() & set(SPACE)
+    planes = inputs.keys() & set(SPACE)
     wrong: Mapping[int, str] = {}
     notes: tuple[Diagnostic, ...] = ()
     if planes:
         from rbfrag.question.sections import in_sections
 
-        given, wrong, notes = in_sections(given, size)
-    known, unread = (given, ()) if rows else read_by_some(given)
-    sorting = _Sorted(known, size, rows, pga_g)
+        inputs, wrong, notes = in_sections(inputs, size)
+    used_inputs, unread = (inputs, ()) if rows else read_by_some(inputs)
+    sorting = _BlockClassifier(used_inputs, size, rows, pga_g)
     for place, why in wrong.items():
-        _Some(sorting, np.array([place])).refuse(True, "{why}", why=why)
+        _ArrayIssues(sorting, np.array([place])).refuse(True, "{why}", why=why)
     sorting.state_drainage()
     blocks = sorting.blocks(kinds, modes)
     blocks = blocks._replace(remarks=(*notes, *blocks.remarks), read=blocks.read | planes)
     if rows:
         return blocks
-    others = given.keys() - known.keys()
-    return blocks._replace(remarks=(*blocks.remarks, *unread), read=blocks.read | others)
+    unused = inputs.keys() - used_inputs.keys()
+    return blocks._replace(remarks=(*blocks.remarks, *unread), read=blocks.read | unused)
 
 
-class _Some:
-    """Keeps why some of many blocks cannot be used, of those that no reason is known against."""
+class _ArrayIssues:
+    """Records why blocks of an array are rejected; the first reason of each block counts."""
 
-    def __init__(self, whole: _Sorted, places: Places) -> None:
-        self.whole, self.places = whole, places
+    def __init__(self, classifier: _BlockClassifier, indices: Indices) -> None:
+        self.classifier, self.indices = classifier, indices
 
     def refuse(self, holds: Any, text: str, *_fields: str, **values: Any) -> None:
         # the row, or the element, is the subject of its reason
-        self._keep(self.whole.refused, holds, text.removeprefix("the block "), values)
+        self._keep(self.classifier.refused, holds, text.removeprefix("the block "), values)
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        self._keep(self.whole.unstable, holds, text, values)
+        self._keep(self.classifier.unstable, holds, text, values)
 
     def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
-        rows = np.flatnonzero(np.broadcast_to(holds, self.places.shape) & self._free())
+        rows = np.flatnonzero(np.broadcast_to(holds, self.indices.shape) & self._is_valid())
         if not rows.size:
             return
-        first = {n: np.broadcast_to(v, self.places.shape)[rows[0]] for n, v in values.items()}
+        first = {n: np.broadcast_to(v, self.indices.shape)[rows[0]] for n, v in values.items()}
         example = text.format(**first) if values else str(text)
-        self.whole.remarks.setdefault(text, (example, []))[1].append(self.places[rows])
+        self.classifier.remarks.setdefault(text, (example, []))[1].append(self.indices[rows])
 
-    def _free(self) -> NDArray[np.bool_]:
-        return self.whole.free[self.places]
+    def _is_valid(self) -> NDArray[np.bool_]:
+        return self.classifier.is_valid[self.indices]
 
-    def _keep(self, reasons: list[Refused], holds: Any, text: str, values: dict[str, Any]) -> None:
-        here = np.flatnonzero(holds & self.whole.free[self.places])
-        if here.size:
-            self.whole.free[self.places[here]] = False
-            own = {n: _at(v, here) if isinstance(v, np.ndarray) else v for n, v in values.items()}
-            reasons.append(Refused(self.places[here], text, own))
+    def _keep(
+        self, reasons: list[InvalidBlocks], holds: Any, text: str, values: dict[str, Any]
+    ) -> None:
+        rows = np.flatnonzero(holds & self.classifier.is_valid[self.indices])
+        if rows.size:
+            self.classifier.is_valid[self.indices[rows]] = False
+            row_values = {
+                n: _at(v, rows) if isinstance(v, np.ndarray) else v for n, v in values.items()
+            }
+            reasons.append(InvalidBlocks(self.indices[rows], text, row_values))
 
 
-class _Sorted:
-    """Many blocks while they are sorted by kind."""
+class _BlockClassifier:
+    """Classification of arrays of blocks by kind."""
 
-    def __init__(self, given: Mapping[str, Any], size: int, rows: bool, pga_g: Any) -> None:
+    def __init__(self, inputs: Mapping[str, Any], size: int, rows: bool, pga_g: Any) -> None:
         self.size, self.rows, self.pga_g = size, rows, pga_g
-        backed = np.asarray(given.get("back_fracture", 1.0), dtype=np.float64)
+        backed = np.asarray(inputs.get("back_fracture", 1.0), dtype=np.float64)
         self.backed = np.broadcast_to(backed != 0.0, (size,))
         """Behind which blocks a plane is; where that is not given, one is."""
-        words = np.ravel(np.array(given.get("drainage", UNDRAINED), dtype=object)).tolist()
-        stated = np.array([word or UNDRAINED for word in words], dtype=object)
-        self.drainage: NDArray[np.object_] = np.broadcast_to(stated, size)
+        words = np.ravel(np.array(inputs.get("drainage", UNDRAINED), dtype=object)).tolist()
+        drainages = np.array([word or UNDRAINED for word in words], dtype=object)
+        self.drainage: NDArray[np.object_] = np.broadcast_to(drainages, size)
         """What the water behind each block does while it moves; an empty word means undrained."""
-        others = ("back_fracture", "drainage")
-        self.given = {name: value for name, value in given.items() if name not in others}
+        excluded = ("back_fracture", "drainage")
+        self.inputs = {name: value for name, value in inputs.items() if name not in excluded}
         self.groups: list[Group] = []
-        self.refused: list[Refused] = []
-        self.unstable: list[Refused] = []
-        self.free = np.ones(size, dtype=np.bool_)
+        self.refused: list[InvalidBlocks] = []
+        self.unstable: list[InvalidBlocks] = []
+        self.is_valid = np.ones(size, dtype=np.bool_)
         """Which blocks no reason is known against."""
-        self.done = np.zeros(size, dtype=np.bool_)
+        self.is_classified = np.zeros(size, dtype=np.bool_)
         """Which blocks are sorted."""
         self.kinds = np.full(size, -1, dtype=np.int8)
         self.modes = np.full(size, -1, dtype=np.int8)
-        self.remarks: dict[Diagnostic, tuple[str, list[Places]]] = {}
+        self.remarks: dict[Diagnostic, tuple[str, list[Indices]]] = {}
         """Warnings, each with its text for the first row of it and its rows."""
         self.read: set[str] = set()
 
@@ -180,20 +185,20 @@ class _Sorted:
         self._state(kinds, modes)
         shapes = self._shapes()
         self._state_free(shapes)
-        left = ~self._complete()
+        remaining = ~self._complete()
         for shape in shapes:
-            own = left & self._known(shape)
-            left &= ~own
-            if own.any():
-                self._sort_shapes(shape, np.flatnonzero(own))
-            self.done |= own
+            selected = remaining & self._has_all(shape)
+            remaining &= ~selected
+            if selected.any():
+                self._sort_shapes(shape, np.flatnonzero(selected))
+            self.is_classified |= selected
         if shapes:  # of which part of a shape is empty, and no number is stated either
-            own = left & ~self._known_any(NUMBERS)
-            if own.any():
-                self._sort_shapes(shapes[0], np.flatnonzero(own))
-            self.done |= own
-        if not self.done.all():
-            self._sort_numbers(np.flatnonzero(~self.done))
+            selected = remaining & ~self._has_any(NUMBERS)
+            if selected.any():
+                self._sort_shapes(shapes[0], np.flatnonzero(selected))
+            self.is_classified |= selected
+        if not self.is_classified.all():
+            self._sort_numbers(np.flatnonzero(~self.is_classified))
         return Blocks(
             tuple(self.groups),
             tuple(_about_rows(warning, *rows) for warning, rows in self.remarks.items()),
@@ -203,19 +208,19 @@ class _Sorted:
         )  # fmt: skip
 
     def state_drainage(self) -> None:
-        """Reject words that are no drainage, and those of blocks without water."""
-        listener = _Some(self, np.arange(self.size))
+        """Reject unknown drainage conditions, and a drainage of blocks without water."""
+        issues = _ArrayIssues(self, np.arange(self.size))
         for word in dict.fromkeys(self.drainage.tolist()):
             if word not in DRAINAGES:
                 why = NO_DRAINAGE.format(f"{word}"[:40])
-                listener.refuse(self.drainage == word, "{why}", "drainage", why=why)
-        if "water_m" not in self.given and (self.drainage == DRAINED).any():
+                issues.refuse(self.drainage == word, "{why}", "drainage", why=why)
+        if "water_m" not in self.inputs and (self.drainage == DRAINED).any():
             raise InputError(DRAINS_NOTHING, fields=("drainage", "water_m"))
 
     def _state(
         self, kinds: str | Sequence[str | None] | None, modes: Sequence[str | None] | None
     ) -> None:
-        """Enter the kinds that are asked for, one each or by the mode that is stated."""
+        """Set the requested kinds, from the kind or the failure mode of each block."""
         if isinstance(kinds, str):
             self.kinds[:] = _codes()[facts_of(kinds).kind]
             kinds = None
@@ -230,48 +235,50 @@ class _Sorted:
         for i, (kind, mode, code, backed) in enumerate(rows):
             row = (str(kind or "").strip(), str(mode or "").strip(), code, backed)
             whys.setdefault(row, []).append(i)
-        for (kind, mode, code, backed), places in whys.items():
-            here = np.array(places)
+        for (kind, mode, code, backed), members in whys.items():
+            indices = np.array(members)
             if kind and kind not in KINDS:
                 text = f"kind = {kind[:40]!r} is unknown; use {', '.join(KINDS)}"
-                _Some(self, here).refuse(True, "{why}", why=text)
+                _ArrayIssues(self, indices).refuse(True, "{why}", why=text)
                 continue
             if kind:
                 code = _codes()[kind]
             elif code < 0 and mode in MODES:
                 code = _codes()[kind_of_mode(mode, back_fracture=backed).kind]
-            self.kinds[here] = code
+            self.kinds[indices] = code
             if mode in MODES:
-                self.modes[here] = MODES.index(mode)
-            own = None if code < 0 else _FACTS[code]
-            if mode and (own is None or own.mode != mode):
-                model = "any" if own is None else f"the {own.kind}"
+                self.modes[indices] = MODES.index(mode)
+            facts = None if code < 0 else _FACTS[code]
+            if mode and (facts is None or facts.mode != mode):
+                model = "any" if facts is None else f"the {facts.kind}"
                 text = (
                     f"the block's mode is {words_of_mode(mode[:40])}: {model} model does not apply"
                 )
-                _Some(self, here).refuse(True, "{why}", why=text)
+                _ArrayIssues(self, indices).refuse(True, "{why}", why=text)
 
     def _state_free(self, shapes: Sequence[tuple[str, ...]]) -> None:
-        """Enter that blocks stand free of which a restitution is stated."""
-        restitution = self.given.get("restitution")
-        if restitution is None or not (shapes or {"p2", "kr"} & self.given.keys()):
+        """Classify blocks with a coefficient of restitution as free-standing."""
+        restitution = self.inputs.get("restitution")
+        if restitution is None or not (shapes or {"p2", "kr"} & self.inputs.keys()):
             return
         facts = requested_kind(None, ("restitution",))
         assert facts is not None
-        stated = ~np.isnan(restitution) if self.rows else True
-        self.kinds[(self.kinds < 0) & stated] = _codes()[facts.kind]
+        has_restitution = ~np.isnan(restitution) if self.rows else True
+        self.kinds[(self.kinds < 0) & has_restitution] = _codes()[facts.kind]
 
     def _shapes(self) -> list[tuple[str, ...]]:
-        """Return the shape that is stated; of a table those that its rows may have."""
+        """Return the geometry that is given; for a table, all geometries its rows may have."""
         if self.rows:
-            whole = [names for names in SHAPES if all(name in self.given for name in names)]
-            begun = any(name in self.given for names in SHAPES for name in names)
-            if begun and not whole and not kinds_by_numbers(self.given):
-                shape_among(self.given)
-            return whole
+            complete_shapes = [
+                names for names in SHAPES if all(name in self.inputs for name in names)
+            ]
+            begun = any(name in self.inputs for names in SHAPES for name in names)
+            if begun and not complete_shapes and not kinds_by_numbers(self.inputs):
+                shape_among(self.inputs)
+            return complete_shapes
         without_back = () if self.backed.all() else ("back_fracture",)
-        shape = shape_among({*self.given, *without_back})
-        if shape is not None and (numbers := [name for name in NUMBERS if name in self.given]):
+        shape = shape_among({*self.inputs, *without_back})
+        if shape is not None and (numbers := [name for name in NUMBERS if name in self.inputs]):
             raise InputError(
                 f"{numbers[0]} cannot be combined with {shape[0]}: give one description of the "
                 "block",
@@ -280,184 +287,184 @@ class _Sorted:
         return [] if shape is None else [shape]
 
     def _complete(self) -> Any:
-        """Return which blocks have all numbers of a kind."""
+        """Return which blocks have all parameters of a kind."""
         complete = np.zeros(self.size, dtype=np.bool_)
-        for facts in kinds_by_numbers(self.given):
-            complete |= self._known(facts.parameters)
+        for facts in kinds_by_numbers(self.inputs):
+            complete |= self._has_all(facts.parameters)
         return complete
 
-    def _stated(self, name: str) -> Any:
-        """Return the values of a field; what an empty cell of a table stands for."""
-        values = self.given[name]
+    def _with_default(self, name: str) -> Any:
+        """Return the values of a field, with the default in empty cells of a table."""
+        values = self.inputs[name]
         if self.rows and name in _IF_EMPTY:
             return np.where(np.isnan(values), _IF_EMPTY[name], values)
         return values
 
-    def _known_any(self, names: Collection[str]) -> Any:
-        known = np.zeros(self.size, dtype=np.bool_)
+    def _has_any(self, names: Collection[str]) -> Any:
+        has_any = np.zeros(self.size, dtype=np.bool_)
         for name in names:
-            if name in self.given:
-                known |= ~np.isnan(self.given[name])
-        return known
+            if name in self.inputs:
+                has_any |= ~np.isnan(self.inputs[name])
+        return has_any
 
-    def _known(self, names: Collection[str]) -> Any:
-        known = np.ones(self.size, dtype=np.bool_)
+    def _has_all(self, names: Collection[str]) -> Any:
+        has_all = np.ones(self.size, dtype=np.bool_)
         for name in names:
-            known &= ~np.isnan(self.given[name])
-        return known
+            has_all &= ~np.isnan(self.inputs[name])
+        return has_all
 
-    def _sort_numbers(self, places: Any) -> None:
-        """Sort blocks that are given by numbers."""
+    def _sort_numbers(self, indices: Any) -> None:
+        """Classify blocks given by their parameters."""
         # a restitution has first_slip already
-        names = [name for name in self.given if not name.startswith("restitution")]
+        names = [name for name in self.inputs if not name.startswith("restitution")]
         if (self.kinds < 0).any():
             for facts in kinds_by_numbers(names):
                 kind = block_of([name for name in names if name in _numbers_of(facts)]).kind
-                here = (self.kinds < 0) & self._known(facts.parameters)
-                self.kinds[here] = _codes()[kind]
+                selected = (self.kinds < 0) & self._has_all(facts.parameters)
+                self.kinds[selected] = _codes()[kind]
             self.kinds[self.kinds < 0] = _codes()[block_of(names).kind]
-        of_these = self.kinds[places]
-        for code in np.unique(of_these[self.free[places]]).tolist():
+        of_these = self.kinds[indices]
+        for code in np.unique(of_these[self.is_valid[indices]]).tolist():
             facts = _FACTS[code]
-            here = places[(of_these == code) & self.free[places]]
+            selected = indices[(of_these == code) & self.is_valid[indices]]
             if not facts.parameters:
-                _Some(self, here).refuse(True, NO_MODEL, kind=facts.kind)
+                _ArrayIssues(self, selected).refuse(True, NO_MODEL, kind=facts.kind)
                 continue
-            self.modes[here] = MODES.index(facts.mode) if facts.mode else -1
-            missing = [name for name in facts.parameters if name not in self.given]
+            self.modes[selected] = MODES.index(facts.mode) if facts.mode else -1
+            missing = [name for name in facts.parameters if name not in self.inputs]
             if missing:
-                whole = " and ".join(facts.parameters)
-                _Some(self, here).refuse(
+                parameters = " and ".join(facts.parameters)
+                _ArrayIssues(self, selected).refuse(
                     True,
                     f"the block's mode is {words_of_mode(facts.mode or '')}, and {missing[0]} is "
-                    f"missing: a block of kind {facts.kind} is given by {whole}",
+                    f"missing: a block of kind {facts.kind} is given by {parameters}",
                 )
                 continue
             numbers = {
-                name: self._stated(name) for name in _numbers_of(facts) if name in self.given
+                name: self._with_default(name) for name in _numbers_of(facts) if name in self.inputs
             }
             self.read |= numbers.keys()
             if "p2" in numbers:
-                check_size(_at(numbers["p2"], here), _Some(self, here))
-            self.group(facts, here, {name: _at(value, here) for name, value in numbers.items()})
+                check_size(_at(numbers["p2"], selected), _ArrayIssues(self, selected))
+            self.group(
+                facts, selected, {name: _at(value, selected) for name, value in numbers.items()}
+            )
 
-    def _sort_shapes(self, shape: tuple[str, ...], places: Places) -> None:
-        """Sort blocks that are given by their shape."""
-        planes = [name for name in (*PLANES, *JOINT, *BOND) if name in self.given]
+    def _sort_shapes(self, shape: tuple[str, ...], indices: Indices) -> None:
+        """Classify blocks given by their geometry."""
+        planes = [name for name in (*PLANES, *JOINT, *BOND) if name in self.inputs]
         self.read |= {*shape, *planes, "back_fracture"}
         self.read |= {"drainage"} if "water_m" in planes else set()
-        stated = {name: _at(self.given[name], places) for name in (*shape, *planes)}
+        columns = {name: _at(self.inputs[name], indices) for name in (*shape, *planes)}
         if shape != RECTANGLE:
             for name in ("beta_deg", "phi_deg"):
-                if name not in stated:
+                if name not in columns:
                     raise InputError(f"{name}{FRICTION_MISSING[7:]}", fields=(name,))
-        listener = _Some(self, places)
+        issues = _ArrayIssues(self, indices)
         # an empty cell gives nothing, nor does what has a default
         unsaid = (*JOINT, *BOND) if self.rows else ("joint_length_m", "phi_residual_deg")
-        there = {n: np.nan_to_num(v, nan=1.0) if n in unsaid else v for n, v in stated.items()}
-        check_ranges(there, listener, columns=self.rows)
-        check_lengths(stated, listener)
-        stated.setdefault("beta_deg", np.zeros(1))
-        stated.setdefault("phi_deg", np.full(1, np.nan))
-        stated.setdefault("phi_back_deg", stated["phi_deg"])
+        there = {n: np.nan_to_num(v, nan=1.0) if n in unsaid else v for n, v in columns.items()}
+        check_ranges(there, issues, columns=self.rows)
+        check_lengths(columns, issues)
+        columns.setdefault("beta_deg", np.zeros(1))
+        columns.setdefault("phi_deg", np.full(1, np.nan))
+        columns.setdefault("phi_back_deg", columns["phi_deg"])
         if shape != RECTANGLE:
-            listener.refuse(np.isnan(stated["phi_deg"]), FRICTION_MISSING)
-        free_kinds, kinds = np.array([facts.free_standing for facts in _FACTS]), self.kinds[places]
-        is_free = np.where(kinds < 0, ~self.backed[places], free_kinds[kinds])
+            issues.refuse(np.isnan(columns["phi_deg"]), FRICTION_MISSING)
+        free_kinds, kinds = np.array([facts.free_standing for facts in _FACTS]), self.kinds[indices]
+        is_free = np.where(kinds < 0, ~self.backed[indices], free_kinds[kinds])
         for free_standing in (False, True):
-            own = (is_free == free_standing) & self.free[places]
-            if own.any():
-                here = np.flatnonzero(own)
-                values = {name: _at(value, here) for name, value in stated.items()}
-                self._sort_standing(shape, places[here], values, free_standing)
+            selected = (is_free == free_standing) & self.is_valid[indices]
+            if selected.any():
+                rows = np.flatnonzero(selected)
+                values = {name: _at(value, rows) for name, value in columns.items()}
+                self._sort_standing(shape, indices[rows], values, free_standing)
 
     def _sort_standing(
-        self, shape: tuple[str, ...], places: Places, stated: dict[str, Any], free_standing: bool
+        self, shape: tuple[str, ...], indices: Indices, columns: dict[str, Any], free_standing: bool
     ) -> None:
-        """Sort shapes that all are backed, or all stand free."""
-        n = places.size
-        blocks = getattr(BlockArray, SHAPES[shape])(*(stated[name] for name in shape))
-        phi, back = stated["phi_deg"], stated["phi_back_deg"]
+        """Classify geometries that are all backed or all free-standing."""
+        n = indices.size
+        blocks = getattr(BlockArray, SHAPES[shape])(*(columns[name] for name in shape))
+        phi, back = columns["phi_deg"], columns["phi_back_deg"]
         taken = np.isnan(phi)
         # a friction angle that leaves a rectangle no choice: between that of its toe and 90°
         phi = np.where(taken, 0.5 * (blocks.alpha3_deg + 90.0), phi)
         back = np.where(np.isnan(back), phi, back)
         strength: dict[str, Any] = {}
-        listener = _Some(self, places)
+        issues = _ArrayIssues(self, indices)
         for name in ("cohesion_pa", "water_m", "jrc", "joint_length_m"):
-            if name in stated:
-                strength[name] = np.nan_to_num(stated[name])
-        if "jrc" in stated:
+            if name in columns:
+                strength[name] = np.nan_to_num(columns[name])
+        if "jrc" in columns:
             # what is smooth needs no strength of its walls
-            jcs = stated.get("jcs_mpa", np.full(1, np.nan))
-            listener.refuse(
-                (strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa"
-            )
+            jcs = columns.get("jcs_mpa", np.full(1, np.nan))
+            issues.refuse((strength["jrc"] > 0.0) & np.isnan(jcs), "jcs_mpa is missing", "jcs_mpa")
             strength["jcs_mpa"] = np.nan_to_num(jcs, nan=1.0)
         if free_standing and "water_m" in strength:
-            listener.refuse(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
+            issues.refuse(strength.pop("water_m") > 0.0, NO_FRACTURE, "water_m")
         elif "water_m" in strength:
             # the drained block is a dry one
-            drained = self.drainage[places] == DRAINED
-            listener.remark(drained & (strength["water_m"] > 0.0), DRAINED_NOTE)
+            drained = self.drainage[indices] == DRAINED
+            issues.remark(drained & (strength["water_m"] > 0.0), DRAINED_NOTE)
             strength["water_m"] = np.where(drained, 0.0, strength["water_m"])
         if strength:
-            density = stated.get("density_kg_m3", np.full(1, np.nan))
+            density = columns.get("density_kg_m3", np.full(1, np.nan))
             needed: Any = False
             for name in ("cohesion_pa", "water_m", "jrc"):
                 needed = needed | (strength.get(name, np.zeros(1)) > 0.0)
-            listener.remark(np.isnan(density) & needed, DENSITY_NOTE)
+            issues.remark(np.isnan(density) & needed, DENSITY_NOTE)
             strength["density_kg_m3"] = np.where(np.isnan(density), ROCK_KG_M3, density)
         push = None
         if np.any(strength.get("water_m", 0.0) > 0.0):
             push = push_of_blocks(
-                blocks, stated["beta_deg"], strength["water_m"], strength["density_kg_m3"]
+                blocks, columns["beta_deg"], strength["water_m"], strength["density_kg_m3"]
             )
-        on = {"beta_deg": stated["beta_deg"], "back_fracture": not free_standing}
+        on = {"beta_deg": columns["beta_deg"], "back_fracture": not free_standing}
         judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
-        residual = stated.get("phi_residual_deg", np.full(1, np.nan))
-        left = np.broadcast_to(~np.isnan(residual), (n,))
-        if left.any():
+        residual = columns.get("phi_residual_deg", np.full(1, np.nan))
+        has_residual = np.broadcast_to(~np.isnan(residual), (n,))
+        if has_residual.any():
             first = judged_all
             first_slip = {"k": first.yield_acceleration, "mode": first.mode}
-            listener.unstable(
-                left & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
+            issues.unstable(
+                has_residual & (first.yield_acceleration <= 0.0), UNSTABLE_AT_REST, **first_slip
             )
-            phi, back = (np.where(left, residual, each) for each in (phi, back))
+            phi, back = (np.where(has_residual, residual, value) for value in (phi, back))
             ended = strength.keys() & ENDED - {"jcs_mpa"}
-            strength |= {name: np.where(left, 0.0, strength[name]) for name in ended}
+            strength |= {name: np.where(has_residual, 0.0, strength[name]) for name in ended}
             judged_all = stability_arrays(blocks, phi_deg=phi, phi_back_deg=back, **on, **strength)
-            fails = left & (judged_all.yield_acceleration <= 0.0)
-            listener.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
-            listener.remark(left, AFTER_SLIP)
+            fails = has_residual & (judged_all.yield_acceleration <= 0.0)
+            issues.refuse(fails, SLIPS_ON, "phi_residual_deg", **first_slip)
+            issues.remark(has_residual, AFTER_SLIP)
         if "jrc" in strength:
             phi = judged_all.phi_deg
         codes = np.broadcast_to(judged_all.mode_code, (n,))
         reasons = np.broadcast_to(judged_all.reason_code, (n,))
         k = np.broadcast_to(judged_all.yield_acceleration, (n,))
         for code in np.unique(reasons[reasons > 0]).tolist():
-            listener.refuse(reasons == code, REASONS[code])
-        self.modes[places] = codes
+            issues.refuse(reasons == code, REASONS[code])
+        self.modes[indices] = codes
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
-        listener.remark(across_m < LEAST_M, SMALL_BLOCK, value=across_m)
+        issues.remark(across_m < LEAST_M, SMALL_BLOCK, value=across_m)
         is_long = np.zeros(1, dtype=np.bool_)
         for name in shape:
-            is_long = is_long | ((stated[name] > MOST_M) if name in LENGTHS else False)
-        check_size(np.where(is_long, np.nan, np.broadcast_to(blocks.p2, (n,))), listener)
+            is_long = is_long | ((columns[name] > MOST_M) if name in LENGTHS else False)
+        check_size(np.where(is_long, np.nan, np.broadcast_to(blocks.p2, (n,))), issues)
         displacement = np.full(1, np.nan)
-        if "displacement_m" in self.given:
+        if "displacement_m" in self.inputs:
             self.read.add("displacement_m")
-            displacement = _at(self.given["displacement_m"], places)
-            listener.refuse(taken & ~np.isnan(displacement), FRICTION_MISSING)
+            displacement = _at(self.inputs["displacement_m"], indices)
+            issues.refuse(taken & ~np.isnan(displacement), FRICTION_MISSING)
         width = len(_FACTS) + 1
-        pairs = codes.astype(np.intp) * width + self.kinds[places] + 1
-        for pair in np.flatnonzero(np.bincount(pairs[self.free[places]])).tolist():
+        pairs = codes.astype(np.intp) * width + self.kinds[indices] + 1
+        for pair in np.flatnonzero(np.bincount(pairs[self.is_valid[indices]])).tolist():
             code, requested = pair // width, pair % width - 1
-            own = (pairs == pair) & self.free[places]
-            if not own.any():
+            selected = (pairs == pair) & self.is_valid[indices]
+            if not selected.any():
                 continue
-            here = np.flatnonzero(own)
-            mode, of_these = MODES[code], places[here]
+            rows = np.flatnonzero(selected)
+            mode, of_these = MODES[code], indices[rows]
             facts = (
                 kind_of_mode(mode, back_fracture=not free_standing)
                 if requested < 0
@@ -465,36 +472,36 @@ class _Sorted:
             )
             self.kinds[of_these] = _FACTS.index(facts)
             judged = ModeShapes(
-                blocks.at(here), mode, k[here], _at(stated["beta_deg"], here), _at(phi, here),
-                _at(back, here), _at(taken, here), self.backed[of_these],
-                _at(np.asarray(strength.get("cohesion_pa", np.zeros(1))) > 0.0, here),
-                _at(np.asarray(strength.get("jrc", np.zeros(1))) > 0.0, here),
-                None if push is None else tuple(_at(each, here) for each in push),
+                blocks.at(rows), mode, k[rows], _at(columns["beta_deg"], rows), _at(phi, rows),
+                _at(back, rows), _at(taken, rows), self.backed[of_these],
+                _at(np.asarray(strength.get("cohesion_pa", np.zeros(1))) > 0.0, rows),
+                _at(np.asarray(strength.get("jrc", np.zeros(1))) > 0.0, rows),
+                None if push is None else tuple(_at(value, rows) for value in push),
                 None if self.pga_g is None else _at(self.pga_g, of_these),
             )  # fmt: skip
             names = [
                 name for name in _numbers_of(facts)
-                if name in self.given and name.endswith(("_sigma", "restitution"))
+                if name in self.inputs and name.endswith(("_sigma", "restitution"))
             ]  # fmt: skip
             self.read |= {*names}
-            others = {name: _at(self.given[name], of_these) for name in names}
+            options = {name: _at(self.inputs[name], of_these) for name in names}
             with np.errstate(all="ignore"):
                 numbers = numbers_of_shape(
-                    facts, judged, _at(displacement, here), others, _Some(self, of_these)
+                    facts, judged, _at(displacement, rows), options, _ArrayIssues(self, of_these)
                 )
             self.group(facts, of_these, numbers)
 
-    def group(self, facts: KindSpec, places: Places, numbers: Mapping[str, Any]) -> None:
-        """Keep blocks of one kind, of those that no reason is known against."""
-        usable = np.flatnonzero(self.free[places])
-        if usable.size:
-            if usable.size < places.size:
-                numbers = {name: _at(np.asarray(v), usable) for name, v in numbers.items()}
-            self.groups.append(Group(facts.kind, numbers, places[usable]))
+    def group(self, facts: KindSpec, indices: Indices, numbers: Mapping[str, Any]) -> None:
+        """Add a group of one kind, without its rejected blocks."""
+        valid_rows = np.flatnonzero(self.is_valid[indices])
+        if valid_rows.size:
+            if valid_rows.size < indices.size:
+                numbers = {name: _at(np.asarray(v), valid_rows) for name, v in numbers.items()}
+            self.groups.append(Group(facts.kind, numbers, indices[valid_rows]))
 
 
 def push_of_blocks(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m3: Any) -> Any:
-    """Return the push of water on blocks, zeros on dry ones."""
+    """Return the water force on blocks, zero for dry blocks."""
     t1, t3, h, beta, water, density = np.broadcast_arrays(
         blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, beta_deg, water_m, density_kg_m3
     )
@@ -505,21 +512,21 @@ def push_of_blocks(blocks: BlockArray, beta_deg: Any, water_m: Any, density_kg_m
             cot=cot_gamma(t1, t3), tan_beta=tan_deg(beta, functions), functions=functions,
         )  # fmt: skip
     along, normal, moment = (
-        np.where(water > 0.0, each, 0.0) for each in (wet.along, wet.normal, wet.moment)
+        np.where(water > 0.0, component, 0.0) for component in (wet.along, wet.normal, wet.moment)
     )
     return along, normal, moment * h
 
 
-def _about_rows(warning: Diagnostic, example: str, parts: Sequence[Places]) -> Diagnostic:
-    """Return a warning about rows, with the values of the first."""
+def _about_rows(warning: Diagnostic, example: str, parts: Sequence[Indices]) -> Diagnostic:
+    """Return a warning about rows, with the values of the first row."""
     rows = np.concatenate(parts)
     more = f" (and {rows.size - 1:,} more rows)" if example != warning and rows.size > 1 else ""
     return warning.replaced(text=example + more, rows=rows)
 
 
-def _at(values: Any, places: Places) -> Any:
-    """Return the values of some places; one that holds for all stays one."""
-    return values if values.size == 1 else values[places]
+def _at(values: Any, indices: Indices) -> Any:
+    """Return the values at these indices; a single value holds for all."""
+    return values if values.size == 1 else values[indices]
 
 
 @cache
@@ -529,6 +536,6 @@ def _codes() -> dict[str, int]:
 
 @cache
 def _numbers_of(facts: KindSpec) -> tuple[str, ...]:
-    """Return what a model of a kind reads of a block."""
+    """Return the fields that a model of this kind uses of a block."""
     block = block_of(facts.parameters, facts.kind)
     return (*block.names, *block.options, *block.sigmas)

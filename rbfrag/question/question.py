@@ -1,4 +1,4 @@
-"""A question about blocks and their shaking, and its answer: `predict`, for every kind of failure.
+"""Probability of failure of blocks under given shaking: `predict`, for every kind of failure.
 
 For a single block neither numpy nor any other library is loaded.
 """
@@ -111,10 +111,10 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     """
     if not question.keys() <= _KEYWORDS:
         question = by_field_name(question, _KEYWORDS)
-    given: dict[str, Any] = {} if p2 is None else {"p2": p2}
+    fields: dict[str, Any] = {} if p2 is None else {"p2": p2}
     if kr is not None:
-        given["kr"] = kr
-    if not question.keys().isdisjoint(given):
+        fields["kr"] = kr
+    if not question.keys().isdisjoint(fields):
         raise InputError("p2 and kr are given twice, by position and by name: give each once")
     options: dict[str, Any] = {}
     kind, polarity, motion = None, "both", None
@@ -126,40 +126,40 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
         elif name == "kind":
             kind = value
         elif name == "sa_g":
-            given |= spectral(value)
+            fields |= spectral(value)
         elif name == "motion":
             motion = value
         elif name == "polarity":
             polarity = value
         else:
-            given[name] = value
+            fields[name] = value
 
     def answer(inputs: Mapping[str, Any]) -> Prediction | PredictionArray:
         if motion is not None:
             return _answer_motion(inputs, motion, kind, polarity, options)
         return ask(inputs, kind=kind, **options)
 
-    result = with_drained_bound(answer, given, kind)
+    result = with_drained_bound(answer, fields, kind)
     return result if isinstance(result, Prediction) else result.with_rejected_elements()
 
 
 def with_drained_bound(
-    answer: Callable[[Mapping[str, Any]], A], given: Mapping[str, Any], kind: Any = None
+    answer: Callable[[Mapping[str, Any]], A], question: Mapping[str, Any], kind: Any = None
 ) -> A:
-    """Return the answer to a question; with that without water pressure where water stands.
+    """Return the prediction; where water stands behind a block, add the one without water pressure.
 
     The drained bound is the answer to the same question without ``water_m``. It is missing where
     that question has none, as of a block that slides when dry without a displacement limit.
 
     Args:
         answer: answers a question.
-        given: the question: fields of block and shaking.
+        question: the question: fields of block and shaking.
         kind: how the blocks are asked to fail.
     """
-    result = answer(given)
-    if not is_wet(given):
+    result = answer(question)
+    if not is_wet(question):
         return result
-    dry = without_water(given)
+    dry = without_water(question)
     try:
         bound = answer(dry)
     except InputError as error:
@@ -169,7 +169,7 @@ def with_drained_bound(
         return with_values(result, drained=_bound_values(bound, group.numbers))
     import numpy as np
 
-    wet = np.asarray(given["water_m"], dtype=np.float64) > 0.0
+    wet = np.asarray(question["water_m"], dtype=np.float64) > 0.0
     answered = np.broadcast_to(wet, bound.probability.shape) & ~np.isnan(result.probability)
     drained = {n: np.where(answered, getattr(bound, n), np.nan) for n in OF_BOUND}
     lost = np.flatnonzero(answered & np.isnan(bound.probability))
@@ -179,10 +179,10 @@ def with_drained_bound(
     return with_values(result, drained=drained)
 
 
-def without_water(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a question about blocks behind which no water stands; arrays keep their number."""
-    dry = {n: value for n, value in given.items() if n not in ("water_m", "drainage")}
-    water: Any = given.get("water_m")
+def without_water(question: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the inputs without water behind the blocks; arrays keep their length."""
+    dry = {n: value for n, value in question.items() if n not in ("water_m", "drainage")}
+    water: Any = question.get("water_m")
     if water is not None and not isinstance(water, int | float):
         import numpy as np
 
@@ -191,14 +191,14 @@ def without_water(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def no_drained_bound(reason: object) -> Diagnostic:
-    """Return the note that the question without water has no answer, and why."""
+    """Return the note that there is no prediction without water, with the reason."""
     fields = reason.fields if isinstance(reason, InputError) else ()
     return Diagnostic(f"no drained bound: {reason}", "no_drained_bound", fields=fields)
 
 
-def is_wet(given: Mapping[str, Any]) -> bool:
-    """Return whether water stands behind a block, or behind any of several."""
-    water: Any = given.get("water_m")
+def is_wet(question: Mapping[str, Any]) -> bool:
+    """Return whether water stands behind any block."""
+    water: Any = question.get("water_m")
     if water is None or isinstance(water, int | float):
         return bool(water is not None and water > 0.0)
     import numpy as np
@@ -210,7 +210,7 @@ OF_BOUND = ("probability", "ci_low", "ci_high")
 
 
 def _bound_values(bound: Prediction, numbers: Mapping[str, Any]) -> dict[str, float | None]:
-    """Return the drained bound of an answer: its values, and the yield by its name.
+    """Return the values of the drained bound, including the yield acceleration.
 
     Args:
         bound: the answer without water.
@@ -236,12 +236,12 @@ if predict.__doc__:  # python -OO leaves none
     predict.__doc__ = predict.__doc__.replace("    KEYWORDS", _keywords_in_words())
 
 
-def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Return inputs by their field, whichever of its names each is given by.
+def by_field_name(question: Mapping[str, Any], fields: Collection[str]) -> dict[str, Any]:
+    """Translate keywords, option names and column names to field names.
 
     Args:
         question: values by keyword, option word or name of a column.
-        known: fields that the answer takes.
+        fields: fields that the answer takes.
 
     Raises:
         UnknownFieldError: a name of no such field, with the one that may be meant.
@@ -253,10 +253,10 @@ def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[s
     names: dict[str, str] = {}
     for name, value in question.items():
         field = name
-        if name not in known:
+        if name not in fields:
             match = field_of(name)
-            if match is None or match.field not in known or match.unit is not None:
-                raise unknown_field(name, known)
+            if match is None or match.field not in fields or match.unit is not None:
+                raise unknown_field(name, fields)
             field = match.field
             if match.column == "no_back" and value is not None:
                 value = not value
@@ -269,15 +269,15 @@ def by_field_name(question: Mapping[str, Any], known: Collection[str]) -> dict[s
     return result
 
 
-def unknown_field(name: str, known: Collection[str]) -> UnknownFieldError:
-    """Return the error of a name that is not a field, with the one that may be meant."""
+def unknown_field(name: str, fields: Collection[str]) -> UnknownFieldError:
+    """Return the error for a name that is not a field, with a suggestion."""
     from difflib import get_close_matches
 
     from rbfrag.question.table import field_of
 
     match = field_of(name)
-    near = [match.field] if match else get_close_matches(name, known, 1)
-    near = [field for field in near if field in known]
+    near = [match.field] if match else get_close_matches(name, fields, 1)
+    near = [field for field in near if field in fields]
     hint = f"; did you mean {near[0]!r}?" if near else "; see help(rbfrag.predict)"
     return UnknownFieldError(f"unknown field {name[:60]!r}{hint}")
 
@@ -286,13 +286,13 @@ OF_SHAKING = frozenset({*SHAKING, *MEASURES})
 """Fields that say nothing of the block."""
 
 
-def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
-    """Return the single block of a question as answers read it, without its measures.
+def described(inputs: Mapping[str, Any], kind: str | None) -> Blocks:
+    """Classify the single block of a question, without its intensity measures.
 
     A block that fails at rest has no numbers; ``at_rest`` has the reason.
     """
-    block = {n: value for n, value in given.items() if n not in OF_SHAKING}
-    return one_block(block, kind, given.get("pga_g"), at_rest=True)
+    block = {n: value for n, value in inputs.items() if n not in OF_SHAKING}
+    return one_block(block, kind, inputs.get("pga_g"), at_rest=True)
 
 
 def ask_at_rest(
@@ -305,7 +305,7 @@ def ask_at_rest(
     rotation_deg: float | None = None,
     **scenario: Any,
 ) -> Prediction:
-    """Return P = 1 of a block that fails without an earthquake, with the reason.
+    """Return P = 1 for a block that is unstable without an earthquake, with the reason.
 
     Args:
         measures: the shaking, which must suffice for a model as it does for any block.
@@ -335,7 +335,7 @@ def ask_at_rest(
 
 
 def _answer_motion(
-    given: Mapping[str, Any], motion: Any, kind: str | None, polarity: Any, options: dict[str, Any]
+    inputs: Mapping[str, Any], motion: Any, kind: str | None, polarity: Any, options: dict[str, Any]
 ) -> Prediction:
     from rbfrag.fragility.prediction_motion import predict_motion
 
@@ -347,9 +347,9 @@ def _answer_motion(
             )
     defaults: dict[str, Any] = {"rotation_deg": None, "model": None, "level": 0.95, "db": None}
     of_arrays = ("nan", "interval")
-    options = defaults | {name: each for name, each in options.items() if name not in of_arrays}
-    measures = {name: value for name, value in given.items() if name in OF_SHAKING}
-    blocks = described(given, kind)
+    options = defaults | {name: value for name, value in options.items() if name not in of_arrays}
+    measures = {name: value for name, value in inputs.items() if name in OF_SHAKING}
+    blocks = described(inputs, kind)
     group = blocks.groups[0]
     if blocks.at_rest:
         of_record = {"xp_m_s": 0.0, "pga_g": 0.0}
@@ -361,7 +361,7 @@ def _answer_motion(
 
 
 def ask(
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     *,
     kind: Any = None,
     mode: Any = None,
@@ -378,10 +378,10 @@ def ask(
     component: str | Sequence[str | None] | None = None,
     rows: bool = False,
 ) -> Prediction | PredictionArray:
-    """Return the answer for blocks and measures by field; see :func:`predict`.
+    """Return the prediction for blocks and intensity measures by field; see :func:`predict`.
 
     Args:
-        given: fields of block and shaking: numbers, or arrays that numpy can broadcast.
+        inputs: fields of block and shaking: numbers, or arrays that numpy can broadcast.
         kind: how they fail, for all or one each; None or an empty text for what they say.
         mode: failure modes that are stated, one each and empty for none; None for none at all.
         rotation_deg: rotation that counts as failure [deg].
@@ -402,52 +402,52 @@ def ask(
         raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
     is_single_component = isinstance(component, str) and component == SINGLE_COMPONENT
     converts = component is not None and not is_single_component
-    if mechanism is not None or gmm is not None or converts or not SCENARIO.isdisjoint(given):
+    if mechanism is not None or gmm is not None or converts or not SCENARIO.isdisjoint(inputs):
         # Kept apart: most questions state measures.
         from rbfrag.question.scenario import SITE, Source, shaken
 
         source = Source(mechanism, gmm)
-        is_scenario = source != Source() or not given.keys().isdisjoint(SITE)
-        given, remarks = shaken(given, source, model, db, component)
+        is_scenario = source != Source() or not inputs.keys().isdisjoint(SITE)
+        inputs, remarks = shaken(inputs, source, model, db, component)
         if component is not None or is_scenario:
             component = SINGLE_COMPONENT
         answer = ask(
-            given, kind=kind, mode=mode, rotation_deg=rotation_deg, sites=sites, model=model,
+            inputs, kind=kind, mode=mode, rotation_deg=rotation_deg, sites=sites, model=model,
             level=level, db=db, nan=nan, interval=interval, weights=weights, component=component,
             rows=rows,
         )  # fmt: skip
         return with_remarks(answer, remarks)
     how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights, "sites": sites}
     if (kind is None or isinstance(kind, str)) and mode is None and not rows:
-        if not has_shape(given):
-            given, unread = read_by_some(given)
-            chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-            answer = answer_given(chosen, given, level, **how)
-            size = size_questions(given.get("p2"), getattr(answer.probability, "shape", ()))
-            remarks = (*unread, *size, *unused_measures(chosen, given))
+        if not has_shape(inputs):
+            inputs, unread = read_by_some(inputs)
+            chosen = find_model(model, inputs, db, kind=kind, rotation_deg=rotation_deg)
+            answer = answer_given(chosen, inputs, level, **how)
+            size = size_questions(inputs.get("p2"), getattr(answer.probability, "shape", ()))
+            remarks = (*unread, *size, *unused_measures(chosen, inputs))
             return with_remarks(answer, remarks, _assumed(component, answer))
-        if all(name in _SINGLE or is_single(value) for name, value in given.items()):
-            blocks = described(given, kind)
+        if all(name in _SINGLE or is_single(value) for name, value in inputs.items()):
+            blocks = described(inputs, kind)
             (group,) = blocks.groups
-            own = {**group.numbers, **{n: given[n] for n in given if n in MEASURES}}
+            values = {**group.numbers, **{n: inputs[n] for n in inputs if n in MEASURES}}
             if blocks.at_rest:
                 at_rest = ask_at_rest(
-                    own, blocks, model=model, level=level, db=db, rotation_deg=rotation_deg
+                    values, blocks, model=model, level=level, db=db, rotation_deg=rotation_deg
                 )
                 return with_remarks(at_rest, blocks.remarks)
-            chosen = find_model(model, own, db, kind=group.kind, rotation_deg=rotation_deg)
-            answer = answer_given(chosen, own, level, **how)
+            chosen = find_model(model, values, db, kind=group.kind, rotation_deg=rotation_deg)
+            answer = answer_given(chosen, values, level, **how)
             assert isinstance(answer, Prediction)
-            remarks = (*blocks.remarks, *unused_measures(chosen, own))
+            remarks = (*blocks.remarks, *unused_measures(chosen, values))
             return with_remarks(answer, remarks, _assumed(component, answer))
-    if "block" in given:
+    if "block" in inputs:
         raise InputError("block must be a single block: give several blocks as arrays of fields")
     # Kept apart so that a single block does not load numpy.
     from rbfrag.question.answers import ask_many
 
     answer = ask_many(
-        given, kind, mode, rows=rows, level=level, **how,
-        find=lambda own, of: find_model(model, own, db, kind=of, rotation_deg=rotation_deg),
+        inputs, kind, mode, rows=rows, level=level, **how,
+        find=lambda values, of: find_model(model, values, db, kind=of, rotation_deg=rotation_deg),
     )  # fmt: skip
     return with_remarks(answer, (), _assumed(component, answer))
 

@@ -1,4 +1,5 @@
-"""The shaking of a scenario: from magnitude, distance and ground, and by the ground's shape.
+"""Ground motion of a scenario earthquake from magnitude, distance and Vs30, with topographic
+amplification.
 
 What is said so becomes measures with their scatter before a question is asked. A single site loads
 no library.
@@ -16,7 +17,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility import describe
 from rbfrag.fragility.lookup import stored_row
 from rbfrag.fragility.measures import AMPLIFIED, SCATTERED, TERMS
-from rbfrag.fragility.method import SINGLE, Numbers, arrays
+from rbfrag.fragility.method import SINGLE, ArrayNamespace, arrays
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import is_single, single
 from rbfrag.question.bssa14 import MEASURES, MECHANISMS, Ordinate, bssa14
@@ -44,7 +45,7 @@ ANOTHER_MODEL = Diagnostic(
 
 
 class Source(NamedTuple):
-    """What is said of the earthquake beside numbers.
+    """Mechanism and ground-motion model of the scenario earthquake.
 
     Args:
         mechanism: how the fault moves; None where that is not said.
@@ -56,16 +57,16 @@ class Source(NamedTuple):
 
 
 def shaken(
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
     source: Source,
     model: Model | None = None,
     db: str | PathLike[str] | None = None,
     component: Any = None,
 ) -> tuple[dict[str, Any], tuple[Diagnostic, ...]]:
-    """Return a question that gives measures and their dispersion, and warnings about it.
+    """Replace a scenario by its intensity measures and their dispersion, with warnings.
 
     Args:
-        given: the question, in which magnitude, distance and ground may stand for measures.
+        inputs: the question, in which magnitude, distance and ground may stand for measures.
         source: what else is said of the earthquake.
         model: the model that is asked for, which reads its measures; None for PGV alone.
         db: its database.
@@ -75,7 +76,7 @@ def shaken(
         InputError: a scenario that is stated in part or beside measures, or out of range, or
             with a component, which is RotD50.
     """
-    question, remarks = dict(given), tuple[Diagnostic, ...]()
+    question, remarks = dict(inputs), tuple[Diagnostic, ...]()
     if source != Source() or not question.keys().isdisjoint(SITE):
         if component is not None:
             raise InputError(
@@ -84,17 +85,17 @@ def shaken(
                 fields=("component",),
             )
         names = ("pgv_m_s",) if model is None else TERMS[_term(model, db)].inputs
-        measures = scenario(given, source, names)
+        measures = scenario(inputs, source, names)
         remarks = (ANOTHER_MODEL,)
-        question = {name: value for name, value in given.items() if name not in GROUND}
-        if "magnitude" in names and "magnitude" in given:
-            question["magnitude"] = given["magnitude"]
-        ns = _numbers(given)
-        for name, each in measures.items():
-            question[name], question[_SIGMAS[name]] = each.median, each.sigma(ns)
+        question = {name: value for name, value in inputs.items() if name not in GROUND}
+        if "magnitude" in names and "magnitude" in inputs:
+            question["magnitude"] = inputs["magnitude"]
+        ns = _numbers(inputs)
+        for name, im in measures.items():
+            question[name], question[_SIGMAS[name]] = im.median, im.sigma(ns)
         if "pgv_m_s" in measures:
             question["pgv_tau"] = measures["pgv_m_s"].tau
-        sigma = given.get("amplification_sigma", 0.0)
+        sigma = inputs.get("amplification_sigma", 0.0)
         question["amplification_sigma"] = total_sigma(sigma, COMPONENT_SIGMA)
     elif component is not None:
         question = to_single_component(question, component)
@@ -111,39 +112,39 @@ def shaken(
 
 
 def scenario(
-    given: Mapping[str, Any], source: Source, names: Collection[str] = MEASURES
+    inputs: Mapping[str, Any], source: Source, names: Collection[str] = MEASURES
 ) -> dict[str, Ordinate]:
-    """Return measures of RotD50 in a scenario, by their names, without amplification.
+    """Return intensity measures of a scenario (RotD50), by name, without amplification.
 
     Args:
-        given: ``magnitude``, ``rjb_km`` [km] and ``vs30_m_s`` [m/s]: numbers, or arrays.
+        inputs: ``magnitude``, ``rjb_km`` [km] and ``vs30_m_s`` [m/s]: numbers, or arrays.
         source: what else is said of the earthquake.
         names: the measures that are wanted.
 
     Raises:
         InputError: something is missing, given twice, or outside the range of the model.
     """
-    stated = [n for n in given if (n in INTENSITY or n in _SIGMAS.values()) and n != "magnitude"]
-    if stated:
+    clashing = [n for n in inputs if (n in INTENSITY or n in _SIGMAS.values()) and n != "magnitude"]
+    if clashing:
         raise InputError(
-            f"{stated[0]} cannot be combined with a scenario (magnitude and rjb_km): omit one of "
+            f"{clashing[0]} cannot be combined with a scenario (magnitude and rjb_km): omit one of "
             "them",
-            fields=(stated[0],),
+            fields=(clashing[0],),
         )
     if source.gmm is not None:
         # Kept apart: a single site without a table loads no numpy.
         from rbfrag.question.gmm_table import of_table
 
-        return of_table(source.gmm, given.get("rjb_km"), names)
-    missing = [name for name in GROUND if name not in given]
+        return of_table(source.gmm, inputs.get("rjb_km"), names)
+    missing = [name for name in GROUND if name not in inputs]
     if missing:
         raise InputError(
             f"{missing[0]} is missing: a scenario is given by {', '.join(GROUND)} and mechanism",
             fields=(*GROUND, "mechanism"),
         )
     mechanism = _mechanism_index(source.mechanism)
-    ns = _numbers(given) if isinstance(mechanism, int) else arrays()
-    values = {name: _checked(name, given[name], mechanism, ns) for name in GROUND}
+    ns = _numbers(inputs) if isinstance(mechanism, int) else arrays()
+    values = {name: _checked(name, inputs[name], mechanism, ns) for name in GROUND}
     return {
         name: bssa14(name, values["magnitude"], values["rjb_km"], values["vs30_m_s"], mechanism, ns)
         for name in names
@@ -152,7 +153,7 @@ def scenario(
 
 
 def _mechanism_index(mechanism: str | Sequence[str | None] | None) -> Any:
-    """Return where mechanisms stand among those of the ground-motion model."""
+    """Return the index of each mechanism in the ground-motion model."""
     if isinstance(mechanism, Sequence) and not isinstance(mechanism, str):
         import numpy as np
 
@@ -184,7 +185,7 @@ class ScenarioShaking(Result):
     warnings: tuple[str, ...] = ()
 
     def sentences(self) -> Iterator[str]:
-        """Yield the median of the first measure with its percentiles."""
+        """Yield the median of the first intensity measure with its percentiles."""
         name, values = next(iter(self.measures.items()))
         unit = QUANTITIES[name].unit
         yield (
@@ -204,7 +205,7 @@ class ScenarioShaking(Result):
         yield TextLine("Model", f"{gmm}, component RotD50")
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
-        """Yield the measures with their percentiles and standard deviations of ln."""
+        """Yield the intensity measures with their percentiles and σ_ln."""
         rows: list[dict[str, object]] = [
             {"measure": describe.measures([name]), **values, "unit": QUANTITIES[name].unit}
             for name, values in self.measures.items()
@@ -216,34 +217,34 @@ class ScenarioShaking(Result):
         return {name: dict(values) for name, values in self.measures.items()}
 
 
-def scenario_shaking(given: Mapping[str, Any], source: Source) -> ScenarioShaking:
-    """Return the shaking of one site in an earthquake scenario.
+def scenario_shaking(inputs: Mapping[str, Any], source: Source) -> ScenarioShaking:
+    """Return the ground motion at one site in a scenario earthquake.
 
     Args:
-        given: as for :func:`scenario`, with ``amplification`` and ``amplification_sigma``.
+        inputs: as for :func:`scenario`, with ``amplification`` and ``amplification_sigma``.
         source: what else is said of the earthquake.
     """
-    site = {name: value for name, value in given.items() if not name.startswith("amplif")}
+    site = {name: value for name, value in inputs.items() if not name.startswith("amplif")}
     names = MEASURES
     if source.gmm is not None:
         from rbfrag.question.gmm_table import read_gmm_table
 
         names = tuple(name for name in _SIGMAS if name in read_gmm_table(source.gmm))
     result = {}
-    for name, each in scenario(site, source, names).items():
-        median = each.median * given.get("amplification", 1.0)
-        phi = math.hypot(each.phi, given.get("amplification_sigma", 0.0))
-        sigma = math.hypot(each.tau, phi)
+    for name, im in scenario(site, source, names).items():
+        median = im.median * inputs.get("amplification", 1.0)
+        phi = math.hypot(im.phi, inputs.get("amplification_sigma", 0.0))
+        sigma = math.hypot(im.tau, phi)
         low, high = (median * math.exp(end * sigma) for end in (-1.0, 1.0))
         result[name] = {
-            "median": median, "p16": low, "p84": high, "sigma": sigma, "tau": each.tau, "phi": phi,
+            "median": median, "p16": low, "p84": high, "sigma": sigma, "tau": im.tau, "phi": phi,
         }  # fmt: skip
-    return ScenarioShaking(result, given, source)
+    return ScenarioShaking(result, inputs, source)
 
 
-def _numbers(given: Mapping[str, Any]) -> Numbers:
+def _numbers(inputs: Mapping[str, Any]) -> ArrayNamespace:
     names = (*GROUND, "amplification", "amplification_sigma")
-    return SINGLE if all(is_single(given[n]) for n in names if n in given) else arrays()
+    return SINGLE if all(is_single(inputs[n]) for n in names if n in inputs) else arrays()
 
 
 def _term(model: Model, db: str | PathLike[str] | None) -> str:
@@ -252,7 +253,7 @@ def _term(model: Model, db: str | PathLike[str] | None) -> str:
     return model.term.name if isinstance(model, FragilityModel) else model.term
 
 
-def _checked(name: str, value: Any, mechanism: Any, ns: Numbers) -> Any:
+def _checked(name: str, value: Any, mechanism: Any, ns: ArrayNamespace) -> Any:
     low, high = _RANGES[name]
     # of several mechanisms the range that all have
     is_normal = mechanism == MECHANISMS.index("normal")

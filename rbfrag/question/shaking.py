@@ -1,4 +1,4 @@
-"""Shaking wherever it enters: values that another unit may have been meant for."""
+"""Checks of intensity measures for values that suggest another unit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOST_A_YEAR = 100.0
 
 
 def doubts_about(measures: Mapping[str, Any]) -> Iterator[Diagnostic]:
-    """Yield what is to be said of values of measures that no earthquake has.
+    """Yield warnings about intensity measures beyond any recorded earthquake.
 
     Args:
         measures: values by the names of :func:`rbfrag.predict`, arrays or numbers; NaN is passed
@@ -32,7 +32,7 @@ def doubts_about(measures: Mapping[str, Any]) -> Iterator[Diagnostic]:
 
 
 def doubts_about_rates(annual_rate: Any) -> Iterator[Diagnostic]:
-    """Yield what is to be said of rates of exceedance that no earthquakes have.
+    """Yield warnings about implausible exceedance rates.
 
     Args:
         annual_rate: rates [1/a], finite, shape (n,).

@@ -1,4 +1,4 @@
-"""Shapes on their planes: why no model answers for them, and what a model reads of them.
+"""Validation of block geometries, and the model inputs computed from them.
 
 One code for a single shape and for many: a :class:`Listener` raises the first reason of a single
 one, and keeps each's own of many. No numpy is loaded for a single shape.
@@ -139,11 +139,11 @@ _INSTEAD = {
 _RADIANS = "{name} = {{value:g}}° is unusually small: is it in radians? Angles are in degrees"
 
 
-class Listener(Protocol):
-    """Hears what is found about blocks."""
+class IssueCollector(Protocol):
+    """Collects errors and warnings about blocks."""
 
     def refuse(self, holds: Any, text: str, *fields: str, **values: Any) -> None:
-        """Say where blocks cannot be used, and why.
+        """Reject blocks with a reason.
 
         Args:
             holds: whether, or which.
@@ -153,14 +153,14 @@ class Listener(Protocol):
         """
 
     def unstable(self, holds: Any, text: str, **values: Any) -> None:
-        """Say where blocks fail at rest; arguments as for `refuse`."""
+        """Mark blocks that are unstable at rest; arguments as for `refuse`."""
 
     def remark(self, holds: Any, text: Diagnostic, **values: Any) -> None:
-        """Warn of the answer where it holds; the text may have values too."""
+        """Add a warning where a condition holds; the text may contain values."""
 
 
 class ModeShapes(NamedTuple):
-    """Shapes of one mode: numbers, or arrays of shape (m,).
+    """Geometries with one failure mode: numbers, or arrays of shape (m,).
 
     Args:
         body: the shapes.
@@ -193,30 +193,30 @@ class ModeShapes(NamedTuple):
 
     @property
     def wet(self) -> Any:
-        """Whether, or on which of them, water pushes."""
+        """True where water exerts a force on the block."""
         if self.push is None:
             return False
         along, off, _ = self.push
         return (along != 0.0) | (off != 0.0)
 
 
-def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
-    """Return the fields of the shape that is stated, () for a block; None where none is.
+def shape_among(fields: Collection[str]) -> tuple[str, ...] | None:
+    """Return the fields of the geometry that is given: () for a block, None without one.
 
     Raises:
         InputError: two shapes, a part of one, or planes without a shape.
     """
-    begun = [names for names in SHAPES if any(name in given for name in names)]
-    if "block" in given:
+    begun = [names for names in SHAPES if any(name in fields for name in names)]
+    if "block" in fields:
         # of a file or an outline the angle of the back plane may be stated
-        if others := [name for names in begun for name in names if name in given]:
+        if sides := [name for names in begun for name in names if name in fields]:
             raise InputError(
-                f"{others[0]} cannot be combined with block: give one description of the block",
-                fields=(others[0],),
+                f"{sides[0]} cannot be combined with block: give one description of the block",
+                fields=(sides[0],),
             )
         return ()
     if not begun:
-        if planes := [name for name in PLANES_OF_A_SHAPE if name in given]:
+        if planes := [name for name in PLANES_OF_A_SHAPE if name in fields]:
             raise InputError(
                 f"{planes[0]} requires the geometry of a block: give {WAYS}",
                 fields=SIDES_AND_PLANES,
@@ -224,12 +224,12 @@ def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
         return None
     first = begun[0]
     if len(begun) > 1:
-        one, other = (next(name for name in names if name in given) for names in begun[:2])
+        field, other = (next(name for name in names if name in fields) for names in begun[:2])
         raise InputError(
-            f"{other} cannot be combined with {one}: give one description of the block, {WAYS}",
+            f"{other} cannot be combined with {field}: give one description of the block, {WAYS}",
             fields=SIDES_AND_PLANES,
         )
-    if missing := [name for name in first if name not in given]:
+    if missing := [name for name in first if name not in fields]:
         raise InputError(
             f"{missing[0]} is missing: {', '.join(first)} together are the geometry of a block",
             fields=first,
@@ -255,61 +255,63 @@ IS_PLANE = frozenset({"beta_deg", *PLANES_OF_A_SHAPE})
 IS_SHAPE = frozenset({"beta_deg", *OF_A_SHAPE})
 
 
-def check_ranges(stated: Mapping[str, Any], listener: Listener, *, columns: bool = False) -> None:
-    """Refuse values that are out of the ranges of their fields, and say where angles are odd.
+def check_ranges(
+    values: Mapping[str, Any], issues: IssueCollector, *, columns: bool = False
+) -> None:
+    """Reject values outside the ranges of their fields, and warn of unusual angles.
 
     Args:
-        stated: values by field; NaN where a friction angle or a displacement is not stated.
-        listener: hears of it.
+        values: values by field; NaN where a friction angle or a displacement is not stated.
+        issues: hears of it.
         columns: call fields as the columns of tables that are written.
     """
-    for name, value in stated.items():
+    for name, value in values.items():
         is_friction = name in ("phi_deg", "phi_back_deg")
         if is_friction or name == "beta_deg":
             least = LEAST_DEG if is_friction else LEAST_DIP_DEG
             small = (abs(value) > 0.0) & (abs(value) < least) & (value % 0.25 != 0.0)
             text = Diagnostic(_RADIANS.format(name=name), "check_unit", fields=(name,))
-            listener.remark(small, text, value=value)
-        usable = QUANTITIES[name].range.holds(value)
-        if usable is True:  # a single number: no text is needed
+            issues.remark(small, text, value=value)
+        in_range = QUANTITIES[name].range.holds(value)
+        if in_range is True:  # a single number: no text is needed
             continue
         about, unknown = QUANTITIES[name], value != value
         shown = column_of(name) if columns else name
         if not is_friction and name != "displacement_m":
             why = "is empty" if columns else "is not a number"
             level = ": enter 0 for a level base" if columns and name == "beta_deg" else ""
-            listener.refuse(unknown, f"{shown} {why}{level}", name)
+            issues.refuse(unknown, f"{shown} {why}{level}", name)
         allowed = f"{about.range.words} {about.unit}".rstrip()
         if about.unit == "deg":
             allowed = re.sub(r"(\d+)", r"\1°", about.range.words)
         wrong = f"{shown} must be {allowed}, not {{value:.10g}}"
-        listener.refuse(usable ^ True ^ unknown, wrong, name, value=value)
+        issues.refuse(in_range ^ True ^ unknown, wrong, name, value=value)
 
 
-def check_lengths(lengths: Mapping[str, Any], listener: Listener) -> None:
-    """Question lengths that are seldom meant: centimetres may have been typed.
+def check_lengths(lengths: Mapping[str, Any], issues: IssueCollector) -> None:
+    """Warn of lengths that suggest centimetres.
 
     Args:
         lengths: values by field [m].
-        listener: hears of it.
+        issues: hears of it.
     """
     for name in LENGTHS:
         if name in lengths:
             text = Diagnostic(
                 f"Check the unit: {word_of(name)} {{value:g}} m (in cm?)", "check_unit"
             )
-            listener.remark(lengths[name] > MOST_M, text, value=lengths[name])
+            issues.remark(lengths[name] > MOST_M, text, value=lengths[name])
 
 
-def check_size(p2: Any, listener: Listener) -> None:
-    """Question a p² [1/s²] that no block seen so far has."""
+def check_size(p2: Any, issues: IssueCollector) -> None:
+    """Warn of a p² [1/s²] outside the range of known blocks."""
     text = Diagnostic(SMALL_P2, "check_unit")
     small = (p2 > 0.0) & (p2 < LEAST_P2)
-    listener.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
+    issues.remark(small, text, value=p2, size=15.0 / (p2 + (small ^ True)))
 
 
 def size_questions(p2: Any, shape: tuple[int, ...] = ()) -> tuple[Diagnostic, ...]:
-    """Return the question about p² [1/s²] of blocks that are given by their numbers.
+    """Return the warning about p² [1/s²] of blocks given by their parameters.
 
     Args:
         p2: a number, an array, or None.
@@ -341,97 +343,97 @@ def numbers_of_shape(
     facts: KindSpec,
     judged: ModeShapes,
     displacement_m: Any,
-    stated: Mapping[str, Any],
-    listener: Listener,
+    options: Mapping[str, Any],
+    issues: IssueCollector,
 ) -> dict[str, Any]:
-    """Return what the model of a kind reads of shapes of one mode, by field.
+    """Return the model inputs of blocks with one failure mode, by field.
 
     Args:
         facts: the kind that answers.
         judged: the shapes.
         displacement_m: displacements that are too far [m], NaN where none is stated.
-        stated: restitutions and standard deviations that are stated, by field.
-        listener: hears why shapes cannot be answered for.
+        options: restitutions and standard deviations that are stated, by field.
+        issues: hears why shapes cannot be answered for.
     """
-    check_ranges({"displacement_m": displacement_m}, listener)
+    check_ranges({"displacement_m": displacement_m}, issues)
     k, mode = judged.k, judged.mode
     words: dict[str, Any] = {"k": k, "mode": words_of_mode(mode), "kind": facts.kind}
     angles = {"beta": judged.beta_deg, "alpha1": judged.body.alpha1_deg}
     angles["alpha3"] = judged.body.alpha3_deg
     forward_at_rest = TOPPLES_AT_REST if mode == "topple" else UNSTABLE_AT_REST
-    listener.unstable(k <= 0.0, forward_at_rest, **words, **angles)
+    issues.unstable(k <= 0.0, forward_at_rest, **words, **angles)
     if facts.mode != mode:
-        listener.refuse(judged.taken, FRICTION_MISSING, "phi_deg")
+        issues.refuse(judged.taken, FRICTION_MISSING, "phi_deg")
         words["instead"] = _INSTEAD.get(mode, "")
-        listener.refuse(True, OTHER_MODE, "displacement_m", **words)
+        issues.refuse(True, OTHER_MODE, "displacement_m", **words)
         return {}
     if not facts.parameters:
-        listener.refuse(True, NO_MODEL_OF_MODE, **words)
+        issues.refuse(True, NO_MODEL_OF_MODE, **words)
         return {}
-    listener.refuse(k == math.inf, LOCKED_AT_REST, **words)
-    listener.remark(judged.wet, UNDRAINED_NOTE)
+    issues.refuse(k == math.inf, LOCKED_AT_REST, **words)
+    issues.remark(judged.wet, UNDRAINED_NOTE)
     single = isinstance(judged.body, Block)
     functions: Elementwise[Any] = SCALAR if single else array_elementwise()
     for holds, warning, values in idealisations(
         judged.body, mode, k, judged.beta_deg, judged.phi_deg, judged.phi_back_deg,
         False if facts.free_standing else judged.backed, functions,
     ):  # fmt: skip
-        listener.remark(holds & (judged.taken ^ True), warning, **values)
+        issues.remark(holds & (judged.taken ^ True), warning, **values)
     if mode == "topple" and not facts.free_standing:
-        listener.remark(judged.bonded, COHESION_NOTE)
+        issues.remark(judged.bonded, COHESION_NOTE)
     if slips_on_base(facts):
-        listener.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
-        listener.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
+        issues.refuse(judged.bonded, COHESIVE, "cohesion_pa", "phi_residual_deg", **words)
+        issues.refuse(judged.rough, ROUGH, "jrc", "phi_residual_deg", **words)
     if judged.pga_g is not None and mode in ("slide", "topple") and not facts.free_standing:
-        _say_what_gives_way(judged, listener)
+        _say_what_gives_way(judged, issues)
     if "ky" in facts.parameters:
-        listener.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
+        issues.refuse(displacement_m != displacement_m, SLIDES, "displacement_m", k=k)
         dip_deg = dip_of_factor(judged)
-        return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **stated}
+        return {"ky": k, "beta_deg": dip_deg, "displacement_m": displacement_m, **options}
     ignored = Diagnostic(
         _NOT_SLIDING.format(kind=facts.kind), "unused_input", fields=("displacement_m",)
     )
-    listener.remark(displacement_m == displacement_m, ignored)
+    issues.remark(displacement_m == displacement_m, ignored)
     if facts.search_needs == "block":  # shape, friction and dip decide how it moves
         p2 = p2_at_rest(judged, functions)
-        listener.refuse(p2 != p2, NO_UNIQUE_MOTION)
-        return {**dict(zip(facts.parameters, (k, p2), strict=True)), **stated}
-    listener.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
-    listener.remark((judged.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
+        issues.refuse(p2 != p2, NO_UNIQUE_MOTION)
+        return {**dict(zip(facts.parameters, (k, p2), strict=True)), **options}
+    issues.remark(judged.taken, TAKEN_NOT_TO_SLIP if facts.free_standing else TAKEN_TO_TOPPLE)
+    issues.remark((judged.backed ^ True) & stands_free_of(facts, False), _STANDS_FREE)
     if not facts.free_standing:
-        return {"p2": judged.body.p2, "kr": k, **stated}
+        return {"p2": judged.body.p2, "kr": k, **options}
     body = judged.body
-    forward, backward, p2, own, least = rocking_at_rest(
+    forward, backward, p2, default_restitution, least = rocking_at_rest(
         tan_alpha1=body.tan_alpha1, tan_alpha3=body.tan_alpha3, half_s1_m=body.half_s1_m,
         inertia_m2=body.inertia_m2, tan_beta=tan_deg(judged.beta_deg, functions),
         functions=functions,
     )  # fmt: skip
-    listener.unstable(forward <= 0.0, TOPPLES_AT_REST, **angles)
-    listener.unstable(backward <= 0.0, LEANS_AT_REST, **angles)
-    listener.refuse(least <= 0.0, STEEP)
+    issues.unstable(forward <= 0.0, TOPPLES_AT_REST, **angles)
+    issues.unstable(backward <= 0.0, LEANS_AT_REST, **angles)
+    issues.refuse(least <= 0.0, STEEP)
     weaker = forward <= backward
     kr = functions.where(weaker, forward, backward)
     uneven = abs(forward - backward) > 1e-6 * (1.0 + forward * backward) * abs(forward)
     for holds, sense in ((weaker, "forward"), (weaker ^ True, "backward")):
         text = Diagnostic(_WEAKER.format(sense=sense), "not_symmetric")
-        listener.remark(uneven & holds, text)
-    restitution = stated.get("restitution", own)
-    restitution = functions.where(restitution == restitution, restitution, own)
-    return {**stated, "p2": p2, "kr": kr, "restitution": restitution}
+        issues.remark(uneven & holds, text)
+    restitution = options.get("restitution", default_restitution)
+    restitution = functions.where(restitution == restitution, restitution, default_restitution)
+    return {**options, "p2": p2, "kr": kr, "restitution": restitution}
 
 
-def _say_what_gives_way(judged: ModeShapes, listener: Listener) -> None:
-    """Say at which PGA a slide tips about its heel, or the toe of a topple slips."""
+def _say_what_gives_way(judged: ModeShapes, issues: IssueCollector) -> None:
+    """Warn of the PGA at which the heel of a slide lifts or the toe of a topple slips."""
     about, threshold_g = (
         (HEEL_TIPS, heel_tips_g) if judged.mode == "slide" else (TOE_SLIPS, toe_slips_g)
     )
     at_g = threshold_g(judged.body, judged.beta_deg, judged.phi_deg, judged.push)
     exceeded = (judged.pga_g > at_g) & (judged.pga_g > judged.k) & (judged.taken ^ True)
-    listener.remark(exceeded, about, threshold=at_g)
+    issues.remark(exceeded, about, threshold=at_g)
 
 
 def dip_of_factor(judged: ModeShapes) -> Any:
-    """Return the dip [deg] that gives wet slides the factor of their displacements.
+    """Return the dip [deg] for the displacement factor of sliding blocks with water.
 
     Models derive cos(φ - b)/cos φ from k_y and a dip b with φ = b + atan k_y. Water lessens k_y and
     leaves the factor F as it is: b = acos(cos(atan k_y)/F) - atan k_y. Where F is less than any of
@@ -458,7 +460,9 @@ def dip_of_factor(judged: ModeShapes) -> Any:
 
 
 def p2_at_rest(judged: ModeShapes, functions: Elementwise[Any]) -> Any:
-    """Return p_s² of slumps, or p_ct² of confined topples [1/s²]; NaN where none is unique."""
+    """Return p_s² of slumps or p_ct² of confined topples [1/s²]; NaN where the motion is not
+    unique.
+    """
     body = judged.body
     slumps = judged.mode == "slump"
     trigonometry: Any = math

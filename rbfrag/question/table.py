@@ -1,4 +1,4 @@
-"""Headers and cells of tables: which column is which field, in which unit.
+"""Headers and cells of tables: the field and unit of each column.
 
 Names in five languages stand in :mod:`rbfrag.vocabulary.headers`. A column that is not understood
 is named as ignored; one that sounds like an input that would change the answer is rejected.
@@ -110,7 +110,7 @@ class HeaderMatch(NamedTuple):
 
 @cache
 def _names() -> dict[str, str]:
-    """Return the fields by all the names of their columns."""
+    """Return the fields by all accepted names of their columns."""
     by_name: dict[str, str] = {}
     for name in COLUMNS:
         for alias in (name, column_of(name), word_of(name), *INPUTS[name].aliases):
@@ -129,13 +129,13 @@ def normalized_words(text: str) -> list[str]:
 
 
 def header_of(name: str) -> str:
-    """Return a name for the column of a field: what people call it, and its unit."""
+    """Return a readable column header for a field: its name and unit."""
     unit = QUANTITIES[name].unit
     return f"{word_of(name)} [{unit}]" if unit else word_of(name)
 
 
 def field_of(header: str) -> HeaderMatch | None:
-    """Return the field that a header names; None for no field."""
+    """Return the field that a header names; None for an unknown header."""
     if (exact := _names().get(header)) is not None:
         return HeaderMatch(exact, None, "no_back" if header == "no_back" else exact)
     text = header.strip().lower()
@@ -157,7 +157,7 @@ def _as_name(text: str) -> str:
 
 
 def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
-    """Return the field of a header without its unit."""
+    """Return the field of a header, without its unit."""
     name = _names().get(_as_name(text))
     if name is not None:
         return HeaderMatch(name, unit, "no_back" if text == "no_back" else name)
@@ -188,17 +188,17 @@ def _called(text: str, unit: str | None = None) -> HeaderMatch | None:
 
 
 def kind_named(text: str) -> str | None:
-    """Return the kind of failure that a word names, in any of five languages; None for no kind."""
+    """Return the kind of failure named by a word in any of five languages; None if unknown."""
     return _KINDS.get(" ".join(normalized_words(text)))
 
 
 def yes_or_no(text: str) -> bool | None:
-    """Return whether a cell says yes; None where it says neither yes nor no."""
+    """Return whether a cell means yes; None if it means neither yes nor no."""
     return headers.ANSWERS.get(" ".join(normalized_words(text)))
 
 
 def drainage_named(text: str) -> str:
-    """Return the drainage that a cell names, in any of five languages; yes means drained.
+    """Return the drainage named by a cell in any of five languages; yes means drained.
 
     What names none is returned as it is.
     """
@@ -209,24 +209,24 @@ def drainage_named(text: str) -> str:
 
 
 def kinds_in(cells: Sequence[str], header: str, source: object) -> list[str] | None:
-    """Return the kinds that the cells of a column name; None where no cell names one.
+    """Return the kinds named by the cells of a column; None if no cell names one.
 
     Raises:
         InputError: some words name a kind and some do not, or one is misspelled.
     """
     by_word = {cell: kind_named(cell) for cell in dict.fromkeys(cells) if cell.strip()}
-    others = [word for word, kind in by_word.items() if kind is None]
-    near = next((w for w in others for k in _KINDS if _is_near(w.lower(), k)), None)
-    if near is not None or (others and len(others) < len(by_word)):
+    rest = [word for word, kind in by_word.items() if kind is None]
+    near = next((w for w in rest for k in _KINDS if _is_near(w.lower(), k)), None)
+    if near is not None or (rest and len(rest) < len(by_word)):
         raise InputError(
-            f"{source}: column {header!r}: {near or others[0]!r:.42} is not a kind of failure; use "
+            f"{source}: column {header!r}: {near or rest[0]!r:.42} is not a kind of failure; use "
             f"{', '.join(KINDS)}, or leave the cell empty"
         )
-    return None if others else [by_word.get(cell) or "" for cell in cells]
+    return None if rest else [by_word.get(cell) or "" for cell in cells]
 
 
 def number_with_unit(text: str, unit: str, *, commas: bool = True) -> float | None:
-    """Return the number of a text in a unit: "40cm/s", "5°", "2,6"; None where it is none.
+    """Return the number in a text with a unit ("40cm/s", "5°", "2,6"); None if there is none.
 
     Args:
         text: a number, perhaps with its unit behind it.
@@ -242,26 +242,26 @@ def number_with_unit(text: str, unit: str, *, commas: bool = True) -> float | No
 
 
 def header_row(rows: Sequence[Sequence[object]]) -> int:
-    """Return which of the first rows of a table holds the names of its columns.
+    """Return the index of the row with the column names of a table.
 
     That is the first which is not empty; one without a field that is a number is a title above the
     first row that names two fields, or above the only one that names a number.
     """
     first = next((i for i, row in enumerate(rows) if any(map(_text, row))), 0)
-    stated = [_fields_in(row) for row in rows]
-    if not stated or _has_number(stated[first]):
+    row_fields = [_fields_in(row) for row in rows]
+    if not row_fields or _has_number(row_fields[first]):
         return first
     below = [
         i
-        for i, fields in enumerate(stated)
+        for i, fields in enumerate(row_fields)
         if _has_number(fields) and not any(map(_is_number, rows[i]))
     ]
-    two = [i for i in below if len(stated[i]) > 1]
+    two = [i for i in below if len(row_fields[i]) > 1]
     return two[0] if two else below[0] if len(below) == 1 else first
 
 
 def fields_stated(rows: Sequence[Sequence[object]]) -> int:
-    """Return how many fields the names of the columns state; see :func:`header_row`."""
+    """Return the number of fields that column names match; see :func:`header_row`."""
     return len(_fields_in(rows[header_row(rows)])) if rows else 0
 
 
@@ -302,7 +302,7 @@ class Header(NamedTuple):
     warnings: tuple[Diagnostic, ...]
 
     def ignored(self, header: Sequence[str], used: Collection[str]) -> Iterator[Diagnostic]:
-        """Yield the warning that names the columns that an answer ignores.
+        """Yield the warning that names the ignored columns.
 
         Args:
             header: all columns of the table.
@@ -312,14 +312,14 @@ class Header(NamedTuple):
         carried = {text for text, field in self.unused.items() if field in CARRIED}
         names = [name for name in header if name not in headers | carried]
         earlier = [name for name in names if name in WRITTEN or name.startswith("annual_rate")]
-        others = [name for name in names if name not in earlier]
-        for names, text in ((others, "ignored"), (earlier, "of an earlier answer ignored")):
+        unused = [name for name in names if name not in earlier]
+        for names, text in ((unused, "ignored"), (earlier, "of an earlier answer ignored")):
             if names:
                 word = "column" if len(names) == 1 else "columns"
                 yield Diagnostic(f"{word} {text}: {', '.join(names)}", "ignored_columns")
 
     def check_unused(self, source: object, present: Collection[str]) -> None:
-        """Reject a column that is not used and would change the answer.
+        """Reject an unused column that would change the answer.
 
         That is one that is not understood and sounds like an input, and one that multiplies
         what is counted.
@@ -342,16 +342,16 @@ class Header(NamedTuple):
             field = sounds_like(text)
             if field is None or not {field, *INSTEAD_OF.get(field, ())}.isdisjoint(present):
                 continue
-            what = "back fracture" if field == "back_fracture" else QUANTITIES[field].noun
+            noun = "back fracture" if field == "back_fracture" else QUANTITIES[field].noun
             raise InputError(
-                f"{source}: the column {text[:60]!r} is unknown; for the {what} use "
+                f"{source}: the column {text[:60]!r} is unknown; for the {noun} use "
                 f"{column_of(field)!r}, else use ignore_columns {text[:60]!r}",
                 fields=("ignore_columns",),
             )
 
 
 def sounds_like(header: str) -> str | None:
-    """Return the field that would change the answer and that a header sounds like."""
+    """Return the field that an unknown header probably means, if it would change the answer."""
     words = normalized_words(header)
     if any(word.startswith(headers.REMARKS) for word in words):
         return None
@@ -368,7 +368,7 @@ def columns_in(
     read: Collection[str],
     ignore_columns: Collection[str] = (),
 ) -> Header:
-    """Return which columns of a table are which fields.
+    """Return the field of each column of a table.
 
     Args:
         header: what the table calls its columns.
@@ -437,15 +437,17 @@ def columns_in(
     return Header(columns, tuple(unknown), unused, tuple(warnings))
 
 
-def unit_factor(unit: str, stated: str) -> float | None:
-    """Return what turns numbers in a stated unit into one of :data:`FACTORS`; None if nothing."""
-    own, word = (each.lower().translate(_SUPERSCRIPTS) for each in (unit, stated))
+def unit_factor(unit: str, source_unit: str) -> float | None:
+    """Return the factor from the source unit to the unit of a field in :data:`FACTORS`; None if
+    unknown.
+    """
+    target, word = (text.lower().translate(_SUPERSCRIPTS) for text in (unit, source_unit))
     word = word.rstrip(".") or word
-    return FACTORS.get(unit, {}).get(word, 1.0 if own and own == word else None)
+    return FACTORS.get(unit, {}).get(word, 1.0 if target and target == word else None)
 
 
 def _reject_near_miss(text: str, source: object, read: Collection[str]) -> None:
-    """Reject a header of five letters or more that misses a name by an edit, or by a swap."""
+    """Reject a header of five letters or more that is one edit or one swap away from a name."""
     bare = _IN_BRACKETS.sub("", text.strip().lower()).replace(" ", "_")
     end = _AT_THE_END.fullmatch(bare)
     if bare in WRITTEN or sum(map(str.isalpha, bare)) < _FEWEST_LETTERS:
@@ -458,14 +460,14 @@ def _reject_near_miss(text: str, source: object, read: Collection[str]) -> None:
             )
 
 
-def _is_near(one: str, other: str) -> bool:
-    """Return whether two texts differ by one edit, or by a swap of two neighbours."""
-    if abs(len(one) - len(other)) > 1 or one == other or len(other) < _FEWEST_LETTERS:
+def _is_near(text: str, other: str) -> bool:
+    """Return whether two texts differ by one edit, or by a swap of two neighbouring letters."""
+    if abs(len(text) - len(other)) > 1 or text == other or len(other) < _FEWEST_LETTERS:
         return False
-    start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
+    start = next((i for i, (a, b) in enumerate(zip(text, other, strict=False)) if a != b), None)
     if start is None:
         return True
-    a, b = one[start:], other[start:]
-    if len(one) == len(other):
+    a, b = text[start:], other[start:]
+    if len(text) == len(other):
         return a[1:] == b[1:] or (a[:2] == b[1::-1] and a[2:] == b[2:])
-    return a[1:] == b if len(one) > len(other) else a == b[1:]
+    return a[1:] == b if len(text) > len(other) else a == b[1:]

@@ -130,7 +130,7 @@ CODES: Mapping[str, tuple[str, str]] = {
 
 
 class Diagnostic(str):
-    """A warning; it is its own text.
+    """A warning: a string with a code.
 
     Args:
         text: the fact and its consequence.
@@ -179,7 +179,7 @@ def with_prefix(prefix: str, warning: str) -> Diagnostic:
 
 
 def diagnostics(*groups: Iterable[str]) -> tuple[Diagnostic, ...]:
-    """Return the warnings of an answer, each text once and with all of its rows."""
+    """Return the warnings of an answer, each text once with all its rows."""
     by_text: dict[str, list[Diagnostic]] = {}
     for group in groups:
         for text in group:
@@ -223,7 +223,9 @@ def as_documents(warnings: Iterable[str]) -> list[dict[str, Any]]:
 
 
 def with_diagnostics(document: Any) -> Any:
-    """Return a JSON document, or each of a list, with ``diagnostics`` next to its ``warnings``."""
+    """Return a JSON document with ``diagnostics`` in addition to its ``warnings``, or each of a
+    list.
+    """
     if isinstance(document, list):
         return [with_diagnostics(part) for part in document]
     if not isinstance(document, Mapping) or "warnings" not in document:
@@ -245,7 +247,7 @@ def codes_by_row(warnings: Iterable[str], size: int) -> Any:
 
 
 def texts_by_row(texts: Iterable[tuple[str, Any]], size: int, separator: str) -> Any:
-    """Return the texts that hold for each row, joined, an array of texts of shape (size,).
+    """Return the joined texts of each row, an array of texts of shape (size,).
 
     Args:
         texts: up to 64 texts with the rows that they hold for, as indices or as a mask.

@@ -36,12 +36,12 @@ def percent(p: float) -> str:
 
 
 def interval(low: float, high: float) -> str:
-    """Return an interval of probabilities in percent, "7.4–26 %"; one where both ends agree."""
+    """Return an interval of probabilities in percent, "7.4–26 %"; one number if both ends agree."""
     return "–".join(dict.fromkeys((_in_percent(low), _in_percent(high)))) + " %"
 
 
 def with_interval(p: float, low: float, high: float) -> str:
-    """Return a probability with its interval, "15 % (7.4–26 %)", unless that adds nothing."""
+    """Return a probability with its interval, "15 % (7.4–26 %)", unless the interval is a point."""
     ends = interval(low, high)
     return percent(p) if ends == percent(p) else f"{percent(p)} ({ends})"
 
@@ -52,7 +52,7 @@ def equals(name: str, value: str) -> str:
 
 
 def exact_percent(fraction: float) -> str:
-    """Return a level or a threshold in percent with all its digits: "97.5 %"."""
+    """Return a level or a threshold in percent with all digits: "97.5 %"."""
     return f"{100.0 * fraction:g} %"
 
 
@@ -88,12 +88,12 @@ def return_periods(low: float, high: float) -> str:
 
 
 def count_of(number: int, noun: str) -> str:
-    """Return a number with its noun, in the plural unless it is one: "12 blocks"."""
+    """Return a number with its noun in the correct form: "12 blocks"."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def place(lon: float, lat: float) -> str:
-    """Return a place of a longitude and latitude [deg]: "37.180 N, 121.930 W"."""
+    """Format a longitude and latitude [deg]: "37.180 N, 121.930 W"."""
     return f"{abs(lat):.3f} {'S' if lat < 0.0 else 'N'}, {abs(lon):.3f} {'W' if lon < 0.0 else 'E'}"
 
 
@@ -111,7 +111,7 @@ def annual_rates(low: float, high: float) -> str:
 
 
 def rounded(value: float) -> str:
-    """Return a number with three digits and without an exponent where people write none."""
+    """Return a number with three digits, without an exponent where possible."""
     if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
         return f"{value:.2g}"
     text = f"{value:#.3g}"

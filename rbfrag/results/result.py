@@ -1,4 +1,4 @@
-"""`Result`: an answer that every interface shows in the same words.
+"""`Result`: base class of answers, which every interface shows in the same words.
 
 The class of an answer states its sentences, its labelled lines and its tables; the command line,
 HTTP, the web page, reports and notebooks print these and write none of their own. The design
@@ -26,7 +26,7 @@ class TextLine(NamedTuple):
 
 
 class TextTable(NamedTuple):
-    """A table for a terminal with its title; without headers its rows are names and values."""
+    """A table for a terminal; without headers, its rows are names and values."""
 
     headers: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -47,7 +47,7 @@ class TextTable(NamedTuple):
     def of_rows(
         cls, rows: Sequence[Mapping[str, object]], *, verbose: bool = False, title: str = ""
     ) -> TextTable:
-        """Return rows under their names, without the columns that are empty in all of them.
+        """Return rows with column names, without empty columns.
 
         Args:
             rows: values by name, the same names in each.
@@ -63,7 +63,7 @@ class TextTable(NamedTuple):
 
 
 class Tabular:
-    """An answer that turns into a table: one row, or one for each element of its arrays.
+    """An answer that can be converted to a table: one row, or one for each element of its arrays.
 
     Base of dataclasses.
     """
@@ -75,7 +75,7 @@ class Tabular:
         return columns_of(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the answer as a pandas table, with the names and units of its fields."""
+        """Return the answer as a pandas DataFrame, with the names and units of its fields."""
         from rbfrag.frames import frame_of
 
         return frame_of(self.table_columns())
@@ -85,13 +85,13 @@ class Tabular:
         yield from self.to_frame().to_dict("records")
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
+        """Return the HTML table for a notebook."""
         from rbfrag.frames import html_of
 
         return html_of(self.to_frame())
 
     def __repr__(self) -> str:
-        """Return name and columns on one line; of arrays their number."""
+        """Return name and columns on one line; for arrays, their length."""
         parts = (
             f"{name}=[{value.size} values]" if hasattr(value, "ravel") else f"{name}={value!r}"
             for name, value in self.table_columns().items()
@@ -101,20 +101,20 @@ class Tabular:
 
 
 class Result(Tabular, ABC):
-    """Base of the answers; a subclass is a dataclass with ``warnings``."""
+    """Base class of the answers; a subclass is a dataclass with ``warnings``."""
 
     warnings: Sequence[str]
 
     @abstractmethod
     def sentences(self) -> Iterator[str]:
-        """Yield the number that decides, with its interval, and what belongs to it."""
+        """Yield the headline: the main number with its interval, and related numbers."""
 
     def headline(self) -> str:
-        """Return the number that decides, with its interval."""
+        """Return the main number with its interval."""
         return next(self.sentences())
 
     def lines(self) -> Iterator[TextLine]:
-        """Yield labelled lines: what was asked, and which model answers."""
+        """Yield labelled lines: the inputs and the model."""
         return iter(())
 
     def tables(self, *, verbose: bool = False) -> Iterator[TextTable]:
@@ -131,17 +131,17 @@ class Result(Tabular, ABC):
         """Return the answer under the keys of the JSON contract."""
 
     def _repr_html_(self) -> str:
-        """Return the answer as a notebook shows it: sentences, lines, warnings, numbers."""
+        """Return the answer for a notebook: sentences, lines, warnings, numbers."""
         from html import escape
 
         lines = (f"{label}: {text}" if label else text for label, text in self.lines())
         texts = (*self.sentences(), *lines, *labelled(self.warnings))
-        first, *others = map(escape, texts)
-        body = "<br>".join((f"<b>{first}</b>", *others))
+        first, *rest = map(escape, texts)
+        body = "<br>".join((f"<b>{first}</b>", *rest))
         return f"<p>{body}</p>{super()._repr_html_()}"
 
     def document(self, *, text: bool = False) -> dict[str, Any]:
-        """Return the JSON document: the contract's keys and ``diagnostics``.
+        """Return the JSON document: the keys of the contract and ``diagnostics``.
 
         Args:
             text: with the sentences and labelled lines under ``text``.

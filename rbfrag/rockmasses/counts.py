@@ -1,4 +1,4 @@
-"""How many blocks of a rock mass fail in each mode, and at which acceleration."""
+"""Failure modes of the blocks of a rock mass: number of blocks and yield accelerations by mode."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SLOPE_BLOCKS = 400
 
 @dataclass(frozen=True)
 class StateCount:
-    """States and yields of some blocks.
+    """States and yield accelerations of a set of blocks.
 
     Args:
         states: number of blocks by state.
@@ -38,7 +38,7 @@ class StateCount:
 
 @dataclass(frozen=True)
 class ModeCount(StateCount):
-    """The blocks of one mode.
+    """Blocks of one mode.
 
     Args:
         share_error: standard error of the share from the finite number of realisations.
@@ -55,7 +55,7 @@ class ModeCount(StateCount):
 
 @dataclass(frozen=True)
 class EqualCounts:
-    """A PGA at which two modes have lost equally many blocks.
+    """PGA at which equally many blocks of two modes have reached yield.
 
     Args:
         below: the mode with more blocks of lower yield below this PGA.
@@ -73,7 +73,7 @@ class EqualCounts:
 
 
 def mode_counts(realisations: Realisations) -> dict[ModeName, ModeCount]:
-    """Return the blocks of all modes, in the order of the mode codes."""
+    """Return the blocks by mode, in the order of the mode codes."""
     drained = realisations.drained
     counts: dict[ModeName, ModeCount] = {}
     for mode in MODES:
@@ -92,7 +92,7 @@ def mode_counts(realisations: Realisations) -> dict[ModeName, ModeCount]:
 
 
 def _state_count(realisations: Realisations, chosen: NDArray[np.bool_]) -> StateCount:
-    """Return the states and yields of some blocks, shape (n,)."""
+    """Return the states and yield accelerations of blocks, shape (n,)."""
     stability = realisations.stability
     by_state = np.bincount(stability.state_code[chosen], minlength=len(STATES)).tolist()
     stable = stability.yield_acceleration[chosen & (stability.state_code == STABLE)]
@@ -103,7 +103,7 @@ def _state_count(realisations: Realisations, chosen: NDArray[np.bool_]) -> State
 
 
 def sorted_yields(realisations: Realisations, mode: ModeName) -> FloatArray:
-    """Return the yield accelerations of a mode, rising [g]; those unstable at rest count as 0.
+    """Return the sorted yield accelerations of a mode [g]; blocks unstable at rest count as 0.
 
     Locked blocks, which no horizontal acceleration moves, are left out.
     """
@@ -114,7 +114,7 @@ def sorted_yields(realisations: Realisations, mode: ModeName) -> FloatArray:
 def cumulative_counts(
     realisations: Realisations, mode: ModeName, pga_g: FloatArray
 ) -> NDArray[np.int64]:
-    """Return the number of blocks of a mode whose yield acceleration is not above PGA.
+    """Return the number of blocks of a mode with a yield acceleration of at most PGA.
 
     These are counts of blocks, not shares of their mode: the curves of two modes may be compared.
 
@@ -125,7 +125,7 @@ def cumulative_counts(
 
 
 def crossings(realisations: Realisations) -> list[EqualCounts]:
-    """Return where the cumulative counts of two modes cross, by rising PGA.
+    """Return the PGA at which the cumulative counts of two modes cross, in increasing order.
 
     A crossing lies between two ranges of PGA in which one mode and then the other leads by more
     than three standard errors of the difference; closer races are chance. Its own standard error
@@ -169,7 +169,7 @@ def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) ->
 
 
 def _error(k: FloatArray, total: NDArray[np.int64], lead: NDArray[np.int64], at: int) -> float:
-    """Return the standard error of a crossing: that of the difference over its slope."""
+    """Return the standard error of a crossing: standard error of the difference over its slope."""
     half = max(1, min(_SLOPE_BLOCKS, k.size // 10))
     low, high = max(at - half, 0), min(at + half, k.size - 1)
     slope = abs(float(lead[high] - lead[low])) / float(k[high] - k[low])

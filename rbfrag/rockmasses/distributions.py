@@ -1,4 +1,4 @@
-"""How the dip, the spacing or the friction of a rock mass scatters.
+"""Probability distributions of the variables of a rock mass: dip, spacing, friction.
 
 Every law turns one uniform number into one value by its inverse distribution function. A
 truncation then only narrows the range of the uniform numbers, and a value depends on nothing
@@ -40,7 +40,7 @@ _NODES = 20001
 
 @dataclass(frozen=True)
 class Distribution:
-    """The law of one variable of a rock mass; make one with :meth:`of`.
+    """Distribution of one variable of a rock mass; created by :meth:`of`.
 
     Args:
         location: value of a constant, mean, median, or centre of the circular law.
@@ -59,7 +59,7 @@ class Distribution:
 
     @classmethod
     def of(cls, description: object, *, angle: bool) -> Distribution:
-        """Return the law that a number or a table of keys describes.
+        """Return the distribution described by a number or a table of keys.
 
         Args:
             description: a number, or a mapping with ``distribution`` and the keys of that law:
@@ -111,13 +111,13 @@ class Distribution:
 
     @property
     def centres(self) -> tuple[float, ...]:
-        """Numbers that must lie in the permitted range of the variable: centre, ends or data."""
+        """Values that must lie in the permitted range: centre, ends or data."""
         if self.law == "uniform":
             return (self.low, self.high)
         return self.values or (self.location,)
 
     def __str__(self) -> str:
-        """Return the law in words with its truncation."""
+        """Describe the distribution and its truncation."""
         if self.law == "constant":
             return f"{self.location:.10g}"
         if self.law == "measured":
@@ -136,7 +136,7 @@ class Distribution:
 
     @property
     def is_truncated(self) -> bool:
-        """Whether a part of the law is cut off."""
+        """True if the distribution is truncated."""
         return self.law in TRUNCATED and (self.low > -math.inf or self.high < math.inf)
 
     def sample(self, n: int, random: np.random.Generator) -> FloatArray:
@@ -185,7 +185,7 @@ class Distribution:
     # differs by 1e-11: a truncation narrows the uniform numbers instead.
 
     def _cdf(self, value: float) -> float:
-        """Return the probability of smaller values before truncation."""
+        """Return the cumulative probability before truncation."""
         if math.isinf(value):
             return 0.0 if value < 0.0 else 1.0
         if self.law == "von_mises":
@@ -200,7 +200,7 @@ class Distribution:
         return float(ndtr((value - self.location) / self.scale))
 
     def _ppf(self, probability: FloatArray) -> FloatArray:
-        """Return the values that have these probabilities of smaller ones before truncation."""
+        """Return the quantiles before truncation."""
         if self.law == "von_mises":
             angles, probabilities = self._von_mises_table()
             return self.location + np.interp(probability, probabilities, angles)
@@ -211,7 +211,7 @@ class Distribution:
         return np.asarray(self.location + self.scale * ndtri(probability))
 
     def _von_mises_table(self) -> tuple[FloatArray, FloatArray]:
-        """Return angles from the mean [deg] and the probability of smaller ones.
+        """Return angles from the mean [deg] and their cumulative probability.
 
         The trapezoid rule: scipy.stats.vonmises.ppf searches each value for itself, 75 s for 20,000
         of them, and vonmises.cdf approximates above kappa = 50 (at 130 by 4e-4 degrees).

@@ -1,4 +1,4 @@
-"""Shares of the blocks of a rock mass that a motion brings down, mode by mode, and their report."""
+"""Fraction of the blocks of a rock mass that fail in a motion, by mode, and its report."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rbfrag.solver.stability.modes import MODES, TOPPLE, ModeName, words_of_mode
 
 
 def exact_interval(count: int, of: int, level: float) -> tuple[float, float]:
-    """Return the interval of Clopper and Pearson for the share behind a count.
+    """Return the Clopper–Pearson confidence interval of a binomial fraction.
 
     It covers the true share with at least the stated probability, whatever the share is, because
     it is made of the tails of the binomial distribution itself.
@@ -40,7 +40,7 @@ QUANTILES = (0.5, 0.95)
 
 @dataclass(frozen=True)
 class CountedShare:
-    """A counted share with the interval that the finite number of blocks leaves."""
+    """Counted fraction with the confidence interval for a finite number of blocks."""
 
     value: float
     low: float
@@ -48,17 +48,17 @@ class CountedShare:
 
     @classmethod
     def of(cls, count: int, total: int, level: float) -> CountedShare:
-        """Return the share of a count in a total."""
+        """Return the fraction of a count in a total."""
         return cls(count / total, *exact_interval(count, total, level))
 
     def as_dict(self) -> dict[str, float]:
-        """Return it under the keys of the JSON contract."""
+        """Return the fraction under the keys of the JSON contract."""
         return {"share": self.value, "ci_low": self.low, "ci_high": self.high}
 
 
 @dataclass(frozen=True)
 class ModeFailures:
-    """What became of the blocks of one mode, or of all, at one scale.
+    """Failures of the blocks of one mode, or of all, at one scale.
 
     Args:
         mode: the mode; None for all.
@@ -84,18 +84,18 @@ class ModeFailures:
 
     @property
     def fails(self) -> int:
-        """Number of blocks that fail by the motion; those that fail without it are not in it."""
+        """Number of blocks that fail by the motion, without those unstable at rest."""
         return self.outcomes["fails"]
 
     @property
     def open(self) -> int:
-        """Number of blocks of which it is open whether they fail."""
+        """Number of blocks with an undetermined outcome."""
         return sum(self.outcomes[name] for name in OPEN)
 
 
 @dataclass(frozen=True)
 class ScaleFailures:
-    """What became of the blocks at one scale of the motion.
+    """Failures of the blocks at one scale of the motion.
 
     Args:
         scale: factor on the motion.
@@ -110,7 +110,7 @@ class ScaleFailures:
 
 
 def failures(shaken: ShakenMass, level: float = 0.95) -> tuple[ScaleFailures, ...]:
-    """Count what became of the blocks, scale by scale."""
+    """Count the failures of the blocks, scale by scale."""
     realisations = shaken.realisations
     chosen = {mode: realisations.of_mode(mode) for mode in MODES}
     return tuple(
@@ -174,20 +174,20 @@ def failures_as_dict(
         "runs": shaken.runs,
         "scales": [
             {
-                "scale": each.scale,
-                "pga_g": each.pga_g,
-                "pgv_m_s": each.scale * shaking.motion.pgv_m_s,
-                "modes": {mode: _counts(of_mode) for mode, of_mode in each.modes.items()},
-                "all": _counts(each.total),
+                "scale": result.scale,
+                "pga_g": result.pga_g,
+                "pgv_m_s": result.scale * shaking.motion.pgv_m_s,
+                "modes": {mode: _counts(of_mode) for mode, of_mode in result.modes.items()},
+                "all": _counts(result.total),
                 "final_modes": final_modes(shaken, i),
             }
-            for i, each in enumerate(scales)
+            for i, result in enumerate(scales)
         ],
     }
 
 
 def final_modes(shaken: ShakenMass, i: int) -> dict[ModeName, dict[str, int]]:
-    """Return how many blocks of each mode end in which at one scale; ``none``: never moved."""
+    """Return the number of blocks by initial and final mode at one scale; ``none``: never moved."""
     names = (*MODES, "none")
     table = {}
     for mode in MODES:
@@ -199,7 +199,7 @@ def final_modes(shaken: ShakenMass, i: int) -> dict[ModeName, dict[str, int]]:
 
 
 def failure_warnings(shaken: ShakenMass) -> list[str]:
-    """Return sentences about the motion, and about blocks with how many they are about."""
+    """Return warnings about the motion, and about blocks with their number."""
     by_mode = {mode: int(shaken.realisations.of_mode(mode).sum()) for mode in MODES}
     return [
         *shaken.warnings,
@@ -227,7 +227,7 @@ def _counts(failures: ModeFailures) -> dict[str, Any]:
 
 
 def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
-    """Return the columns of the block table, one row a realisation and scale."""
+    """Return the columns of the block table, one row per realisation and scale."""
     columns = block_columns(shaken.realisations)
     reason = columns.pop("reason")
     scales = np.array(shaken.shaking.scales)

@@ -1,4 +1,4 @@
-"""A rock mass in a file.
+"""Rock mass files.
 
 TOML::
 
@@ -56,7 +56,7 @@ _LARGEST_BYTES = 10_000_000
 
 
 def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
-    """Return the rock mass that a TOML or CSV file describes.
+    """Read a rock mass from a TOML or CSV file.
 
     Args:
         path: file ending in ``.toml`` or ``.csv``.
@@ -78,7 +78,7 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
 
 
 def _with_measured(description: dict[str, object], folder: Path) -> dict[str, object]:
-    """Return a description with the planes of the tables that it names."""
+    """Return a description with the planes of the tables it names."""
     for name, value in description.items():
         is_plane = name.endswith(_PLANE) and isinstance(value, str)
         if is_plane and str(value).lower().endswith(".csv"):
@@ -87,7 +87,7 @@ def _with_measured(description: dict[str, object], folder: Path) -> dict[str, ob
 
 
 def rock_mass_of_toml(text: str) -> RockMass:
-    """Return the rock mass that TOML describes.
+    """Return the rock mass described in TOML.
 
     Raises:
         InputError: it is not TOML, or describes no rock mass; the message names the key.
@@ -96,7 +96,7 @@ def rock_mass_of_toml(text: str) -> RockMass:
 
 
 def rock_mass_of_csv(text: str) -> RockMass:
-    """Return the rock mass that CSV describes.
+    """Return the rock mass described in CSV.
 
     Raises:
         InputError: it is not CSV, or describes no rock mass; the message names the line or key.
@@ -105,7 +105,7 @@ def rock_mass_of_csv(text: str) -> RockMass:
 
 
 def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
-    """Return the rock mass that the tables of a TOML or JSON document describe.
+    """Return the rock mass described by the tables of a TOML or JSON document.
 
     Raises:
         InputError: they describe no rock mass; the message names the key.
@@ -114,7 +114,7 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
 
 
 def _flat(document: Mapping[str, object]) -> dict[str, object]:
-    """Return the keys of all tables of a document, each with the name of its table."""
+    """Return the keys of all tables of a document, each with its table name."""
     description: dict[str, object] = {}
     for name, content in document.items():
         if name not in _SECTIONS:

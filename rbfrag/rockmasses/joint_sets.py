@@ -1,4 +1,4 @@
-"""A rock mass with two fracture sets that scatter, and the blocks that chance makes of it."""
+"""Rock mass with two random joint sets, and the blocks sampled from it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _LARGEST_SEED = 2**63 - 1
 
 
 class Variable(NamedTuple):
-    """A quantity of the rock mass that may scatter.
+    """Variable of a rock mass that may be random.
 
     Args:
         stream: number of its own stream of random numbers; never to be given to another.
@@ -61,7 +61,7 @@ class Variable(NamedTuple):
 
     @property
     def range_text(self) -> str:
-        """The permitted range in words."""
+        """Permitted range for messages."""
         if math.isinf(self.high):
             return f"{self.low:g} or more" if self.from_low else f"above {self.low:g}"
         if self.from_low:
@@ -119,7 +119,7 @@ IMPOSSIBLE = (
 
 @dataclass(frozen=True)
 class RockMass:
-    """Two fracture sets, the friction on them and the size of the blocks between them.
+    """Two joint sets, their friction and the size of the blocks between them.
 
     Make one with :meth:`of`, or read it from a file.
 
@@ -142,7 +142,7 @@ class RockMass:
 
     @classmethod
     def of(cls, description: Mapping[str, object]) -> RockMass:
-        """Return the rock mass that a mapping describes.
+        """Return the rock mass described by a mapping.
 
         Args:
             description: keys such as ``base.dip_deg`` with a number or the keys of a
@@ -162,8 +162,8 @@ class RockMass:
         description, remarks = in_section(description)
         for key in description:
             if key not in VARIABLES and key not in _SETTINGS:
-                known = ", ".join((*VARIABLES, *_SETTINGS))
-                raise InputError(f"unknown key {key}: the keys of a rock mass are {known}")
+                keys = ", ".join((*VARIABLES, *_SETTINGS))
+                raise InputError(f"unknown key {key}: the keys of a rock mass are {keys}")
         variables: dict[str, Distribution] = {}
         for key, variable in VARIABLES.items():
             if key in description:
@@ -197,7 +197,7 @@ class RockMass:
         )
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
-        """Return n values of every variable, each from its own stream of random numbers."""
+        """Return n values of every variable, each from its own random stream."""
         streams = {key: VARIABLES[key].stream for key in self.variables}
         seeds = {key: np.random.SeedSequence(seed, spawn_key=(k,)) for key, k in streams.items()}
         return {
@@ -206,7 +206,7 @@ class RockMass:
         }
 
     def realise(self, n: int | None = None, seed: int | None = None) -> Realisations:
-        """Return blocks drawn at random, with their modes and yield accelerations.
+        """Sample blocks at random, with their modes and yield accelerations.
 
         Every variable has its own stream of random numbers: changing the law of one of them,
         or letting one more of them scatter, leaves the values of the others as they were.
@@ -223,7 +223,7 @@ class RockMass:
         return self.blocks_of(self.draw(n, seed), seed)
 
     def blocks_of(self, drawn: Mapping[str, FloatArray], seed: int = SEED) -> Realisations:
-        """Return the blocks of values of every variable, shape (n,) each.
+        """Return the blocks for values of every variable, shape (n,) each.
 
         Water that would stand above the top of a fracture fills it.
         """
@@ -288,22 +288,23 @@ class RockMass:
             first = on_joint(joint, phi, phi_back)
             if _RESIDUAL not in drawn:
                 return first
-            left = {name: values for name, values in joint.items() if name not in ENDED}
+            residual_joint = {name: values for name, values in joint.items() if name not in ENDED}
             residual = drawn[_RESIDUAL]
-            return replace(first, after_slip=on_joint(left, residual, residual))
+            return replace(first, after_slip=on_joint(residual_joint, residual, residual))
 
         # drained blocks are dry ones
         dry = {name: values for name, values in joint.items() if name != "water_m"}
         drains = self.drainage == DRAINED
         realisations = realised(dry if drains else joint)
-        stability, left = realisations.stability, realisations.in_time.stability
+        stability, residual_stability = realisations.stability, realisations.in_time.stability
         codes, sliver = stability.reason_code, len(IMPOSSIBLE) - 1
         # in place: all of these realisations are the same blocks
         reason[possible & ((codes != 0) | ~(stability.p2 > 0.0))] = sliver
         reason[possible & (codes == FLOATS)] = sliver - 1
-        reason[possible & ((codes == OF_JOINT) | ((codes == 0) & (left.reason_code != 0)))] = (
-            sliver - 2
-        )
+        reason[
+            possible
+            & ((codes == OF_JOINT) | ((codes == 0) & (residual_stability.reason_code != 0)))
+        ] = sliver - 2
         if np.any(water[possible] > 0.0):
             drained = realisations if drains else realised(dry)
             realisations = replace(realisations, drained=drained)
@@ -314,7 +315,7 @@ class RockMass:
 
 @dataclass(frozen=True, eq=False)
 class Realisations:
-    """Blocks drawn from a rock mass; all arrays have shape (n,).
+    """Blocks sampled from a rock mass; all arrays have shape (n,).
 
     Args:
         beta_deg: dip of the base [deg].
@@ -358,21 +359,21 @@ class Realisations:
 
     @property
     def in_time(self) -> Realisations:
-        """The blocks as what follows their first slip sees them."""
+        """The blocks with the joint strength that remains after their first slip."""
         return self.after_slip or self
 
     @property
     def n(self) -> int:
-        """Number of realisations, possible or not."""
+        """Number of realisations, valid or not."""
         return int(self.reason_code.size)
 
     @property
     def is_block(self) -> NDArray[np.bool_]:
-        """Whether a realisation is a block."""
+        """True where a realisation is a valid block, shape (n,)."""
         return np.equal(self.reason_code, 0)
 
     def of_mode(self, mode: ModeName, state: StateName | None = None) -> NDArray[np.bool_]:
-        """Return which realisations are blocks of a mode, in a state or in any, shape (n,)."""
+        """Return the blocks of a mode, in one state or in any, as a mask of shape (n,)."""
         chosen = self.is_block & (self.stability.mode_code == MODES.index(mode))
         if state is not None:
             chosen &= self.stability.state_code == STATES.index(state)
@@ -385,22 +386,22 @@ class Realisations:
 
     @property
     def impossible(self) -> dict[str, int]:
-        """How many realisations are no block, by the reason."""
+        """Number of invalid realisations, by reason."""
         counts = np.bincount(self.reason_code, minlength=len(IMPOSSIBLE)).tolist()
         return {text: c for text, c in zip(IMPOSSIBLE[1:], counts[1:], strict=True) if c}
 
     @property
     def why_impossible(self) -> str:
-        """How many realisations are no block, and why, in words."""
+        """Number of invalid realisations with their reasons, as text."""
         return "; ".join(f"{count} times {text}" for text, count in self.impossible.items())
 
     @property
     def reason(self) -> NDArray[np.object_]:
-        """Why a realisation is no block, as text; empty for one that is."""
+        """Reason why each realisation is invalid, as text; empty for a block."""
         return np.array(IMPOSSIBLE, dtype=object)[self.reason_code]
 
     def refuse_vertical(self) -> None:
-        """Refuse a rock mass that states a vertical acceleration, which comes with a motion."""
+        """Reject a rock mass with a vertical acceleration, which is part of the motion."""
         if np.any(self.kv != 0.0):
             raise InputError(
                 "block.kv is not supported with a motion, which has the vertical acceleration: "
@@ -409,7 +410,7 @@ class Realisations:
 
     @property
     def ends_with_slip(self) -> NDArray[np.bool_]:
-        """Whether the strength of a block ends with its first slip, shape (n,).
+        """True where the joint strength of a block ends with its first slip, shape (n,).
 
         That of a topple does not, which turns about its toe whatever bond or roughness.
         """
@@ -419,7 +420,7 @@ class Realisations:
 
     @property
     def is_wet(self) -> NDArray[np.bool_]:
-        """Whether water acts on a block as it moves, shape (n,)."""
+        """True where water acts on a block during motion, shape (n,)."""
         return np.asarray(self.joint.get("water_m", np.zeros(self.n)) > 0.0)
 
     @property
@@ -433,7 +434,7 @@ class Realisations:
 
 
 def checked_count(value: object, name: str) -> int:
-    """Return a number of realisations, or refuse it."""
+    """Return a valid number of realisations; reject others."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 < value <= MOST_REALISATIONS:
         raise InputError(
             f"{name} = {value!r}: give a whole number of realisations from 1 to "
@@ -443,7 +444,7 @@ def checked_count(value: object, name: str) -> int:
 
 
 def checked_seed(value: object, name: str) -> int:
-    """Return a seed, or refuse it."""
+    """Return a valid seed; reject others."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST_SEED:
         raise InputError(f"{name} = {value!r}: give a whole number from 0 to {_LARGEST_SEED}")
     return value

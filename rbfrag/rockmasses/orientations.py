@@ -116,7 +116,7 @@ def _is_number(text: str) -> bool:
 
 
 def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tuple[str, ...]]:
-    """Return a rock mass in the section of its face, and what is to be said of it.
+    """Return the description of a rock mass in the section across its face, and warnings.
 
     Args:
         description: as of a rock mass; ``face.plane`` with ``base.plane`` and ``back.plane``, each
@@ -126,17 +126,17 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
     Raises:
         InputError: a plane is missing or cannot be read, or no section does.
     """
-    own = dict(description)
-    stated = {name: own.pop(f"{name}.plane", None) for name in ("face", "base", "back")}
-    if all(value is None for value in stated.values()):
-        return own, ()
+    converted = dict(description)
+    plane_values = {name: converted.pop(f"{name}.plane", None) for name in ("face", "base", "back")}
+    if all(value is None for value in plane_values.values()):
+        return converted, ()
     planes: dict[str, Plane] = {}
     sets: dict[str, OrientationSet] = {}
-    for name, value in stated.items():
+    for name, value in plane_values.items():
         if value is None:
             raise InputError(f"{name}.plane is missing: give face, base and back as 25/102")
         if isinstance(value, list):
-            sets[name] = orientation_set([plane_of(each, f"{name}.plane") for each in value])
+            sets[name] = orientation_set([plane_of(text, f"{name}.plane") for text in value])
             planes[name] = sets[name].mean
         else:
             planes[name] = plane_of(value, f"{name}.plane")
@@ -147,17 +147,17 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
     dips = {"base": section.beta_deg, "back": section.beta_deg + section.gamma_deg}
     factors = {"base": section.base_factor, "back": section.back_factor}
     for name, dip in dips.items():
-        if f"{name}.dip_deg" in own:
+        if f"{name}.dip_deg" in converted:
             raise InputError(f"{name}.dip_deg and {name}.plane both give the dip: give one of them")
-        own[f"{name}.dip_deg"] = dip
+        converted[f"{name}.dip_deg"] = dip
         spacing = f"{name}.spacing_m"
-        if spacing in own:
-            own[spacing] = _scaled(own[spacing], factors[name])
+        if spacing in converted:
+            converted[spacing] = _scaled(converted[spacing], factors[name])
         if name not in sets:
             continue
         joints = sets[name]
         kappa = joints.fisher_k / factors[name] ** 2
-        own[f"{name}.dip_deg"] = {"distribution": "von_mises", "mean": dip, "kappa": kappa}
+        converted[f"{name}.dip_deg"] = {"distribution": "von_mises", "mean": dip, "kappa": kappa}
         notes.append(
             f"{name}: {joints.size} planes, mean {joints.mean}, Fisher K {joints.fisher_k:.4g}, "
             f"alpha95 {joints.alpha95_deg:.3g} deg; {percent(joints.share_off(face))} of such "
@@ -169,16 +169,16 @@ def in_section(description: Mapping[str, object]) -> tuple[dict[str, object], tu
                 "than the von Mises law drawn from (at K 10 by 3.3 %)"
             )
     coded = (Diagnostic(note, "plane_sets") for note in notes)
-    return own, (*section.remarks, *coded)
+    return converted, (*section.remarks, *coded)
 
 
 def _scaled(law: Any, factor: float) -> Any:
-    """Return the law of a length that is longer by a factor."""
+    """Return the distribution of a length multiplied by a factor."""
     if isinstance(law, dict):
         return {
             key: value if key in ("distribution", "sd_ln", "kappa") else _scaled(value, factor)
             for key, value in law.items()
         }
     if isinstance(law, list):
-        return [_scaled(each, factor) for each in law]
+        return [_scaled(item, factor) for item in law]
     return law * factor if isinstance(law, int | float) and not isinstance(law, bool) else law

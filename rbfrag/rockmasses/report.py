@@ -118,11 +118,11 @@ def mass_warnings(
     warnings = [] if answer is None else list(answer.warnings)
     if in_motion and realisations.drained is not None:
         warnings += notes_on_water(realisations)
-        modes = (each.stability.mode_code for each in (realisations, realisations.drained))
-        others = np.flatnonzero(np.not_equal(*modes) & realisations.is_block)
-        if others.size:
-            text = OTHER_MODE_DRAINED.format(count=others.size)
-            warnings.append(Diagnostic(text, "other_mode", rows=others))
+        modes = (blocks.stability.mode_code for blocks in (realisations, realisations.drained))
+        changed = np.flatnonzero(np.not_equal(*modes) & realisations.is_block)
+        if changed.size:
+            text = OTHER_MODE_DRAINED.format(count=changed.size)
+            warnings.append(Diagnostic(text, "other_mode", rows=changed))
     bonded = np.flatnonzero(realisations.of_mode("topple") & (realisations.cohesion_pa > 0.0))
     if bonded.size:
         note = with_prefix(f"{bonded.size} toppling blocks: ", NO_EFFECT_OF_COHESION)

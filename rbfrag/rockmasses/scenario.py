@@ -1,4 +1,4 @@
-"""What a rock mass does in a motion of which measures are known: probability of failure by mode."""
+"""Failure probability of a rock mass under given intensity measures, by mode."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ LOCKED = "locked: it does not move under any horizontal acceleration in this mod
 
 @dataclass(frozen=True)
 class Average:
-    """A probability of failure averaged over blocks.
+    """Failure probability averaged over blocks.
 
     Args:
         probability: mean of their probabilities; None without blocks.
@@ -63,7 +63,7 @@ class Average:
 
 @dataclass(frozen=True)
 class ScenarioMode:
-    """The answer for the blocks of one mode.
+    """Failure probability of the blocks of one mode.
 
     Args:
         has_model: whether a fragility model answers for the mode.
@@ -86,7 +86,7 @@ class ScenarioMode:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What one motion does to the blocks of a rock mass.
+    """Failure probabilities of the blocks of a rock mass in one motion.
 
     Args:
         model: name of the model that answered; None if no block needed one.
@@ -134,7 +134,7 @@ class Scenario:
     drained: Scenario | None = None
 
     def average(self, blocks: NDArray[np.bool_]) -> Average:
-        """Return the average over those of some blocks, shape (n,), that have an answer."""
+        """Return the average over the selected blocks, shape (n,), that have a probability."""
         covered = blocks & np.isfinite(self.probability)
         return _average(covered, self.probability, self.ci_low, self.ci_high)
 
@@ -149,7 +149,7 @@ def scenario(
     displacement_m: float | None = None,
     rotation_deg: float | None = None,
 ) -> Scenario:
-    """Return the probability of failure of the blocks in one motion, averaged by mode.
+    """Return the failure probability of the blocks in one motion, averaged by mode.
 
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
     fragility model. With `displacement_m` a stable block that slides has the probability of
@@ -227,7 +227,7 @@ def scenario(
         fill(topples, answer)
 
     modelled: set[ModeName] = set(MODELLED)
-    others: dict[ModeName, str] = {}
+    other_models: dict[ModeName, str] = {}
     if displacement_m is not None:
         for mode, blocks, question in _other_modes(
             after, described, measures, displacement_m, rotation_deg
@@ -239,13 +239,13 @@ def scenario(
                 continue
             assert isinstance(answers, PredictionArray)
             modelled.add(mode)
-            others[mode] = answers.model
+            other_models[mode] = answers.model
             fill(blocks, answers)
         # their models exist, but not for what ends with the first slip
         ended = np.isin(reason, (BONDED, ENDS, SLIPS_ON))
         modelled |= {m for m in UNANSWERED if np.any(realisations.of_mode(m) & ended)}
 
-    if lacking and answer is None and not others:
+    if lacking and answer is None and not other_models:
         raise next(iter(lacking.values()))
     drained: Scenario | None = None
     covered = np.isfinite(probability)
@@ -306,7 +306,7 @@ def scenario(
         how=how,
         reason=reason,
         warnings=(*warnings, *gives_way, *no_bound),
-        other_models=others,
+        other_models=other_models,
         drained=drained,
     )
 
@@ -318,7 +318,9 @@ def _other_modes(
     displacement_m: float,
     rotation_deg: float | None,
 ) -> Iterator[tuple[ModeName, NDArray[np.bool_], dict[str, Any]]]:
-    """Yield, for all modes but toppling, which blocks a model answers for, and what it is asked."""
+    """Yield, for all modes except toppling, the blocks with a model and the inputs of the
+    prediction.
+    """
     distance = positive(displacement_m, "displacement_m", "m")
     motion: dict[str, Any] = {
         name: measures[name]
@@ -348,7 +350,7 @@ def _other_modes(
 
 
 def _shapes(realisations: Realisations, mode: ModeName) -> ModeShapes:
-    """Return the blocks as those of one mode, which some of them are."""
+    """Return the blocks as geometries of one mode."""
     return ModeShapes(
         realisations.blocks, mode, realisations.stability.yield_acceleration,
         realisations.beta_deg, realisations.phi_deg, realisations.phi_back_deg, False, backed=True,
@@ -357,7 +359,7 @@ def _shapes(realisations: Realisations, mode: ModeName) -> ModeShapes:
 
 
 def _push(realisations: Realisations) -> Any:
-    """Return the push of water on the blocks as `ModeShapes` has it; None for dry ones."""
+    """Return the water force on the blocks for `ModeShapes`; None for dry blocks."""
     if not realisations.is_wet.any():
         return None
     joint = realisations.joint
@@ -369,23 +371,23 @@ def _push(realisations: Realisations) -> Any:
 def _what_gives_way(
     realisations: Realisations, described: NDArray[np.bool_], pga_g: float
 ) -> Iterator[str]:
-    """Yield how many slides tip about their heel at a PGA [g], and how many toes slip."""
+    """Yield the number of slides whose heel lifts at a PGA [g], and of topples whose toe slips."""
     push = _push(realisations)
     thresholds: dict[ModeName, tuple[Diagnostic, Callable[..., Any]]] = {
         "slide": (HEEL_TIPS, heel_tips_g),
         "topple": (TOE_SLIPS, toe_slips_g),
     }
     for mode, (about, threshold_g) in thresholds.items():
-        own = np.flatnonzero(realisations.of_mode(mode, "stable") & described)
+        rows = np.flatnonzero(realisations.of_mode(mode, "stable") & described)
         at_g = threshold_g(
-            realisations.blocks.at(own), realisations.beta_deg[own], realisations.phi_deg[own],
-            None if push is None else tuple(each[own] for each in push),
+            realisations.blocks.at(rows), realisations.beta_deg[rows], realisations.phi_deg[rows],
+            None if push is None else tuple(component[rows] for component in push),
         )  # fmt: skip
-        gives_way = (at_g < pga_g) & (realisations.stability.yield_acceleration[own] < pga_g)
+        gives_way = (at_g < pga_g) & (realisations.stability.yield_acceleration[rows] < pga_g)
         if count := int(np.count_nonzero(gives_way)):
-            low, high = (float(each(at_g[gives_way])) for each in (np.min, np.max))
+            low, high = (float(reduce(at_g[gives_way])) for reduce in (np.min, np.max))
             text = about.replace("{threshold:.2f}", f"{low:.2f} to {high:.2f}")
-            prefix = f"{count} of {own.size} stable blocks of mode {mode}: "
+            prefix = f"{count} of {rows.size} stable blocks of mode {mode}: "
             yield about.replaced(text=f"{prefix}{text}")
 
 

@@ -1,4 +1,4 @@
-"""What one recorded motion does to the blocks of a rock mass, each run in its own mode."""
+"""Simulation of the blocks of a rock mass under one recorded motion, each in its own mode."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ cracks and general failure (Jibson 1993, Transportation Research Record 1411, 9-
 
 @dataclass(frozen=True)
 class FailureLimits:
-    """What counts as failure, besides a block that is past recovery.
+    """Failure limits, in addition to loss of stability.
 
     Args:
         displacement_m: a sliding block fails where it slides further than this [m].
@@ -85,7 +85,7 @@ class FailureLimits:
             positive(self.rotation_deg, "rotation", "degrees")
 
     def code(self, mode_code: int, end: RunEnd) -> int:
-        """Return the code in :data:`OUTCOMES` of a block that was run."""
+        """Return the code in :data:`OUTCOMES` of a simulated block."""
         if end.outcome is Outcome.TOPPLED:
             return FAILS
         peak = limit = None
@@ -127,7 +127,7 @@ class ScaledMotion:
 
 @dataclass(frozen=True, eq=False)
 class BlocksToRun:
-    """Some stable blocks of a rock mass and the scales at which they move; shapes (k,) and (m, k).
+    """Stable blocks of a rock mass and the scales at which they move; shapes (k,) and (m, k).
 
     Args:
         place: places of the blocks among the realisations.
@@ -147,7 +147,7 @@ class BlocksToRun:
 
 @dataclass(frozen=True, eq=False)
 class BlockOutcomes:
-    """What became of them, shapes (m, k).
+    """Outcomes of simulated blocks, shapes (m, k).
 
     Args:
         place: as in :class:`BlocksToRun`.
@@ -169,7 +169,7 @@ class BlockOutcomes:
 
 
 def run_blocks(work: BlocksToRun) -> BlockOutcomes:
-    """Run blocks, one after another, each at the scales at which it moves."""
+    """Simulate blocks, each at the scales at which it moves."""
     excitations = work.shaking.excitations()
     code = np.full(work.moves.shape, AT_REST, dtype=np.int8)
     displacement_m = np.where(work.mode_code == MODES.index("topple"), np.nan, 0.0)
@@ -182,7 +182,11 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
         mode_code = int(work.mode_code[j])
         try:
             run = _runner(work, j)
-            outcomes = [(i, run(one)) for i, one in enumerate(excitations) if work.moves[i, j]]
+            outcomes = [
+                (i, run(scaled_motion))
+                for i, scaled_motion in enumerate(excitations)
+                if work.moves[i, j]
+            ]
         except InputError as error:
             raise InputError(f"block {int(work.place[j]) + 1}: {error}") from None
         for i, end in outcomes:
@@ -205,11 +209,11 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
 
 
 def _runner(work: BlocksToRun, j: int) -> Runner:
-    """Return the runner of the model that the block's mode calls for."""
-    one: dict[str, Any] = {name: float(values[j]) for name, values in work.numbers.items()}
-    block = Block.from_fractures(one.pop("s1_m"), one.pop("s2_m"), one.pop("gamma_deg"))
-    finding, planes, _ = judged(block, back_fracture=work.back_fracture, **one)
-    site = SupportedBlock(
+    """Return the runner of the model for the block's mode."""
+    inputs: dict[str, Any] = {name: float(values[j]) for name, values in work.numbers.items()}
+    block = Block.from_fractures(inputs.pop("s1_m"), inputs.pop("s2_m"), inputs.pop("gamma_deg"))
+    finding, planes, _ = judged(block, back_fracture=work.back_fracture, **inputs)
+    supported_block = SupportedBlock(
         block=block,
         beta_rad=math.radians(finding.beta_deg),
         phi_rad=math.radians(finding.phi_deg),
@@ -219,7 +223,7 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
         yield_g=finding.k,
         push=push_of(block, planes) or DRY,
     )
-    return model_of_mode(MODES[work.mode_code[j]]).runner(site)
+    return model_of_mode(MODES[work.mode_code[j]]).runner(supported_block)
 
 
 def _or_nan(value: float | None) -> float:
@@ -237,7 +241,7 @@ MOST_OUTCOMES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class ShakingPlan:
-    """What is known of the blocks without running any, and which ones have to be run.
+    """Outcomes known without simulation, and the blocks to simulate.
 
     Args:
         shaking: the motion and its scales.
@@ -257,15 +261,15 @@ class ShakingPlan:
     warnings: tuple[str, ...]
 
     @property
-    def places(self) -> NDArray[np.intp]:
-        """Places of the blocks that are to be run at any scale."""
+    def indices(self) -> NDArray[np.intp]:
+        """Indices of the blocks to simulate at any scale."""
         return np.flatnonzero(self.moves.any(axis=0))
 
     def work(self, chunk: int = CHUNK) -> Iterator[BlocksToRun]:
-        """Yield the blocks that are to be run, some at a time."""
-        realisations, places = self.realisations.in_time, self.places
-        for start in range(0, places.size, chunk):
-            at = places[start : start + chunk]
+        """Yield the blocks to simulate, in chunks."""
+        realisations, indices = self.realisations.in_time, self.indices
+        for start in range(0, indices.size, chunk):
+            at = indices[start : start + chunk]
             numbers = {name: getattr(realisations, name) for name in _NUMBERS}
             numbers |= realisations.joint
             yield BlocksToRun(
@@ -302,9 +306,9 @@ class ShakingPlan:
             runs += answer.runs
             for key, count in answer.about.items():
                 about[key] = about.get(key, 0) + count
-        known = {each.name: getattr(self, each.name) for each in fields(self)}
+        attributes = {item.name: getattr(self, item.name) for item in fields(self)}
         return ShakenMass(
-            **{**known, "code": code},
+            **{**attributes, "code": code},
             displacement_m=displacement_m,
             rotation_rad=rotation_rad,
             final_code=final_code,
@@ -315,7 +319,7 @@ class ShakingPlan:
 
 @dataclass(frozen=True, eq=False)
 class ShakenMass(ShakingPlan):
-    """What became of the realisations of a rock mass; arrays have shape (scales, n).
+    """Outcomes of the realisations of a rock mass; arrays have shape (scales, n).
 
     Args:
         displacement_m: greatest displacement along the base, of the block or, where it turns, of
@@ -334,7 +338,7 @@ class ShakenMass(ShakingPlan):
 
 
 class ShakingOptions(TypedDict, total=False):
-    """How a motion acts on a rock mass, as :func:`plan_shaking` takes it."""
+    """Options of :func:`plan_shaking`: how a motion acts on a rock mass."""
 
     scales: Sequence[float]
     vertical: GroundMotion | None
@@ -351,7 +355,7 @@ def plan_shaking(
     polarity: Polarity = "forward",
     limits: FailureLimits | None = None,
 ) -> ShakingPlan:
-    """Find the blocks that a motion moves, which are those that have to be run.
+    """Find the blocks that a motion moves, which have to be simulated.
 
     A block stays at rest where k_h never exceeds (1 + k_v) times its yield; that is seen at the
     samples, because k_h/(1 + k_v) is monotone between them.
@@ -382,21 +386,21 @@ def plan_shaking(
     stable = is_block & (state == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
     locked = is_block & (state == mechanism.LOCKED)
     after = realisations.in_time
-    left = after.stability.yield_acceleration
+    residual_yield = after.stability.yield_acceleration
     excitations = shaking.excitations()
     code = np.full((len(excitations), realisations.n), AT_REST, dtype=np.int8)
     moves = np.zeros(code.shape, dtype=np.bool_)
-    for i, one in enumerate(excitations):
-        moves[i] = stable & (k < one.max_q)
+    for i, scaled_motion in enumerate(excitations):
+        moves[i] = stable & (k < scaled_motion.max_q)
         code[i, is_block & ~stable] = UNSTABLE
         code[i, locked] = LOCKED
-        if one.jump_node < one.w.size:
+        if scaled_motion.jump_node < scaled_motion.w.size:
             code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
         breaks = moves[i] & after.ends_with_slip
         code[i, breaks] = BOND_BREAKS
         # on what friction is left it does not stand
-        code[i, moves[i] & (left <= 0.0)] = FAILS
-        moves[i] &= ~breaks & (left > 0.0) & np.isfinite(left)
+        code[i, moves[i] & (residual_yield <= 0.0)] = FAILS
+        moves[i] &= ~breaks & (residual_yield > 0.0) & np.isfinite(residual_yield)
         code[i, ~is_block] = NO_BLOCK
     return ShakingPlan(
         realisations=realisations,
@@ -404,7 +408,7 @@ def plan_shaking(
         limits=FailureLimits() if limits is None else limits,
         code=code,
         moves=moves,
-        pga_g=np.array([one.pga_g for one in excitations]),
+        pga_g=np.array([scaled_motion.pga_g for scaled_motion in excitations]),
         warnings=(
             *motion_remarks(motion, vertical, excitations[0]),
             *_about_bonds(code == BOND_BREAKS),

@@ -1,4 +1,4 @@
-"""The service as a program of its own, as `rbfrag serve` starts it: python -m rbfrag.service."""
+"""The service as a separate program, as started by `rbfrag serve`: python -m rbfrag.service."""
 
 from rbfrag.service.run import serve
 

@@ -1,4 +1,4 @@
-"""The application: every operation, the page, and what becomes of errors."""
+"""The web application: operations, web page and error handling."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ HEADERS = {
 
 
 class PageFiles(StaticFiles):
-    """What the browser loads; `/` is the page itself."""
+    """Static files of the web page; `/` is the page itself."""
 
     def __init__(self) -> None:
         super().__init__(directory=FOLDER, html=True)
@@ -66,7 +66,7 @@ class PageFiles(StaticFiles):
 
 
 def make_app(settings: ServiceSettings) -> FastAPI:
-    """Return the application."""
+    """Return the web application."""
     pool = WorkerPool(settings.jobs, settings.time_limit)
 
     @asynccontextmanager

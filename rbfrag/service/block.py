@@ -1,4 +1,4 @@
-"""`/v1/block` and `/v1/drawing`: how one block fails, and the lines that a page draws of it."""
+"""`/v1/block` and `/v1/drawing`: failure mode of one block, and the lines of its drawing."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def add_routes(routes: APIRouter) -> None:
         from rbfrag.question.blocks import on_planes
         from rbfrag.solver.stability.single import stability
 
-        shape = on_planes(query.given())
+        shape = on_planes(query.inputs())
         result = stability(shape.block, **shape.planes)
         warnings = tuple(dict.fromkeys((*shape.remarks, *result.warnings)))
         return replace(result, warnings=warnings).document(text=query.text)
@@ -55,7 +55,7 @@ def add_routes(routes: APIRouter) -> None:
         from rbfrag.plots.blocks.block import block_lines
         from rbfrag.solver.stability.single import rectangle_r3_m
 
-        body, result, kind, numbers, reason = _drawn(query.given())
+        body, result, kind, numbers, reason = _drawn(query.inputs())
         lines = block_lines(body, result)
         return {
             "kind": kind,
@@ -72,26 +72,26 @@ def add_routes(routes: APIRouter) -> None:
 
 
 def _drawn(
-    given: Mapping[str, Any],
+    inputs: Mapping[str, Any],
 ) -> tuple[Block, Stability, str, Mapping[str, float] | None, str]:
-    """Return a block, its stability, kind and model inputs, or why no model answers."""
+    """Return a block, its stability, its kind of failure, and the inputs of a prediction."""
     from rbfrag.question.blocks import one_block, shape_of
     from rbfrag.solver.kinds import facts_of, kind_of_mode
     from rbfrag.solver.stability.single import level_rectangle, stability
 
     def kind_of(result: Stability) -> str:
-        return kind_of_mode(result.mode, back_fracture=given.get("back_fracture", True)).kind
+        return kind_of_mode(result.mode, back_fracture=inputs.get("back_fracture", True)).kind
 
-    numbers = {name: given[name] for name in ("p2", "kr") if name in given}
-    shape = None if numbers else shape_of(given)
+    numbers = {name: inputs[name] for name in ("p2", "kr") if name in inputs}
+    shape = None if numbers else shape_of(inputs)
     if shape is None:
         require(numbers, "p2", "kr")
-        others = [name for name in given if name not in (*numbers, "back_fracture")]
-        if others:
+        conflicts = [name for name in inputs if name not in (*numbers, "back_fracture")]
+        if conflicts:
             raise InputError(
-                f"{others[0]} cannot be combined with p2 and kr: give p2 and kr, or a geometry "
+                f"{conflicts[0]} cannot be combined with p2 and kr: give p2 and kr, or a geometry "
                 "with dip and friction",
-                fields=(others[0],),
+                fields=(conflicts[0],),
             )
         body, result = level_rectangle(**numbers)
         return body, result, kind_of(result), numbers, ""
@@ -99,7 +99,7 @@ def _drawn(
     kind = kind_of(result)
     slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
     try:
-        (group,) = one_block({**given, **slides}, kind).groups
+        (group,) = one_block({**inputs, **slides}, kind).groups
     except InputError as error:  # no earthquake decides about it, or no model answers
         return shape.block, result, kind, None, "" if result.state == "unstable" else str(error)
     read = {name: value for name, value in group.numbers.items() if name not in slides}
@@ -107,7 +107,7 @@ def _drawn(
 
 
 def require(numbers: Collection[str], *names: str) -> None:
-    """Refuse a block of which a number is missing."""
+    """Reject a block with a missing number."""
     from rbfrag.question.shapes import OF_A_SHAPE, WAYS
 
     for name in names:

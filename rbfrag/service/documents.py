@@ -1,4 +1,4 @@
-"""The answers as OpenAPI describes them: their keys have the types that the answers declare."""
+"""Response documents for OpenAPI, with the types declared by the answers."""
 
 from __future__ import annotations
 
@@ -34,11 +34,13 @@ _NOT_LOADED = {"pd": SimpleNamespace(Index=Any)}
 
 
 def with_fields(definitions: dict[str, Any]) -> Callable[[type[T]], type[T]]:
-    """Return what gives a model fields, each a type and a default, beside those it states."""
+    """Return a decorator that adds fields, each a type and a default, to a model."""
 
     def extended(model: type[T]) -> type[T]:
         further = {
-            name: each for name, each in definitions.items() if name not in model.model_fields
+            name: definition
+            for name, definition in definitions.items()
+            if name not in model.model_fields
         }
         # under its own name and module, so that other processes find it
         return create_model(
@@ -52,7 +54,7 @@ def with_fields(definitions: dict[str, Any]) -> Callable[[type[T]], type[T]]:
 def keys_of(
     *answers: type, names: Sequence[str] = (), omitted: Sequence[str] = ()
 ) -> Callable[[type[T]], type[T]]:
-    """Return a decorator that gives a document the values of answers.
+    """Return a decorator that adds the values of answers to a document.
 
     Args:
         answers: dataclasses.
@@ -73,14 +75,14 @@ def keys_of(
 
 
 def _in_json(of: Any) -> Any:
-    """Return the type that JSON has for a type with arrays in it."""
+    """Return the JSON type for a type that contains arrays."""
     if get_origin(of) is UnionType:
         return reduce(or_, map(_in_json, get_args(of)))
     return _LISTS[get_args(get_args(of)[1])[0]] if get_origin(of) is np.ndarray else of
 
 
 def _describe(schema: dict[str, Any]) -> None:
-    """Give the keys of a document the labels and units of the vocabulary."""
+    """Add the labels and units of the vocabulary to the keys of a document."""
     for name, of in schema.get("properties", {}).items():
         if about := RESULTS.get(name):
             unit = f" [{about.unit}]" if about.unit else ""
@@ -98,7 +100,7 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class Problem(_Document):
-    """Problem details (RFC 9457); `traces` are those of a file of which one is to be named."""
+    """Problem details (RFC 9457); `traces` are those of a file of which one must be selected."""
 
     type: str
     title: str
@@ -108,7 +110,7 @@ class Problem(_Document):
 
 
 class DiagnosticDocument(_Document):
-    """A warning about a table; `rows` are the first it holds for, from 0, none for all."""
+    """A warning about a table; `rows` are the first affected rows, from 0; none for all."""
 
     code: str
     severity: str
@@ -126,14 +128,14 @@ class LineDocument(_Document):
 
 
 class TextDocument(_Document):
-    """An answer in words: its sentences, the first with the number that decides, and lines."""
+    """The text of an answer: its sentences, the first with the main result, and lines."""
 
     sentences: list[str]
     lines: list[LineDocument]
 
 
 class _Answer(_Document):
-    """An answer; `diagnostics` are its warnings with their codes, `text` is there on request."""
+    """An answer; `diagnostics` are its warnings with codes, `text` is included on request."""
 
     diagnostics: list[DiagnosticDocument]
     text: TextDocument | None = None
@@ -141,14 +143,14 @@ class _Answer(_Document):
 
 @keys_of(Prediction, names=OF_EACH_MODEL)
 class ModelAnswer(_Document):
-    """The answer of one model that the measures suffice for."""
+    """The answer of one model whose measures are available."""
 
     recommended: bool
 
 
 @keys_of(Prediction, omitted=("inputs", "alternatives"))
 class PredictAnswer(_Answer):
-    """Probability of failure of a block: what `rbfrag predict` prints as JSON.
+    """Probability of failure of a block; the same JSON as `rbfrag predict`.
 
     `probability` is the mean over all earthquakes and sites with these intensity measures, `ci_low`
     and `ci_high` its confidence interval. `event_low` and `event_high` are the prediction interval
@@ -165,7 +167,7 @@ class PredictAnswer(_Answer):
 
 @keys_of(PredictionArray, names=OF_ARRAYS)
 class PredictArrays(_Answer):
-    """Probabilities of many blocks or motions; null where the input cannot be used.
+    """Probabilities of many blocks or motions; null where the input is rejected.
 
     `drained` has `probability`, `ci_low` and `ci_high` without water pressure, null for dry blocks.
     """
@@ -175,7 +177,7 @@ class PredictArrays(_Answer):
 
 @keys_of(TableAnswer, omitted=("blocks",))
 class TableAnswers(_Answer):
-    """A table of blocks with its answers: what `rbfrag predict --blocks` prints as JSON.
+    """A table of blocks with its answers; the same JSON as `rbfrag predict --blocks`.
 
     `table` is the CSV file that is written, with the notes below it.
     """
@@ -186,7 +188,7 @@ class TableAnswers(_Answer):
 
 @keys_of(Cohesion)
 class CohesionAnswer(_Document):
-    """What cohesion of the base adds."""
+    """Contribution of the cohesion of the base."""
 
     ky: float | None
     ky_equivalent: float | None
@@ -194,12 +196,12 @@ class CohesionAnswer(_Document):
 
 @keys_of(JointStrength)
 class JointAnswer(_Document):
-    """What roughness makes of the friction of the base at the normal stress of its yield."""
+    """Friction of the base from roughness, at the normal stress of its yield."""
 
 
 @keys_of(Stability, Block, names=KEYS)
 class BlockAnswer(_Answer):
-    """How a block fails: what `rbfrag block` prints as JSON; null where it does not apply."""
+    """Failure mode of a block; the same JSON as `rbfrag block`; null where it does not apply."""
 
     ky: float | None
     yield_acceleration: float | None
@@ -229,7 +231,7 @@ class DrawingAnswer(_Document):
 
 @keys_of(ModelRow, names=("name", "kind", "term", "method", "is_default", "created"))
 class ModelListed(_Document):
-    """A stored model: what `rbfrag models list` prints as JSON.
+    """A stored model; the same JSON as `rbfrag models list`.
 
     `reads` names the measures of the shaking that it needs. `log_loss` is that of outcomes of
     earthquakes left out, the smaller the better among models of a kind; `log_loss_kr05` that of
@@ -248,7 +250,7 @@ class ModelListed(_Document):
 
 
 class Health(_Document):
-    """The service answers."""
+    """Status of the service."""
 
     status: str
     version: str
@@ -256,7 +258,7 @@ class Health(_Document):
 
 @keys_of(TopplingSpectrum)
 class SpectrumAnswer(_Answer):
-    """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum` prints as JSON."""
+    """The toppling spectrum of a motion in one polarity; the same JSON as `rbfrag spectrum`."""
 
     may_topple: bool | None
 
@@ -271,13 +273,13 @@ class MapRow(_Document):
 
 @keys_of(CriticalResult, names=(*STRENGTH_VALUES, "polarity", "pga_g", "warnings"))
 class CriticalAnswer(_Answer):
-    """The largest k_r/PGA that topples: what `rbfrag critical` prints as JSON."""
+    """The largest k_r/PGA that topples; the same JSON as `rbfrag critical`."""
 
     map: list[MapRow] | None = None
 
 
 class RockmassAnswer(_Answer):
-    """Blocks by mode: what `rbfrag rockmass` prints as JSON."""
+    """Blocks by mode; the same JSON as `rbfrag rockmass`."""
 
     realisations: int
     blocks: int
@@ -294,7 +296,7 @@ class RockmassAnswer(_Answer):
 
 
 class Contribution(_Document):
-    """The part of a rate that comes from an interval of the shaking [1/yr]."""
+    """Contribution of an interval of the shaking to a rate [1/yr]."""
 
     from_: float = Field(alias="from")
     to: float
@@ -317,7 +319,7 @@ class SiteRate(_Document):
 
 
 class HazardDocument(_Answer):
-    """Annual rates of failure [1/yr]: what `rbfrag hazard` prints as JSON.
+    """Annual rates of failure [1/yr]; the same JSON as `rbfrag hazard`.
 
     A curve of one site has the rate and its `contributions`; curves of several sites have a row of
     `blocks` for each and the expected failures of all. `between_measures` is the dispersion of

@@ -1,4 +1,4 @@
-"""What every request passes first and last: who asks, what is said about it afterwards."""
+"""Access control, response headers, metrics and logging for every request."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _HEADERS = [
 
 
 class Guard:
-    """An ASGI application around another that asks for the token, measures and logs."""
+    """ASGI middleware that checks token, host and origin, and records metrics and logs."""
 
     def __init__(self, app: Application, settings: ServiceSettings, metrics: Metrics) -> None:
         self._app = app
@@ -45,9 +45,9 @@ class Guard:
             return
         start = perf_counter()
         status, size = 500, 0
-        own = scope["path"].startswith("/v1/")
+        is_api = scope["path"].startswith("/v1/")
         # HEAD is answered as GET, and its body is left out
-        head_alone = own and scope["method"] == "HEAD"
+        head_alone = is_api and scope["method"] == "HEAD"
         as_get = {**scope, "method": "GET"} if head_alone else scope
 
         async def watched(message: Message) -> None:
@@ -56,7 +56,7 @@ class Guard:
                 message = {**message, "body": b""}
             if message["type"] == "http.response.start":
                 status = message["status"]
-                if own:
+                if is_api:
                     message["headers"] = [*message.get("headers", ()), *_HEADERS]
             else:
                 size += len(message.get("body", b""))
@@ -74,20 +74,20 @@ class Guard:
             log_request(scope, status, size, elapsed_s)
 
     def _refusal(self, scope: Message) -> Any:
-        given = dict(scope["headers"])
+        headers = dict(scope["headers"])
         # those that came in one piece, which the connection has read before it could count them
         if sum(len(name) + len(value) + 4 for name, value in scope["headers"]) > HEADERS_BYTES:
             return problem(431, "headers", f"the headers are longer than {HEADERS_BYTES} bytes")
         if sum(name == b"host" for name, _ in scope["headers"]) > 1:
             return problem(400, "host", "the header Host occurs twice: send one")
-        if not self._is_own(scope["method"], given):
+        if not self._is_same_origin(scope["method"], headers):
             return problem(
                 403,
                 "origin",
                 "requests from pages of other origins are not allowed: start it with "
                 "--allow-origin ORIGIN",
             )
-        if self._hosts and _name(given.get(b"host", b"")) not in self._hosts:
+        if self._hosts and _name(headers.get(b"host", b"")) not in self._hosts:
             return problem(
                 421,
                 "host",
@@ -97,7 +97,7 @@ class Guard:
             return None
         if scope["path"] in OPEN_TO_ALL:
             return None
-        scheme, _, token = given.get(b"authorization", b"").partition(b" ")
+        scheme, _, token = headers.get(b"authorization", b"").partition(b" ")
         if hmac.compare_digest(token.strip(), self._token) and scheme.lower() == b"bearer":
             return None
         return problem(
@@ -107,13 +107,13 @@ class Guard:
             {"www-authenticate": 'Bearer realm="rbfrag"'},
         )
 
-    def _is_own(self, method: str, given: dict[bytes, bytes]) -> bool:
-        """Whether a request that changes or costs something comes from no foreign page."""
-        origin = given.get(b"origin")
+    def _is_same_origin(self, method: str, headers: dict[bytes, bytes]) -> bool:
+        """Return whether a state-changing request comes from an allowed origin."""
+        origin = headers.get(b"origin")
         if origin is None or method in ("GET", "HEAD", "OPTIONS"):
             return True
-        own = origin.partition(b"://")[2].lower() == given.get(b"host", b"").lower()
-        return own or bool({origin.lower(), b"*"} & self._origins)
+        same_host = origin.partition(b"://")[2].lower() == headers.get(b"host", b"").lower()
+        return same_host or bool({origin.lower(), b"*"} & self._origins)
 
 
 def _name(host: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""What operations are asked: the names of a query or of a body, made from the declared fields.
+"""Parameters of the operations, in a query or a body, generated from the declared fields.
 
 A parameter has the name of the command line's option without its dashes, and the same unit;
 spectral accelerations are named as the columns of tables are. Values are read here as numbers and
@@ -19,6 +19,7 @@ from rbfrag.vocabulary.quantities import (
     ANSWERING,
     AT_REST,
     BLOCK,
+    COMMON,
     COMPONENT,
     INPUTS,
     INTENSITY,
@@ -30,7 +31,6 @@ from rbfrag.vocabulary.quantities import (
     SHAKING,
     SHAPE,
     SPACE,
-    WHOLE,
     Limits,
     inputs_from,
     name_of,
@@ -61,19 +61,19 @@ _DEFAULTS = {"level": LEVEL}
 
 
 def _limited(of: Any, limits: Limits) -> Any:
-    """Return a type whose schema states a range, which is not checked here."""
+    """Return a type whose schema has a range, which is not validated here."""
     keys = {
         "exclusiveMinimum": limits.above, "minimum": limits.least,
         "exclusiveMaximum": limits.below, "maximum": limits.most,
     }  # fmt: skip
-    stated = {word: limit for word, limit in keys.items() if limit is not None}
-    return Annotated[of, WithJsonSchema({"type": "number", **stated})]
+    bounds = {word: limit for word, limit in keys.items() if limit is not None}
+    return Annotated[of, WithJsonSchema({"type": "number", **bounds})]
 
 
 def asking(
     *names: str, many: bool = False, examples: Mapping[str, float] | None = None
 ) -> Callable[[type[T]], type[T]]:
-    """Return what gives a model the parameters of fields.
+    """Return a decorator that adds the parameters of fields to a model.
 
     Args:
         names: the fields.
@@ -104,29 +104,29 @@ def asking(
 
 
 class Parameters(BaseModel):
-    """Named values; a name that is not known is refused."""
+    """Named values; unknown names are rejected."""
 
     model_config = ConfigDict(
         extra="forbid", allow_inf_nan=False, protected_namespaces=(), use_attribute_docstrings=True
     )
 
-    def given(self) -> dict[str, Any]:
-        """Return what is stated, by field.
+    def inputs(self) -> dict[str, Any]:
+        """Return the values sent, by field.
 
         Raises:
             InputError: two words for one field.
         """
-        stated, known = self.model_fields_set, INPUTS
+        words_set, fields = self.model_fields_set, INPUTS
         values = self.__dict__.items()
         return inputs_from(
-            {word: v for word, v in values if word in stated and name_of(word) in known}
+            {word: v for word, v in values if word in words_set and name_of(word) in fields}
         )
 
     def question(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return what is stated of block and shaking, by field, and how it is to be answered."""
-        given = self.given()
-        how = {name: given.pop(name) for name in _HOW if name in given}
-        return given, how
+        """Return the inputs of block and shaking, by field, and the options of the answer."""
+        inputs = self.inputs()
+        how = {name: inputs.pop(name) for name in _HOW if name in inputs}
+        return inputs, how
 
 
 class Answered(Parameters):
@@ -139,7 +139,7 @@ class Answered(Parameters):
 _SHAPE = (*SHAPE, *PLANES, *SPACE, *JOINT, "drainage", "back_fracture")
 _BEFORE_SLIP = tuple(name for name in _SHAPE if name != "phi_residual_deg")
 _AT_REST = (*_BEFORE_SLIP, "cohesion_pa", "density_kg_m3", *AT_REST)
-_BLOCK = (*BLOCK, *WHOLE)
+_BLOCK = (*BLOCK, *COMMON)
 _QUESTION = (*_BLOCK, *SHAKING, *REQUEST)
 
 
@@ -160,7 +160,7 @@ class PredictQuery(Answered):
 
 @asking(*SHAKING, *REQUEST, "kind")
 class TableQuery(Answered):
-    """Parameters of `/v1/table`: kind of rows that name none, and shaking if no column has any."""
+    """Parameters of `/v1/table`: default kind of the rows, and shaking if no column has any."""
 
     form: Literal["csv", "xlsx"] = "csv"
     """What the body is: csv (also cells pasted from a spreadsheet) or xlsx."""
@@ -172,7 +172,7 @@ class TableQuery(Answered):
 
 @asking(*_QUESTION, many=True)
 class PredictRows(Answered):
-    """Numbers, which stand for every element, and lists of one length."""
+    """Numbers, which apply to every element, and lists of equal length."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"p2": 3.0, "kr": [0.1, 0.2, 0.3], "pgv": [0.6, 0.6, 1.2]}]}
@@ -180,7 +180,7 @@ class PredictRows(Answered):
 
 
 class Reading(Parameters):
-    """How an accelerogram is read that does not say it itself, and how it is shown."""
+    """Metadata of an accelerogram that its file does not contain."""
 
     name: Text = "upload"
     """Name of the record in the answer."""
@@ -214,7 +214,7 @@ class SpectrumQuery(Reading):
 
     def sizes(self) -> list[float]:
         """Return the values of p² [1/s²]."""
-        sizes = [float(each) for each in self.p2.split(",")]
+        sizes = [float(text) for text in self.p2.split(",")]
         if len(sizes) > MOST_SIZES:
             raise InputError(f"p2 has {len(sizes)} values; the maximum per request is {MOST_SIZES}")
         return sizes

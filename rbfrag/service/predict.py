@@ -1,4 +1,4 @@
-"""`/v1/predict`: the probability that blocks fail."""
+"""`/v1/predict`: the probability of failure of blocks."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ BYTES_BESIDE = 1 << 20
 
 
 def answer_one(query: PredictQuery | PredictRows, db: str | None) -> dict[str, Any]:
-    """Return what `rbfrag predict` prints as JSON."""
+    """Return the same JSON as `rbfrag predict`."""
     inputs, how = query.question()
     return answer_block(inputs, **how, db=db).document(text=query.text)
 
 
 def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
-    """Return probabilities of many blocks.
+    """Return the failure probabilities of many blocks.
 
     Args:
         body: JSON of what :class:`PredictRows` describes.
@@ -67,11 +67,11 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     if len({*lengths.values()} - {1}) > 1:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
-    given, how = rows.question()
+    fields, how = rows.question()
     # in which null is NaN
     arrays = {
         name: np.array(value, dtype=np.float64, ndmin=1) if name in COLUMNS else value
-        for name, value in given.items()
+        for name, value in fields.items()
     }
     answers = with_drained_bound(lambda inputs: ask(inputs, **how, db=db), arrays)
     assert isinstance(answers, PredictionArray)
@@ -79,7 +79,7 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
 
 
 def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None) -> bytes:
-    """Return the answers for a table of blocks as the command line reads it.
+    """Return the answers for a table of blocks, read as by the command line.
 
     Args:
         body: the table, CSV or a workbook.
@@ -103,10 +103,10 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
         source.write_bytes(body)
         try:
             with opened_table(source, SHAKING, sheet=query.sheet, ignore_columns=ignored) as table:
-                if not {*SHAKING}.isdisjoint(table.stated.columns):
+                if not {*SHAKING}.isdisjoint(table.header.columns):
                     inputs = {}
             answer = predict_table(
-                source, target, given=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,
+                source, target, inputs=inputs, kind=kind, sheet=query.sheet, ignore_columns=ignored,
                 excel_text=True, db=db, **how,
             )  # fmt: skip
         except InputError as error:
@@ -122,17 +122,17 @@ def answer_table(body: bytes, query: TableQuery, row_limit: int, db: str | None)
 
 
 def notes_below(warnings: Sequence[str], delimiter: str) -> str:
-    """Return the warnings as lines below a CSV table, which is downloaded as one file."""
+    """Return the warnings as lines to append to a CSV table, which is downloaded as one file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n", delimiter=delimiter)
     if warnings:
         writer.writerow([])
-    writer.writerows([NOTE, each.code, str(each)] for each in diagnostics(warnings))
+    writer.writerows([NOTE, warning.code, str(warning)] for warning in diagnostics(warnings))
     return text.getvalue()
 
 
 def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -> None:
-    """Add the operations on `/v1/predict`, whose long work is done by a pool."""
+    """Add the operations on `/v1/predict`, with long work done by a pool."""
 
     @routes.get(
         "/v1/predict",
@@ -183,7 +183,7 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
         """
         body = await request.body()
         check_json(body, settings.row_limit)
-        given = body, settings.row_limit, settings.db
+        arguments = body, settings.row_limit, settings.db
         if len(body) > BYTES_BESIDE or body.count(b",") > ELEMENTS_BESIDE:
-            return await pool.run(request, answer_many, *given)
-        return await in_thread(settings.time_limit, answer_many, *given)
+            return await pool.run(request, answer_many, *arguments)
+        return await in_thread(settings.time_limit, answer_many, *arguments)

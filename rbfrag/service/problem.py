@@ -1,4 +1,4 @@
-"""What went wrong, as problem details (RFC 9457): one handler for every error."""
+"""Error responses as problem details (RFC 9457), with one handler for every error."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ MEDIA_TYPE = "application/problem+json"
 
 
 class MalformedError(InputError):
-    """A body that is not what its type says."""
+    """A body that is not of its declared type."""
 
 
 class SeveralTracesError(InputError):
-    """A file of several traces of which none is named.
+    """A file of several traces without a selected one.
 
     Args:
         words: what is wrong and what to do.
@@ -47,7 +47,7 @@ class SeveralTracesError(InputError):
 
 
 class RequestRefusedError(HTTPException):
-    """A request that the service does not take; see :func:`problem`."""
+    """A request that the service rejects; see :func:`problem`."""
 
     def __init__(
         self, status: int, kind: str, detail: str, headers: Mapping[str, str] | None = None
@@ -72,9 +72,9 @@ _MEANING = {
 
 
 def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Return the problems of an operation as FastAPI describes further responses."""
+    """Return the problems of an operation as additional responses for FastAPI."""
     content = {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}
-    return {each: {"description": _MEANING[each], "content": content} for each in statuses}
+    return {status: {"description": _MEANING[status], "content": content} for status in statuses}
 
 
 READ = documented(401, 422, 503)
@@ -91,7 +91,7 @@ def problem(
     headers: Mapping[str, str] | None = None,
     **more: object,
 ) -> Response:
-    """Return an answer that says what was wrong.
+    """Return a response that describes an error.
 
     Args:
         status: HTTP status.
@@ -156,7 +156,7 @@ def _by_the_framework(request: Request, error: HTTPException) -> Response:
 
 
 def _allowed(request: Request) -> str:
-    """Return the methods of a path, of all its routes; each route knows its own alone."""
+    """Return the methods of a path over all its routes; each route has only its own."""
     methods: set[str] = set()
     for route in request.app.routes:
         if route.matches(request.scope)[0] != Match.NONE:
@@ -171,26 +171,26 @@ _short.maxstring = _short.maxother = 60
 
 
 def refusal(fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]]) -> InputError:
-    """Return in words why values do not suit a model.
+    """Return the error for values that do not match a model.
 
     Args:
         fields: the fields of the model, by name.
         errors: what pydantic says, each with its place in the values.
     """
     # a name that is unknown explains one that is missing
-    first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
+    first = next((error for error in errors if error["type"] == "extra_forbidden"), errors[0])
     if not first["loc"]:
         return InputError('the body must be a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}')
     # where a field may be a number or a list, the deepest of its errors is that of what was meant
     worst = max(
-        (each for each in errors if each["loc"][0] == first["loc"][0]),
-        key=lambda each: (len(each["loc"]), each["type"] not in ("float_type", "list_type")),
+        (error for error in errors if error["loc"][0] == first["loc"][0]),
+        key=lambda error: (len(error["loc"]), error["type"] not in ("float_type", "list_type")),
     )
     name = str(first["loc"][0])
     if worst["type"] == "extra_forbidden":
-        known = ", ".join(fields)
-        return InputError(f"unknown parameter {name[:60]!r}; the parameters are {known}")
-    indices = "".join(f"[{each}]" for each in worst["loc"][1:] if isinstance(each, int))
+        names = ", ".join(fields)
+        return InputError(f"unknown parameter {name[:60]!r}; the parameters are {names}")
+    indices = "".join(f"[{index}]" for index in worst["loc"][1:] if isinstance(index, int))
     return InputError(_sentence(name + indices, worst, fields[name].description or ""))
 
 
@@ -236,22 +236,22 @@ _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
 
 
 def in_parameters(words: str, settings: ServiceSettings) -> str:
-    """Return a message of the command line in the words of a request.
+    """Return a message of the command line with the names of request parameters.
 
     Options lose their dashes, and the database is not named by its place.
     """
-    for place in _places(settings):
+    for place in _database_locations(settings):
         words = words.replace(place, "the database")
     words = _URL.sub("the database", words)
     return _OPTION.sub(lambda option: option[1].replace("-", "_"), words)
 
 
-def _places(settings: ServiceSettings) -> Sequence[str]:
-    place = os.fspath(locate(settings.db))
-    places = [place, settings.db or place]
-    if "://" not in place:
-        places.append(os.path.abspath(place))  # noqa: PTH100
+def _database_locations(settings: ServiceSettings) -> Sequence[str]:
+    location = os.fspath(locate(settings.db))
+    locations = [location, settings.db or location]
+    if "://" not in location:
+        locations.append(os.path.abspath(location))  # noqa: PTH100
     shipped = reference_file()
     if shipped is not None:
-        places.append(str(shipped))
-    return sorted(places, key=len, reverse=True)
+        locations.append(str(shipped))
+    return sorted(locations, key=len, reverse=True)

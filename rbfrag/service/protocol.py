@@ -1,4 +1,4 @@
-"""HTTP connections, in bounds: headers so long and so slow, and none dropped that has asked."""
+"""HTTP connections with limits on headers and idle time; requests in progress are completed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
 
 
 class BoundedProtocol(HttpToolsProtocol):
-    """A connection whose headers have limits, and that ends with an answer."""
+    """A connection with limits on its headers, closed only after the response."""
 
     _open: ClassVar[dict[BoundedProtocol, None]] = {}
     """The connections of this process, the one that was last used last."""
@@ -42,20 +42,20 @@ class BoundedProtocol(HttpToolsProtocol):
     _unread: int | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin to wait for the first headers."""
+        """Start the timeout of the first headers."""
         super().connection_made(transport)
         self._close_longest_idle()
         self._used()
         self._wait_for_headers()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wait for nothing more."""
+        """Stop all timeouts."""
         self._stop_waiting()
         self._open.pop(self, None)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Read on, unless the headers are too long."""
+        """Process data, unless the headers are too long."""
         if self._unread is not None:
             self._unread -= len(data)
             if self._unread < 0:
@@ -68,13 +68,13 @@ class BoundedProtocol(HttpToolsProtocol):
                 self._refuse(_TOO_LARGE)
 
     def on_message_begin(self) -> None:
-        """Begin to wait for the headers of a request."""
+        """Start the timeout of the headers of a request."""
         super().on_message_begin()
         if self._late is None:
             self._wait_for_headers()
 
     def on_headers_complete(self) -> None:
-        """Begin to answer."""
+        """Start the response."""
         self._stop_waiting()
         self._used()
         super().on_headers_complete()
@@ -83,19 +83,19 @@ class BoundedProtocol(HttpToolsProtocol):
             self.cycle.keep_alive = False
 
     def linger(self) -> None:
-        """End the answer, and let what the client still sends go by for a while.
+        """End the response, and discard what the client still sends for a while.
 
         A connection that is closed upon unread bytes is reset, and the client may never read why
         it was refused (RFC 9112, section 9.6).
         """
-        stated = any(name == b"content-length" for name, _ in self.scope["headers"])
-        self._unread = LINGER_BYTES if stated else LINGER_BYTES // 64
+        has_length = any(name == b"content-length" for name, _ in self.scope["headers"])
+        self._unread = LINGER_BYTES if has_length else LINGER_BYTES // 64
         self.transport.write_eof()
         self.flow.resume_reading()
         self.loop.call_later(LINGER_S, self.transport.close)
 
     def shutdown(self) -> None:
-        """End after the answer that is due, if one is: the client may have asked just now."""
+        """Close after a pending response; the client may just have sent a request."""
         self._ending = True
         if self._idle():
             self._unset_keepalive_if_required()
@@ -108,13 +108,13 @@ class BoundedProtocol(HttpToolsProtocol):
         self._open[self] = None
 
     def _close_longest_idle(self) -> None:
-        """Close what has been idle longest, so that idle connections keep nobody out."""
+        """Close the longest idle connections when there are too many."""
         too_many = 1 + len(self._open) - CONNECTIONS
         if too_many > 0:
-            idle = (each for each in self._open if each._idle())
-            for each in list(islice(idle, too_many)):
-                each._refuse(_TOO_SLOW)
-                self._open.pop(each, None)
+            idle = (connection for connection in self._open if connection._idle())
+            for connection in list(islice(idle, too_many)):
+                connection._refuse(_TOO_SLOW)
+                self._open.pop(connection, None)
 
     def _idle(self) -> bool:
         return self.cycle is None or self.cycle.response_complete
@@ -140,7 +140,7 @@ class BoundedProtocol(HttpToolsProtocol):
 
 
 class _Lingering:
-    """The transport of an answer: it is not closed upon a body of which a part is unread."""
+    """Transport of a response that stays open while part of a request body is unread."""
 
     def __init__(self, protocol: BoundedProtocol, cycle: Any) -> None:
         self._protocol = protocol
@@ -150,7 +150,7 @@ class _Lingering:
         return getattr(self._protocol.transport, name)
 
     def close(self) -> None:
-        """Close the connection, at once if nothing more is to receive."""
+        """Close the connection, immediately if nothing remains to be received."""
         if self._cycle.more_body and not self._protocol.transport.is_closing():
             self._protocol.linger()
         else:

@@ -1,4 +1,4 @@
-"""How requests are read: bodies in bounds of size, time and number, each parameter once."""
+"""Reading of requests: bodies with limits of size, time and number, and unique parameters."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
 class Bodies:
-    """Reads bodies, and bounds how many are worked on and what all of them hold.
+    """Reader of request bodies that limits their number and total memory.
 
     The framework can bound the size of a body, but neither the time that one takes to receive nor
     the memory of many at once.
@@ -72,35 +72,35 @@ class Bodies:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
-        self._places = asyncio.Semaphore(settings.bodies_at_once)
-        self._free = settings.bodies_at_once * settings.body_limit_bytes
+        self._slots = asyncio.Semaphore(settings.bodies_at_once)
+        self._free_bytes = settings.bodies_at_once * settings.body_limit_bytes
 
     @asynccontextmanager
     async def read(self, request: Request) -> AsyncIterator[Request]:
         """Yield a request whose body is there; its place is kept until the answer is made."""
         limits = self._settings
-        stated = request.headers.get("content-length", "")
-        if stated.isdigit() and int(stated) > limits.body_limit_bytes:
+        content_length = request.headers.get("content-length", "")
+        if content_length.isdigit() and int(content_length) > limits.body_limit_bytes:
             raise self._too_long()
         parts: list[bytes] = []
         try:
             await self._read_into(parts, request)
             parts[:] = [b"".join(parts)]
-            whole = _with_body(request, parts[0])
+            complete_request = _with_body(request, parts[0])
             if len(parts[0]) <= SMALL_BYTES:
-                yield whole
+                yield complete_request
                 return
             # taken only now: nobody waits behind bodies that do not come
             try:
-                await asyncio.wait_for(self._places.acquire(), limits.time_limit)
+                await asyncio.wait_for(self._slots.acquire(), limits.time_limit)
             except TimeoutError:
                 raise RequestRefusedError(*BUSY) from None
             try:
-                yield whole
+                yield complete_request
             finally:
-                self._places.release()
+                self._slots.release()
         finally:
-            self._free += sum(map(len, parts))
+            self._free_bytes += sum(map(len, parts))
 
     async def _read_into(self, parts: list[bytes], request: Request) -> None:
         size = 0
@@ -116,10 +116,10 @@ class Bodies:
                     parts.append(message.get("body", b""))
                     came, more = len(parts[-1]), message.get("more_body", False)
                     size += came
-                    self._free -= came
+                    self._free_bytes -= came
                     if size > self._settings.body_limit_bytes:
                         raise self._too_long()
-                    if self._free < 0:
+                    if self._free_bytes < 0:
                         raise RequestRefusedError(*BUSY[:3], {**BUSY[3], **_CLOSE})
                     # what came fast is no credit for more than one pause
                     late = min(late + came / LEAST_RATE, now() + PAUSE_S)
@@ -146,7 +146,7 @@ def _with_body(request: Request, body: bytes) -> Request:
 
 
 def check_json(body: bytes, row_limit: int) -> None:
-    """Refuse JSON whose parsing would take long, before it is parsed.
+    """Reject JSON that would take long to parse, before it is parsed.
 
     Raises:
         InputError: more brackets, names or elements than any request needs.
@@ -162,7 +162,7 @@ def check_json(body: bytes, row_limit: int) -> None:
 
 
 def json_of(body: bytes) -> Any:
-    """Return what a body says, in whose JSON each key is there once.
+    """Return the content of a JSON body, in which each key must be unique.
 
     Raises:
         MalformedError: it is not JSON.
@@ -190,21 +190,21 @@ def _no_number(word: str) -> NoReturn:
     )
 
 
-def by_parameter(values: dict[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Return values by parameter, whichever name of its field each is given by.
+def by_parameter(values: dict[str, Any], parameters: Collection[str]) -> dict[str, Any]:
+    """Return values by parameter, for any name of their fields.
 
     Args:
         values: values by parameter, keyword or name of a column.
-        known: the parameters of the operation; other names stay as they are.
+        parameters: the parameters of the operation; other names stay as they are.
 
     Raises:
         InputError: one field by two names.
     """
     result: dict[str, Any] = {}
     for name, value in values.items():
-        match = None if name in known else field_of(name)
+        match = None if name in parameters else field_of(name)
         word = name if match is None else parameter_of(match.field)
-        if match is not None and word in known and match.unit is None:
+        if match is not None and word in parameters and match.unit is None:
             if match.column == "free_standing":
                 value = FREE_STANDING if _is_true(value) else None
             elif match.column == "back_fracture":  # its parameter is no_back
@@ -222,15 +222,15 @@ def _is_true(value: Any) -> bool:
 
 
 def read_as(model: type[T], values: Any) -> T:
-    """Return values that a request states, or refuse what is none of a model.
+    """Return the values of a request as a model, or reject invalid ones.
 
     Args:
         model: what may be stated.
         values: the parameters of a query, or the JSON of a body.
     """
-    known = model.model_fields
-    if isinstance(values, dict) and not values.keys() <= known.keys():
-        values = by_parameter(values, known)
+    fields = model.model_fields
+    if isinstance(values, dict) and not values.keys() <= fields.keys():
+        values = by_parameter(values, fields)
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -238,34 +238,36 @@ def read_as(model: type[T], values: Any) -> T:
 
 
 class QueryRoute(APIRoute):
-    """A route whose query one model reads, each parameter given once, and its body in bounds.
+    """Route with one query model, unique parameters, and a limited body.
 
     FastAPI inspects every field of such a model anew for each request: with the names of
     `/v1/predict` that takes longer than all the rest of the answer (docs/evidence/performance.md).
     """
 
     def get_route_handler(self) -> Handler:
-        """Return what answers a request."""
-        models: list[Any] = [each.field_info.annotation for each in self.dependant.query_params]
+        """Return the request handler."""
+        models: list[Any] = [
+            parameter.field_info.annotation for parameter in self.dependant.query_params
+        ]
         model: type[BaseModel] | None = models[0] if models else None
 
         async def answer(request: Request) -> Response:
             values = query_of(request)
-            given: dict[str, Any] = {}
+            arguments: dict[str, Any] = {}
             if model is not None:
-                given["query"] = read_as(model, values)
+                arguments["query"] = read_as(model, values)
             if request.method != "POST":
-                document = await self.endpoint(**given)
+                document = await self.endpoint(**arguments)
                 return document if isinstance(document, Response) else json_answer(document)
             bodies: Bodies = request.app.state.bodies
             async with bodies.read(request) as read:
-                return json_answer(await self.endpoint(read, **given))
+                return json_answer(await self.endpoint(read, **arguments))
 
         return answer
 
 
 def json_answer(answer: object) -> Response:
-    """Return a document, or JSON that is written already, as the answer to a request."""
+    """Return a document, or finished JSON, as the response to a request."""
     text = answer if isinstance(answer, bytes) else json_text(answer)
     return Response(text, media_type="application/json")
 
@@ -279,7 +281,7 @@ def json_text(document: object) -> bytes:
 
 
 def query_of(request: Request) -> dict[str, str]:
-    """Return the parameters of a request; the framework takes the last of equal names, unasked."""
+    """Return the parameters of a request; duplicate names are rejected."""
     query = request.scope["query_string"].decode("latin-1")
     pairs = parse_qsl(query, keep_blank_values=True)
     values = dict(pairs)
@@ -298,7 +300,7 @@ def media_type(request: Request) -> str:
 
 
 def sent_as(content: dict[str, Any]) -> dict[str, Any]:
-    """Return what OpenAPI says of a body that is a file as it is: FastAPI has no word for it."""
+    """Return the OpenAPI description of a body that is a plain file, unknown to FastAPI."""
     return {"requestBody": {"required": True, "content": content}}
 
 
@@ -308,7 +310,7 @@ async def sent_file(request: Request) -> bytes:
         return await request.body()
     try:
         async with request.form(max_files=1, max_fields=1) as form:
-            files = [each for _, each in form.multi_items() if not isinstance(each, str)]
+            files = [part for _, part in form.multi_items() if not isinstance(part, str)]
             if len(files) != 1 or len(form.multi_items()) != 1:
                 raise MalformedError("the form must have exactly one file")
             return await files[0].read()

@@ -1,4 +1,4 @@
-"""What is recorded of requests: counts for Prometheus, and lines of JSON."""
+"""Records of requests: counts for Prometheus, and log lines of JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _METHODS = frozenset({"GET", "POST", "HEAD", "OPTIONS", "PUT", "DELETE", "PATCH"
 
 
 class Metrics:
-    """Requests by operation, method and status, and how long they took.
+    """Counts of requests by operation, method and status, and their durations.
 
     Args:
         paths: the operations; any other path counts as ``page`` or ``other``, so that what is
@@ -57,7 +57,7 @@ class Metrics:
         self._counters: dict[tuple[str, str, int], tuple[Counter, Histogram]] = {}
 
     def count(self, scope: Mapping[str, Any], status: int, elapsed_s: float) -> None:
-        """Count one request, its HTTP status and how long it took [s]."""
+        """Count one request, with its HTTP status and duration [s]."""
         path, method = scope["path"], scope["method"]
         if path not in self._paths:
             path = "other" if status >= 400 or path.startswith("/v1/") else "page"
@@ -72,7 +72,7 @@ class Metrics:
         seconds.observe(elapsed_s)
 
     def text(self) -> bytes:
-        """Return the counts of all processes as Prometheus reads them."""
+        """Return the counts of all processes in the format of Prometheus."""
         registry = self._registry
         if os.environ.get(SHARED_FOLDER):
             registry = CollectorRegistry()
@@ -81,7 +81,7 @@ class Metrics:
 
 
 def log_request(scope: Mapping[str, Any], status: int, size: int, elapsed_s: float) -> None:
-    """Write down what was asked and how it ended; not the query, which is the asker's."""
+    """Log a request and its outcome, without the query, which is private."""
     time = datetime.now(UTC).isoformat(timespec="milliseconds")
     client = scope.get("client")
     # written out: json.dumps takes 6 µs more, a twentieth of a request
@@ -94,10 +94,10 @@ def log_request(scope: Mapping[str, Any], status: int, size: int, elapsed_s: flo
 
 
 class JsonFormatter(logging.Formatter):
-    """Writes a message of the logging library as one line of JSON."""
+    """Formatter of log messages as single lines of JSON."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line."""
+        """Return the line of a message."""
         line = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
@@ -120,6 +120,6 @@ CONFIGURATION: dict[str, Any] = {
 
 
 def log_as_json() -> None:
-    """Write messages, and warnings of libraries, as lines of JSON in this process."""
+    """Log messages, and warnings of libraries, as lines of JSON in this process."""
     dictConfig(CONFIGURATION)
     logging.captureWarnings(True)

@@ -1,4 +1,4 @@
-"""Running the service in one process or several."""
+"""Running the service in one or several processes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rbfrag.service.settings import ServiceSettings
 
 
 class Workers(Multiprocess):
-    """Processes of uvicorn that end together."""
+    """Processes of uvicorn that terminate together."""
 
     def terminate_all(self) -> None:
-        """Tell every process to end.
+        """Terminate every process.
 
         Nobody may connect any more: this process holds the address too, and what it let in
         nobody would answer.
@@ -34,7 +34,7 @@ VARIABLE = "RBFRAG_SERVICE"
 
 
 def serve() -> None:
-    """Answer requests until the process is stopped, as the environment says."""
+    """Answer requests until the process is stopped, with settings from the environment."""
     import uvicorn
 
     from rbfrag.service.protocol import BoundedProtocol
@@ -71,7 +71,7 @@ def serve() -> None:
 
 
 def listener(host: str, port: int) -> socket.socket:
-    """Return a socket that listens.
+    """Return a listening socket.
 
     Args:
         host: address to listen at.
@@ -94,7 +94,7 @@ def listener(host: str, port: int) -> socket.socket:
 
 
 def app() -> FastAPI:
-    """Return the application that the environment describes."""
+    """Return the web application with settings from the environment."""
     from rbfrag.service.app import make_app
     from rbfrag.service.request_records import log_as_json
 

@@ -13,7 +13,7 @@ from rbfrag.errors import InputError
 
 @dataclass(frozen=True)
 class ServiceSettings:
-    """Where a service reads, whom it answers and how much it takes on.
+    """Database, access and limits of a service.
 
     Its fields are the options of `rbfrag serve`, which say what each means, and:
 
@@ -41,11 +41,11 @@ class ServiceSettings:
 
     @property
     def body_limit_bytes(self) -> int:
-        """Longest body of a request that is taken."""
+        """Maximum length of a request body."""
         return int(1e6 * self.body_limit_mb)
 
     def checked(self) -> ServiceSettings:
-        """Return the settings of a service that is started: with its token and its names.
+        """Return the settings of a service to start, with its token and host names.
 
         Raises:
             InputError: an option that cannot be, or other computers could ask without a token.
@@ -86,7 +86,7 @@ _TOKEN = re.compile(r"[A-Za-z0-9._~+/=-]{16,512}")
 
 
 def read_token(file: str | None) -> str | None:
-    """Return the token of a service, or None where none is stated.
+    """Return the token of a service, or None if none is set.
 
     Args:
         file: a file with nothing but the token; None for the environment variable.
@@ -112,7 +112,7 @@ def read_token(file: str | None) -> str | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only programs of this computer can ask at an address."""
+    """Return whether an address is reachable from this computer only."""
     if host == "localhost":
         return True
     try:

@@ -1,4 +1,4 @@
-"""What a file that is sent says: accelerograms, hazard curves, rock masses."""
+"""Operations on uploaded files: accelerograms, hazard curves and rock masses."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _ACCELEROGRAM = sent_as(
 
 
 def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -> None:
-    """Add the operations on files, which a pool works on."""
+    """Add the operations on files, which are processed by a pool."""
 
     @routes.post(
         "/v1/spectrum",
@@ -139,5 +139,5 @@ def add_routes(routes: APIRouter, settings: ServiceSettings, pool: WorkerPool) -
                 "media-type",
                 f"unsupported Content-Type of a rock mass: use {', '.join(_FORMS)}",
             )
-        given = await request.body(), form, query, settings.row_limit, settings.db
-        return await pool.run(request, work.rock_mass, *given)
+        arguments = await request.body(), form, query, settings.row_limit, settings.db
+        return await pool.run(request, work.rock_mass, *arguments)

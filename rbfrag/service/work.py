@@ -1,4 +1,4 @@
-"""Long work in processes beside the one that answers, each task with a limit of time.
+"""Long work in separate processes, each task with a time limit.
 
 A task takes a body and the parameters of its operation, and returns JSON.
 """
@@ -53,7 +53,7 @@ EXAMPLE = "time_s,acceleration_g\n" + "".join(
 
 
 def warm_up() -> None:
-    """Load or compile the kernels, so that no request waits for that or is ended for it."""
+    """Load or compile the kernels, so that no request has to wait for them."""
     spectrum(EXAMPLE.encode(), SpectrumQuery())
     critical(EXAMPLE.encode(), CriticalQuery.model_validate({"p2": 3.0}))
 
@@ -61,7 +61,7 @@ def warm_up() -> None:
 def rock_mass(
     body: bytes, form: str, query: RockmassQuery, row_limit: int, db: str | None
 ) -> bytes:
-    """Return what `rbfrag rockmass` prints as JSON, for toml, json or csv."""
+    """Return the same JSON as `rbfrag rockmass`, for toml, json or csv."""
     from rbfrag.campaign.rock_mass_answer import rockmass
     from rbfrag.rockmasses.file import rock_mass_of_csv, rock_mass_of_tables, rock_mass_of_toml
 
@@ -74,10 +74,10 @@ def rock_mass(
         described = rock_mass_of_tables(document)
     else:
         described = (rock_mass_of_toml if form == "toml" else rock_mass_of_csv)(_text(body))
-    wanted = described.realisations if query.n is None else query.n
-    if wanted > row_limit:
+    count = described.realisations if query.n is None else query.n
+    if count > row_limit:
         raise InputError(
-            f"{wanted} realisations exceed the maximum of {row_limit} per request: reduce n"
+            f"{count} realisations exceed the maximum of {row_limit} per request: reduce n"
         )
     measures, how = query.question()
     if how and not measures:
@@ -91,7 +91,7 @@ def rock_mass(
 
 
 def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
-    """Return what `rbfrag spectrum` prints as JSON."""
+    """Return the same JSON as `rbfrag spectrum`."""
     from rbfrag.motions.polarity import POLARITIES
     from rbfrag.motions.toppling_spectrum import TopplingSpectrum
 
@@ -107,13 +107,13 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 
 
 def critical(body: bytes, query: CriticalQuery) -> bytes:
-    """Return what `rbfrag critical` prints as JSON."""
+    """Return the same JSON as `rbfrag critical`."""
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.question.blocks import has_shape, one_block
     from rbfrag.solver.respond import respond
     from rbfrag.solver.search.critical import critical as search
 
-    numbers = query.given()
+    numbers = query.inputs()
     if has_shape(numbers):
         (group,) = one_block(numbers, TOPPLING_BLOCK.kind).groups
         numbers = {**group.numbers}
@@ -128,7 +128,7 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
 
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
-    """Return what `rbfrag hazard` prints as JSON."""
+    """Return the same JSON as `rbfrag hazard`."""
     import numpy as np
 
     from rbfrag.hazards.answer import hazard_at_sites, with_drained_rates
@@ -145,18 +145,18 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         converted_period_s=None if convert is None else convert.period_s,
     )
     meaning = query.model_dump(include={"convert", "convert_sigma", "component"})
-    stated, how = query.question()
+    inputs, how = query.question()
     if (kind := how.pop("kind", None)) is not None:
-        stated["kind"] = kind
-    given = {name: [value] * len(curves) for name, value in stated.items()}
+        inputs["kind"] = kind
+    block_inputs = {name: [value] * len(curves) for name, value in inputs.items()}
     sites = np.arange(len(curves))
-    places = [[curve] for curve in curves]
+    site_curves = [[curve] for curve in curves]
     answering = cast("AnsweringFields", {**how, "db": db})
     rates = with_drained_rates(
         lambda blocks: hazard_at_sites(
-            places, sites, blocks, cast("CurveKeywords", meaning), answering, years=query.years
+            site_curves, sites, blocks, cast("CurveKeywords", meaning), answering, years=query.years
         ),
-        given,
+        block_inputs,
     )
     return json_text(rates.as_dict())
 
@@ -176,11 +176,11 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
         return traces[0]
     if trace is not None and 0 <= trace < len(traces):
         return traces[trace]
-    listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(traces))
+    listed = ", ".join(f"{i} ({record.component})" for i, record in enumerate(traces))
     trouble = f"holds {len(traces)} traces" if trace is None else f"has no trace {trace}"
     raise SeveralTracesError(
         f"{FILE} {trouble}: give one of  {listed}  with trace, for example trace=0",
-        [each.component for each in traces],
+        [record.component for record in traces],
     )
 
 
@@ -199,7 +199,7 @@ TASKS_PER_PROCESS = 500
 
 
 class WorkerPool:
-    """Processes that work, started when they are first needed, each task with a limit of time."""
+    """Worker processes, started on first use, each task with a time limit."""
 
     def __init__(self, jobs: int, time_limit_s: float) -> None:
         self._jobs = jobs
@@ -207,7 +207,7 @@ class WorkerPool:
         self._pool: ProcessPool | None = None
 
     def open(self) -> ProcessPool:
-        """Return the processes, started."""
+        """Return the started processes."""
         if self._pool is None or not self._pool.active:
             # a forked copy of a process with threads and sockets would be none to rely on
             context = multiprocessing.get_context("spawn")
@@ -219,17 +219,17 @@ class WorkerPool:
             )
         return self._pool
 
-    async def run(self, request: Request, function: Callable[..., bytes], *given: Any) -> bytes:
+    async def run(self, request: Request, function: Callable[..., bytes], *arguments: Any) -> bytes:
         """Return what a function of a module answers; the work ends when the client goes."""
-        future = self.open().schedule(function, args=given)
+        future = self.open().schedule(function, args=arguments)
         answer = asyncio.wrap_future(future)
-        left = asyncio.ensure_future(_disconnected(request))
-        either: list[asyncio.Future[Any]] = [answer, left]
+        disconnected = asyncio.ensure_future(_disconnected(request))
+        either: list[asyncio.Future[Any]] = [answer, disconnected]
         try:
             await asyncio.wait(either, timeout=self._limit_s, return_when=asyncio.FIRST_COMPLETED)
             if answer.done():
                 return answer.result()
-            if left.done():
+            if disconnected.done():
                 raise RequestRefusedError(*GONE)
             if not future.running():
                 raise RequestRefusedError(*BUSY)
@@ -242,25 +242,25 @@ class WorkerPool:
         except ProcessExpired:
             raise RequestRefusedError(*BUSY) from None
         finally:
-            left.cancel()
+            disconnected.cancel()
             # ends the process, if it still works on it
             answer.cancel()
 
     def close(self) -> None:
-        """End the processes, whatever they do; nobody waits for an answer any more."""
+        """Terminate the processes and their work; no request waits any more."""
         if self._pool is not None:
             self._pool.stop()  # type: ignore[no-untyped-call]
             self._pool.join()
 
 
-async def in_thread(limit_s: float, function: Callable[..., Any], *given: Any) -> Any:
+async def in_thread(limit_s: float, function: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a function answers that may wait for a database, beside other requests.
 
     Whoever asks is told after the limit of time; the database is waited for no longer either.
     """
     LONGEST_WAIT_S.set(limit_s)  # for this request alone, and for its thread
     try:
-        return await asyncio.wait_for(asyncio.to_thread(function, *given), limit_s)
+        return await asyncio.wait_for(asyncio.to_thread(function, *arguments), limit_s)
     except TimeoutError:
         raise RequestRefusedError(*BUSY) from None
 

@@ -343,7 +343,7 @@ class SlidingStrengths(Result):
         slid = response.displacement_m
         if slid is None:
             return f"The block may slide farther: {response.outcome.advice}"
-        limits = sorted(each.as_dict()["displacement_m"] for each in self.thresholds)
+        limits = sorted(strength.as_dict()["displacement_m"] for strength in self.thresholds)
         verdicts = [
             f"{words} {' and '.join(f'{limit:g}' for limit in of)} m"
             for words, of in (

@@ -1,4 +1,4 @@
-"""Headers of table columns in five languages, and the words of cells: each list can be extended.
+"""Column headers in five languages, and the words of cells; each list can be extended.
 
 A header is read as its words, in any order, without case, accents and units ("Höhe [cm]": hohe).
 """

@@ -1,4 +1,4 @@
-"""The quantities, each declared once, in groups in the order of the help, and their names.
+"""The quantities, each declared once, in groups in the order of the help, with their names.
 
 One module, and plain classes, because each start of the program loads and makes all of it.
 """
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Limits:
-    """The values that a quantity may have; None for no such limit.
+    """Permitted range of a quantity; None for no limit.
 
     Args:
         above: lower limit, excluded.
@@ -33,7 +33,7 @@ class Limits:
         self.above, self.least, self.below, self.most = above, least, below, most
 
     def holds(self, value: Any) -> Any:
-        """Return whether a number, or which of many, lies within; NaN does not."""
+        """Return whether a number, or each of an array, lies within the range; NaN does not."""
         inside = value == value
         if self.above is not None:
             inside = inside & (value > self.above)
@@ -47,7 +47,7 @@ class Limits:
 
     @property
     def words(self) -> str:
-        """The range in words."""
+        """Text of the range."""
         if self.above is not None and self.below is not None:
             return f"between {self.above:g} and {self.below:g}"
         high = "" if self.below is None else f"below {self.below:g}"
@@ -67,7 +67,7 @@ ANY, POSITIVE, NOT_NEGATIVE = Limits(), Limits(above=0.0), Limits(least=0.0)
 
 
 class Input:
-    """Names, type and help of a quantity that is an input.
+    """Names, type and help of an input quantity.
 
     Args:
         detail: addition to the label in the help; names in braces stand for their spelling in an
@@ -96,7 +96,7 @@ class Input:
 
 
 class Measure:
-    """What makes a quantity an intensity measure.
+    """Properties of an intensity measure.
 
     Args:
         title: name for people where that is not the symbol.
@@ -136,7 +136,7 @@ class Measure:
 
 
 class Quantity:
-    """One quantity.
+    """One quantity: name, unit, symbol, range and texts.
 
     Args:
         name: name in Python, JSON and the database, with its unit.
@@ -176,7 +176,7 @@ class Quantity:
 
     @property
     def noun(self) -> str:
-        """The label as a part of a sentence: "dip of the base"."""
+        """The label within a sentence: "dip of the base"."""
         text = self.label
         for mark in ",;(":
             text = text.partition(mark)[0]
@@ -190,7 +190,7 @@ class Quantity:
         return self._prompt or f"the {self.noun} in {self.unit}, {limit}"
 
     def description(self, spell: Callable[[str], str]) -> str:
-        """Return label, details and default, with inputs as an interface spells them."""
+        """Return label, details and default, with inputs in the spelling of an interface."""
         text = self.label
         if self.input is not None:
             detail, default = self.input.detail, self.input.default
@@ -205,7 +205,7 @@ class Quantity:
 
 
 class _Spelling(dict[str, str]):
-    """Names as an interface spells them, made when they are asked for."""
+    """Names in the spelling of an interface, created on demand."""
 
     def __init__(self, spell: Callable[[str], str]) -> None:
         super().__init__()
@@ -563,8 +563,8 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
 # fmt: on
 
 QUANTITIES = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
-INPUTS = {name: each.input for name, each in QUANTITIES.items() if each.input is not None}
-MEASURES = {name: each.measure for name, each in QUANTITIES.items() if each.measure is not None}
+INPUTS = {name: q.input for name, q in QUANTITIES.items() if q.input is not None}
+MEASURES = {name: q.measure for name, q in QUANTITIES.items() if q.measure is not None}
 """The quantities, those that can be given, and the intensity measures, by name."""
 
 
@@ -585,11 +585,11 @@ SCATTER = _names("block scatter")
 BLOCK = (*NUMBERS, *FAILURE, *SHAPE, *PLANES, *JOINT, *SCATTER)
 SPACE = _names("space")
 """Planes in space, as dip/dip direction."""
-WHOLE = _names("space", "whole")
+COMMON = _names("space", "whole")
 """What holds for all blocks of a question."""
 BY_ROW = ("back_fracture", "cohesion_pa", "density_kg_m3")
 """Those of them that a table may give row by row."""
-BLOCKS = (*BLOCK, *WHOLE)
+BLOCKS = (*BLOCK, *COMMON)
 """What the blocks of a question are."""
 INTENSITY = _names("measures")
 """Intensity measures of one horizontal component."""
@@ -620,7 +620,7 @@ PANELS = {
     "Block and shaking": ("height_m", "width_m", "beta_deg", "phi_deg", "kind", "pgv_m_s"),
     "Block parameters": (*NUMBERS, *FAILURE),
     "Block geometry": ("block", *SHAPE, *SPACE),
-    "Joint properties": (*PLANES, *JOINT, *WHOLE, *AT_REST),
+    "Joint properties": (*PLANES, *JOINT, *COMMON, *AT_REST),
     "Block uncertainty": SCATTER,
     "Other intensity measures": (*INTENSITY, *COMPONENT, *RECORD),
     "Scenario and ground-motion uncertainty": (*SCENE, *SOURCE),
@@ -642,24 +642,24 @@ _UNITS = ("_kg_m3", "_deg", "_m_s", "_pa", "_km", "_m", "_g", "_s")
 
 
 def column_of(name: str) -> str:
-    """Return what the column of an input is called in tables that are written."""
+    """Return the column name of an input in written tables."""
     return INPUTS[name].column or name
 
 
 def word_of(name: str) -> str:
-    """Return what people call what has its unit in its name: ``beta`` of ``beta_deg``."""
+    """Return the short name of an input with its unit in the name: ``beta`` for ``beta_deg``."""
     if name in INPUTS and INPUTS[name].word:
         return INPUTS[name].word
     return name.removesuffix(next((unit for unit in _UNITS if name.endswith(unit)), ""))
 
 
 def option_of(name: str) -> str:
-    """Return what an input is called on the command line."""
+    """Return the command-line option of an input."""
     return "--" + word_of(name).replace("_", "-")
 
 
 def parameter_of(name: str) -> str:
-    """Return what an input is called in requests: spectral accelerations as in tables."""
+    """Return the request parameter of an input: spectral accelerations as in tables."""
     return name if name in SPECTRAL.values() else word_of(name)
 
 
@@ -670,12 +670,12 @@ _BY_WORD = {parameter_of(name): name for name in INPUTS} | {
 
 
 def name_of(word: str) -> str:
-    """Return the input that people call so; the word itself where it is none."""
+    """Return the input with this short name; the word itself if there is none."""
     return _BY_WORD.get(word, word)
 
 
 def inputs_from(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Return by name what was given in words of shell or requests; None and False are not given.
+    """Return inputs by name from the words of shell or requests, without None and False.
 
     Raises:
         InputError: two words for one input.

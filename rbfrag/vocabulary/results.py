@@ -1,4 +1,4 @@
-"""Keys of the JSON documents that are no inputs: label, unit and symbol, each declared once.
+"""Keys of the JSON documents that are not inputs: label, unit and symbol, each declared once.
 
 Loaded only for documentation and OpenAPI; inputs and derived numbers of a question are in
 :mod:`rbfrag.vocabulary.quantities`.

@@ -185,7 +185,7 @@ def test_added_again_nothing_is_new(tmp_path: Path, db: Path) -> None:
     add_motions([path], db=db)
     before = rows(db)
     again = add_motions([path], db=db)
-    assert (again.added, again.known, again.warnings) == ((), (1, 2, 3), ())
+    assert (again.added, again.already_stored, again.warnings) == ((), (1, 2, 3), ())
     assert rows(db) == before
 
 
@@ -201,7 +201,7 @@ def test_another_arithmetic_makes_no_other_motion(
 
     monkeypatch.setattr("rbfrag.campaign.add_motions.processed", otherwise)
     again = add_motions([path], db=db)
-    assert (again.added, again.known) == ((), (1,))
+    assert (again.added, again.already_stored) == ((), (1,))
 
 
 def test_raw_and_processed_are_two_and_said(tmp_path: Path, db: Path) -> None:
@@ -220,7 +220,7 @@ def test_two_files_of_the_same_samples(tmp_path: Path, db: Path) -> None:
         (tmp_path / name).mkdir()
         write_at2(tmp_path / name / "same.AT2", shaking(1), station=name)
     report = add_motions([tmp_path / "a", tmp_path / "b"], db=db)
-    assert (report.added, report.known) == ((1,), (1,))
+    assert (report.added, report.already_stored) == ((1,), (1,))
     (warning,) = report.warnings
     assert "b/same.AT2#0 holds the same samples as" in warning
     assert "stored once, as motion 1" in warning
@@ -389,7 +389,7 @@ def everything(
 
 def test_the_real_set(everything: tuple[Path, AddReport]) -> None:
     db, report = everything
-    assert (len(report.added), len(report.processed), report.known) == (341, 123, ())
+    assert (len(report.added), len(report.processed), report.already_stored) == (341, 123, ())
     assert {Path(bad.path).suffix for bad in report.failed} == {".csv"}
     assert report.warnings == ()
     stored = rows(db)

@@ -51,7 +51,7 @@ def test_the_database_is_that_of_local_workers(
     seen: list[CampaignProgress] = []
     two = simulate(remote, scheduler=cluster.scheduler_address, on_progress=seen.append, **asked)
     assert (one.runs, one.found, one.responses) == (two.runs, two.found, two.responses)
-    assert [seen[0].done, seen[-1].done] == [0, one.combinations]
+    assert [seen[0].completed, seen[-1].completed] == [0, one.combinations]
     assert digest_of(local) == digest_of(remote)
     again = simulate(remote, scheduler=cluster.scheduler_address, **asked)
     assert again.resumed == again.combinations
@@ -67,7 +67,7 @@ def test_a_lost_worker_changes_nothing(
     killed = threading.Event()
 
     def kill(progress: CampaignProgress) -> None:
-        if progress.done and not killed.is_set():
+        if progress.completed and not killed.is_set():
             os.kill(victims[0], signal.SIGKILL)
             killed.set()
 

@@ -180,7 +180,7 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
     slump(other)
 
     def stop(progress: CampaignProgress) -> None:
-        if progress.done:
+        if progress.completed:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

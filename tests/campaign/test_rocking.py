@@ -121,7 +121,7 @@ def test_an_interrupted_campaign_goes_on_where_it_stopped(
     fill(place)
 
     def stop(progress: CampaignProgress) -> None:
-        if progress.done:
+        if progress.completed:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

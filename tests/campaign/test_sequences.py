@@ -147,7 +147,7 @@ def test_a_campaign_that_was_stopped_goes_on_where_it_stopped(
     whole = run(other)
     seen: list[CampaignProgress] = []
     with pytest.raises(StoppedError, match="8 of 32 stored; the same command goes on"):
-        run(database, on_progress=seen.append, stopped=lambda: seen[-1].done > 0)
+        run(database, on_progress=seen.append, stopped=lambda: seen[-1].completed > 0)
     again = run(database)
     assert (again.resumed, again.combinations) == (8, 32)
     assert again.sequence == whole.sequence

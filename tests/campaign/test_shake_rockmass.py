@@ -34,8 +34,8 @@ def test_two_workers_find_what_one_finds() -> None:
     assert alone.about == both.about
     assert alone.runs == both.runs > 2 * CHUNK
     moved = int(alone.moves.any(axis=0).sum())
-    assert told[0].done == 0
-    assert told[-1].done == told[-1].total == moved
+    assert told[0].completed == 0
+    assert told[-1].completed == told[-1].total == moved
     assert told[-1].rate_per_s > 0.0
     assert told[-1].seconds_left == 0.0
     assert told[0].seconds_left is None

@@ -144,7 +144,7 @@ def test_a_search_that_contradicts_what_is_stored_is_refused(database: Path) -> 
 def test_progress_is_told_after_each_motion(database: Path) -> None:
     seen: list[CampaignProgress] = []
     simulate(database, p2=P2, jobs=1, on_progress=seen.append)
-    assert [progress.done for progress in seen] == [0, 4, 8, 12, 16, 20, 24]
+    assert [progress.completed for progress in seen] == [0, 4, 8, 12, 16, 20, 24]
     assert seen[-1].total == 24
     assert seen[-1].seconds_left == 0.0
     assert seen[3].rate_per_s > 0.0
@@ -169,7 +169,7 @@ def test_interruption_keeps_what_is_done(database: Path) -> None:
     simulate(undisturbed, p2=P2, jobs=1)
 
     def stop(progress: CampaignProgress) -> None:
-        if progress.done >= 8:
+        if progress.completed >= 8:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -152,10 +152,10 @@ def test_every_option_of_the_table_is_one_of_a_command() -> None:
     walk(group)
     everywhere = set().union(*known.values())
     for rule in (*CONFLICTS, *NEEDS):
-        assert {*rule.options, *rule.others} <= everywhere, rule
+        assert {*rule.options, *rule.other_options} <= everywhere, rule
         for command in rule.commands:
             assert {*rule.options} & known[command], rule
-            assert {*rule.others} & known[command], rule
+            assert {*rule.other_options} & known[command], rule
 
 
 def test_the_stub_is_the_list_of_public_names() -> None:

@@ -32,7 +32,7 @@ def recording(tmp_path: Path) -> Path:
 def test_add_says_what_it_processed(shell: Shell, recording: Path) -> None:
     answer = shell.json("motions", "add", recording)
     assert answer == {
-        "added": [1, 2, 3], "known": [], "processed": [1, 2, 3], "failed": [], "warnings": [],
+        "added": [1, 2, 3], "already_stored": [], "processed": [1, 2, 3], "failed": [], "warnings": [],
         "not_read": [],
     }  # fmt: skip
     rows = shell.json("motions", "list")
@@ -66,7 +66,7 @@ def test_export_and_back(shell: Shell, recording: Path, tmp_path: Path) -> None:
     answer = shell.json("motions", "export", "1", "2", "--out", "two.csv")
     assert answer["sha256"] == [row["sha256"] for row in shell.json("motions", "list")[:2]]
     again = shell.json("motions", "add", "two.csv")
-    assert (again["added"], again["known"]) == ([], [1, 2])
+    assert (again["added"], again["already_stored"]) == ([], [1, 2])
     shell("motions", "export", "1", "--out", "one.at2")
     assert read_motion(tmp_path / "one.at2").sha256 == answer["sha256"][0]
     back = shell.json("critical", "two.csv#0", "--p2", "3", "--vertical", "two.csv#1")

@@ -97,6 +97,6 @@ def test_a_database_that_may_not_grow(
     with pytest.raises(DatabaseFailedError, match="the disk is full; what was finished is kept"):
         simulate(database, p2=P2, jobs=1, on_progress=seen.append)
     monkeypatch.undo()
-    assert stored(str(database)) == seen[-1].done
+    assert stored(str(database)) == seen[-1].completed
     simulate(database, p2=P2, jobs=1)
     assert digest(str(database)) == undisturbed

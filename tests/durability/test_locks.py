@@ -59,7 +59,7 @@ def test_a_lock_half_way(database: Path, impatient: None, undisturbed: str) -> N
     other = sqlite3.connect(database, isolation_level=None)
 
     def lock(progress: CampaignProgress) -> None:
-        if progress.done == 8:
+        if progress.completed == 8:
             other.execute("BEGIN IMMEDIATE")
 
     with pytest.raises(DatabaseBusyError, match="run the same command again"):
@@ -291,7 +291,7 @@ def test_a_server_that_falls_silent_is_given_up(
         by_proxy = url.set(host="127.0.0.1", port=port).render_as_string(hide_password=False)
 
         def stall(progress: CampaignProgress) -> None:
-            if progress.done >= 8:
+            if progress.completed >= 8:
                 stalls.set()
 
         with pytest.raises(DatabaseFailedError, match=r"no answer for .* run the same command"):

@@ -120,7 +120,7 @@ def test_a_server_that_is_gone_between_two_transactions(
     merge_databases(motions, db=place)
 
     def stop(progress: CampaignProgress) -> None:
-        if progress.done >= 8:
+        if progress.completed >= 8:
             control("stop", "-m", "immediate")
 
     with pytest.raises(DatabaseFailedError, match=r"the server gave up.* run the same command"):

@@ -33,7 +33,7 @@ def test_any_cut_leaves_what_was_there_before(
 
     def copy(progress: CampaignProgress) -> None:
         # as after a power cut: the log is not yet part of the file
-        if progress.done == progress.total:
+        if progress.completed == progress.total:
             for tail in ("", "-wal", "-shm"):
                 shutil.copy(f"{database}{tail}", torn / f"whole.db{tail}")
 
@@ -80,7 +80,7 @@ def test_a_log_with_flipped_bytes_ends_before_them(
     database: Path, undisturbed: str, tmp_path: Path
 ) -> None:
     def copy(progress: CampaignProgress) -> None:
-        if progress.done == progress.total:
+        if progress.completed == progress.total:
             for tail in ("", "-wal"):
                 shutil.copy(f"{database}{tail}", tmp_path / f"flipped.db{tail}")
 

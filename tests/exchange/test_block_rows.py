@@ -107,7 +107,7 @@ def test_bad_rows_leave_the_others_as_they_are(
     found = read_blocks(source)
     assert found.refused["row"].tolist() == bad
     assert found.blocks["row"].tolist() == [i for i in range(len(rows)) if i not in bad]
-    for i, reason, place in zip(bad, found.refused["reason"], found.places, strict=True):
+    for i, reason, place in zip(bad, found.refused["reason"], found.row_labels, strict=True):
         expected = BAD[kinds[i]][1]
         if form == "geojson" and kinds[i] == "no place":  # a point has both, or none
             expected = "lon = nan, lat = nan is no place"
@@ -126,7 +126,7 @@ def test_bad_rows_leave_the_others_as_they_are(
         )
         assert f"(block b{bad[0]}): " in said[0]
         with pytest.raises(InputError) as refusal:
-            found.whole("all are asked about")
+            found.require_all("all are asked about")
         message = str(refusal.value)
         assert f"{len(bad)} of {len(rows)} blocks are invalid, and all are asked" in message
         assert len(message) < 500
@@ -137,7 +137,7 @@ def test_bad_rows_leave_the_others_as_they_are(
 def test_predictions_name_the_same_row(tmp_path: Path, form: str, kind: str) -> None:
     source = table(tmp_path, form, [SOUND, SOUND, BAD[kind][0], SOUND])
     target = tmp_path / f"out{source.suffix}"
-    told: Any = predict_table(source, target, given={"pgv_m_s": 0.6}, ignore_columns=("weight",))
+    told: Any = predict_table(source, target, inputs={"pgv_m_s": 0.6}, ignore_columns=("weight",))
     place = f"{WORDS.get(form, 'row')} {FIRST.get(form, 1) + 2}"
     (said,) = (text for text in told.warnings if "could not be used" in text)
     assert said.startswith("1 of 4 blocks could not be used; the reasons stand in the column")
@@ -159,9 +159,9 @@ def test_lines_are_those_of_an_editor(
     if not with_arrow:
         monkeypatch.setattr("rbfrag.exchange.tables.csv_file.pyarrow", _no_arrow)
     rows = read_blocks(source)
-    assert rows.places == ["line 6 (block b)", "line 8 (block d)"]
+    assert rows.row_labels == ["line 6 (block b)", "line 8 (block d)"]
     told: Any = predict_table(
-        source, tmp_path / "b.csv", given={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
+        source, tmp_path / "b.csv", inputs={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
     assert (told.rows, told.without_answer) == (4, 2)
     assert "the first is line 6: kr is not a number" in str(told.warnings)
@@ -181,7 +181,7 @@ def test_delimiters_behind_the_last_column_are_no_column(tmp_path: Path) -> None
     assert rows.blocks["block_id"].tolist() == ["a", "b"]
     assert rows.refused["reason"].tolist() == ["5 cells under 3 columns"]
     told = predict_table(
-        source, tmp_path / "b.csv", given={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
+        source, tmp_path / "b.csv", inputs={"pgv_m_s": 0.6}, model=None, level=0.95, db=None
     )
     assert (told.rows, told.answered) == (3, 2)
 
@@ -298,7 +298,7 @@ def test_a_long_list_has_room_in_a_message() -> None:
     with pytest.raises(InputError) as refusal:
         read_blocks(
             {"p2_1_s2": np.full(5000, 3.0), "kr": np.append(0.1, np.full(4999, -1.0))}
-        ).whole("all are asked about")
+        ).require_all("all are asked about")
     message = str(refusal.value)
     assert "4,999 of 5,000 blocks" in message
     assert message.endswith("correct or remove these rows")

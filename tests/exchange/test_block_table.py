@@ -160,12 +160,12 @@ def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
         "height_m,width_m,dip_deg,kind,restitution\n"
         "3,0.6,-5,,\n3,0.6,-5,rocking,\n3,0.6,-5,rocking,0.9\n"
     )
-    columns = read_blocks(path).whole()
+    columns = read_blocks(path).require_all()
     backed, free, _ = columns["kr"].tolist()
     alpha, dip = np.arctan(0.2), np.radians(5.0)
     assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
     assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
-    assert read_blocks(path, "rocking").whole()["kr"][0] == pytest.approx(free)
+    assert read_blocks(path, "rocking").require_all()["kr"][0] == pytest.approx(free)
 
 
 def test_text_of_another_encoding_is_refused_with_its_row(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_a_table_is_read_back(tmp_path: Path) -> None:
     }
     path = write_block_table(columns, tmp_path / "blocks.csv", excel_text=True)
     assert "\n'=1+1,3.0,0.1\n" in path.read_text()
-    assert read_blocks(path).whole()["block_id"].tolist() == names.tolist()
+    assert read_blocks(path).require_all()["block_id"].tolist() == names.tolist()
     assert write_block_table(columns, tmp_path / "b.csv").read_text().count("\n=1+1,") == 1
 
 
@@ -61,7 +61,7 @@ def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
     source, out = tmp_path / "blocks.csv", tmp_path / "answers.csv"
     source.write_text("name,p2_1_s2,kr,pgv_m_s\n'=1+1,3,0.1,0.5\n-2.5,3,0.1,0.5\nx,3,0.1,0.5\n")
     summary = predict_table(
-        source, out, given={}, model=None, level=0.95, db=None, excel_text=excel_text
+        source, out, inputs={}, model=None, level=0.95, db=None, excel_text=excel_text
     )
     first, second, _ = out.read_text().splitlines()[1:]
     assert first.replace('"', "").startswith("'=1+1,3" if excel_text else "=1+1,3")

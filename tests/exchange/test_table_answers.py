@@ -47,7 +47,7 @@ def answer(
         save_model(connection, model_row())
 
     def run(source: Path, target: Path, **given: float) -> TableAnswer:
-        return predict_table(source, target, given=given, model=None, level=0.95, db=str(database))
+        return predict_table(source, target, inputs=given, model=None, level=0.95, db=str(database))
 
     return run
 
@@ -84,7 +84,7 @@ def total_of(tmp_path: Path, dependence: dict[str, Any] | None, rows: str) -> di
         save_model(connection, model_row(dependence=dependence))
     source = tmp_path / "a.csv"
     source.write_text(f"{HEAD},site_id\n{rows}")
-    return predict_table(source, given={}, model=None, level=0.9, db=str(database))
+    return predict_table(source, inputs={}, model=None, level=0.9, db=str(database))
 
 
 @pytest.mark.parametrize("sites", [1, 20])
@@ -118,7 +118,7 @@ def test_what_is_not_known_of_a_total_is_none(tmp_path: Path) -> None:
     told = total_of(tmp_path, None, "1,3.0,0.1,0.6,\n")
     assert told.failures_low is told.failures_high is None
     with pytest.raises(InputError, match="use the column site_id in a table"):
-        predict_table(tmp_path / "a.csv", given={}, sites=3)
+        predict_table(tmp_path / "a.csv", inputs={}, sites=3)
 
 
 def test_parts_join_without_a_seam(
@@ -264,7 +264,7 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
         "block_id,ky,beta_deg,mode\na,0.1,10,slide\nb,-0.1,10,slide\nc,0.1,10,topple\n"
     )
     given = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
-    told = predict_table(source, target, given=given, model=None, level=0.95, db=str(REFERENCE))
+    told = predict_table(source, target, inputs=given, model=None, level=0.95, db=str(REFERENCE))
     assert (told.kind, told.rows, told.answered) == ("sliding", 3, 2)
     assert [row["kind"] for row in rows_of(target)] == ["sliding", "sliding", "toppling"]
     first, second, third = rows_of(target)
@@ -274,7 +274,7 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     assert "mode is topple, and p2 is missing" in third["reason"]
     source.write_text("ks,ps2_1_s2,pgv_m_s,pga_g\n0.1,3,0.5,0.6\n")
     told = predict_table(
-        source, target, given={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
+        source, target, inputs={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
     )
     assert told.model == "slumping-2deg-pgv_pga"
     expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, pga_g=0.6, db=str(REFERENCE))
@@ -282,7 +282,7 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     source.write_text("ky,pgv_m_s\n0.1,0.5\n")
     with pytest.raises(InputError, match="no column displacement_m"):
-        predict_table(source, target, given={}, model=None, level=0.95, db=str(REFERENCE))
+        predict_table(source, target, inputs={}, model=None, level=0.95, db=str(REFERENCE))
 
 
 def test_uncertain_blocks_are_integrated_over(answer: Answer, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def save(path: Path, *rows: tuple[object, ...]) -> Path:
 
 
 def answer(source: Path, target: Path, **given: float) -> TableAnswer:
-    return predict_table(source, target, given=given, model=None, level=0.95, db=None)
+    return predict_table(source, target, inputs=given, model=None, level=0.95, db=None)
 
 
 def rows_of(path: Path) -> list[dict[str, object]]:
@@ -105,7 +105,7 @@ def test_formulas_are_read_as_their_values(tmp_path: Path) -> None:
                 assert b"<f>0.05*2</f><v" in text
                 text = text.replace(b"<v />", b"<v>0.1</v>").replace(b"<v></v>", b"<v>0.1</v>")
             new.writestr(member, text)
-    assert read_blocks(computed).whole()["kr"].tolist() == [0.1]
+    assert read_blocks(computed).require_all()["kr"].tolist() == [0.1]
 
 
 @pytest.mark.parametrize("mark", ["", "\ufeff"])

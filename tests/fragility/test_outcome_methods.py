@@ -136,12 +136,12 @@ def test_fits_read_blocks_as_rock_has_them_and_are_judged_on_the_grid():
     assert (data.read & above).sum() > 100 < (data.read & below).sum()
     assert (data.failed[above] == 0.0).all()
     # judged is what was run on the grid, also blocks that are too strong to be read
-    judged = data.judged.known
+    judged = data.judged.is_known
     assert np.array_equal(judged, (kr >= 0.02) & ~above & ~below)
     assert (judged & ~data.read).sum() > 10
     real = data.judged_real
     assert real is not None
-    assert np.array_equal(real.known, judged & (kr >= 0.05))
+    assert np.array_equal(real.is_known, judged & (kr >= 0.05))
     # what is judged and not read has no part in a fit
     rows = rows_of(wider, "logistic", "pgv")
     unread = ~data.read.ravel()[rows.place]

@@ -10,7 +10,7 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
+from rbfrag.fragility.method import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Form, LinearPredictor, Method
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -27,7 +27,7 @@ def velocity(sa10_g, _):
 
 def formula(b, v, ns):
     ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
-    return Eta(b[0] + b[1] * ratio, (1.0, ratio))
+    return LinearPredictor(b[0] + b[1] * ratio, (1.0, ratio))
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from rbfrag.hazards.event_counts import (
     PartCounts,
     _shaken,
     _sum_by_moments,
-    _sum_of_each,
+    _sum_lognormals,
     count_part,
     shift_error,
 )
@@ -172,7 +172,7 @@ def test_error_from_the_axes() -> None:
 def test_sums_of_costs_have_three_moments() -> None:
     n, sigma, draws = 60, 0.8, 100_000
     number, sigmas = np.full(draws, n), np.full(draws, sigma)
-    laws = (_sum_of_each(number, sigmas, np.random.default_rng(1)),
+    laws = (_sum_lognormals(number, sigmas, np.random.default_rng(1)),
             _sum_by_moments(number, sigmas, np.random.default_rng(2)))  # fmt: skip
     for values in laws:
         square = np.exp(sigma**2)

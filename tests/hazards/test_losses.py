@@ -24,7 +24,7 @@ from rbfrag.fragility.methods import method_named
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
-from rbfrag.hazards.event_counts import EventYears, SomeYears, count_years
+from rbfrag.hazards.event_counts import EventBatch, EventYears, count_years
 from rbfrag.hazards.loss_answer import LossAnswer
 from rbfrag.hazards.uncertainty import rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -270,7 +270,7 @@ def test_parts_of_the_work_change_nothing(
     assert seen == [(212, 212)] or seen[-1][0] == seen[-1][1]
     monkeypatch.setattr("rbfrag.hazards.losses.PAIRS_AT_ONCE", 7)
 
-    def backwards(parts: Iterator[SomeYears], number: int, common: EventYears) -> Iterator[Any]:
+    def backwards(parts: Iterator[EventBatch], number: int, common: EventYears) -> Iterator[Any]:
         results = [count_years(common, part) for part in parts]
         assert len(results) == number > 20
         return iter(results[::-1])

@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.hazards.maps.map_failures import (
     MapFailures,
-    Places,
+    SiteLocations,
     map_failures,
 )
 from rbfrag.hazards.maps.site_probability import SiteProbability, site_probability
@@ -26,7 +26,7 @@ from tests.hazards.conftest import measure_row
 FloatArray = NDArray[np.float64]
 
 LON, LAT = np.array([10.0, 10.1, 10.15, 10.4]), np.array([45.0, 45.0, 45.1, 45.05])
-PLACES = Places.of(LON, LAT)
+PLACES = SiteLocations.of(LON, LAT)
 P2, KR = np.array([3.0, 3.0, 10.0, 1.0]), np.array([0.1, 0.1, 0.15, 0.08])
 SHAKING = {"pgv_m_s": np.array([0.6, 0.5, 0.5, 0.8]), "pga_g": np.array([0.5, 0.4, 0.5, 0.4])}
 STD = {"pgv_m_s": np.array([0.5, 0.4, 0.5, 0.6]), "pga_g": np.full(4, 0.5)}
@@ -142,13 +142,13 @@ def test_certain_shaking_leaves_the_blocks_own_dependence(row: Row) -> None:
     assert found.drawn[COPULA].var() == pytest.approx((p * (1.0 - p)).sum(), rel=0.03)
     assert found.range_km is None
     # of one site instead, however far apart
-    together = Places.of(LON, LAT, np.array(["A"] * 4, dtype=object))
+    together = SiteLocations.of(LON, LAT, np.array(["A"] * 4, dtype=object))
     found = map_failures(answer, {"p2": P2, "kr": KR}, together, draws=40_000)
     assert found.by_law[COPULA].probability_any == pytest.approx(p.max(), abs=0.01)
 
 
 def test_places_within_a_hundred_metres_are_one_site() -> None:
-    found = Places.of(np.array([10.0, 10.0002, 10.002]), np.array([45.0, 45.0001, 45.0]))
+    found = SiteLocations.of(np.array([10.0, 10.0002, 10.002]), np.array([45.0, 45.0001, 45.0]))
     assert found.group[0] == found.group[1] != found.group[2]
 
 

@@ -92,7 +92,7 @@ def test_adding(tmp_path: Path, records: Path) -> None:
     assert missing.path.endswith("gone.v2")
     assert "line 4 of the metadata" in missing.reason
     again = add_motions(records / "chan001.v2", db=tmp_path / "one.db", metadata=table)
-    assert len(again.known) == 2
+    assert len(again.already_stored) == 2
     with pytest.raises(InputError, match="file or folder not found"):
         add_motions(tmp_path / "none.zip" / "a.v2", db=tmp_path / "one.db")
 

@@ -115,7 +115,7 @@ def test_codes_are_those_of_an_array_and_a_row(name: str) -> None:
     assert codes(answer_block(fields, **how).warnings) == expected
     cells = {column_of(n): ["no" if value is False else value] for n, value in question.items()}
     pd.DataFrame(cells).to_csv("row.csv", index=False)
-    assert codes(predict_table("row.csv", given={}).warnings) == expected
+    assert codes(predict_table("row.csv", inputs={}).warnings) == expected
 
 
 def test_the_questions_cover_the_warnings() -> None:

@@ -131,14 +131,14 @@ def test_every_interface_equals_a_dense_integration(
     header = ",".join(["component", *question])
     cells = ",".join(str(value) for value in question.values())
     (tmp_path / "b.csv").write_text(f"{header}\n{name},{cells}\n,{cells}\nrotd5,{cells}\n")
-    table = predict_table(tmp_path / "b.csv", given={}, db=str(REFERENCE))
+    table = predict_table(tmp_path / "b.csv", inputs={}, db=str(REFERENCE))
     by_row = [row["probability"] for row in table.blocks]
     assert by_row[:2] == pytest.approx(many.probability[::-1].tolist(), rel=1e-6)
     assert by_row[2] is None
     assert "did you mean 'rotd50'" in table.blocks[2]["reason"]
     assert not any("component" in text for text in table.warnings[:-1])
     # an option is for the rows that name none
-    filled = predict_table(tmp_path / "b.csv", given={}, component=name, db=str(REFERENCE))
+    filled = predict_table(tmp_path / "b.csv", inputs={}, component=name, db=str(REFERENCE))
     assert [row["probability"] for row in filled.blocks[:2]] == [by_row[0]] * 2
 
 

@@ -90,7 +90,7 @@ def test_other_columns_are_rejected_where_they_sound_like_input_and_named_elsewh
 def test_columns_of_an_earlier_answer_are_named_as_ignored(tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text("block_id,p2_1_s2,kr,pgv_m_s,lon,lat\na,3,0.1,0.6,20,40\n")
-    assert predict_table(source, target, given={}, component="single").warnings == ()
+    assert predict_table(source, target, inputs={}, component="single").warnings == ()
     assert read_blocks(target).remarks == (
         "column ignored: pgv_m_s",
         "columns of an earlier answer ignored: probability, ci_low, ci_high, event_low, "
@@ -133,7 +133,7 @@ def answered(
 ) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     source, target = tmp_path / "blocks.csv", tmp_path / "answers.csv"
     source.write_text(text)
-    told = predict_table(source, target, given=given, model=None, level=0.95, db=None)
+    told = predict_table(source, target, inputs=given, model=None, level=0.95, db=None)
     warnings = told.warnings
     with target.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file)), warnings

@@ -67,7 +67,7 @@ def run_on_cluster(
     after_a_death: str = GO_ON,
     shared: Any = None,
 ) -> Iterator[Results]:
-    """Yield the answers as they come from a cluster.
+    """Yield results as they arrive from a cluster.
 
     A motion travels inside its task, so that the scheduler can give the task to another worker
     when one is lost. Work is fetched as it is handed out, and no more than three motions a
@@ -108,7 +108,7 @@ def _most_under_way(client: Any) -> int:
 
 
 def _next_result(waiting: Any, address: str, after_a_death: str) -> Iterator[Any]:
-    """Yield the next result, or nothing where its worker died after the work was done.
+    """Yield the next result, or nothing if its worker died after finishing.
 
     A result stays on its worker until it is fetched. The scheduler has it computed again, and
     its future, which was reported as done, waits once more.

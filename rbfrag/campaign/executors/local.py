@@ -1,4 +1,4 @@
-"""Who does the work of a campaign: processes of this machine, or a cluster."""
+"""Local execution of a campaign by worker processes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CLUSTER = "a cluster"
 
 
 def check_workers(jobs: int | None, scheduler: str | None) -> None:
-    """Refuse an impossible number of workers, or two answers to who does the work."""
+    """Reject an invalid number of workers, or workers together with a cluster."""
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be at least 1, not {jobs}", fields=("jobs",))
     if jobs is not None and scheduler is not None:
@@ -51,7 +51,7 @@ def executor(
     after_a_death: str = GO_ON,
     shared: Any = None,
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
-    """Offer, for a ``with`` block, a function that does work and yields answers in any order.
+    """Provide, in a ``with`` block, a function that runs work and yields results in any order.
 
     The function takes the work and the number of its chunks.
 
@@ -97,7 +97,7 @@ def run_locally(
     stopped: Stopped = never,
     shared: Any = None,
 ) -> Iterator[R]:
-    """Yield the answers as they come, from worker processes or, for one worker, from here.
+    """Yield results as they arrive, from worker processes or, for one worker, from this process.
 
     Work is fetched as it is handed out, and no more than three chunks a worker are under way:
     a writer that is slower than the workers holds them up instead of filling the memory.
@@ -174,7 +174,7 @@ def _with_shared(do: Callable[..., R], item: Any) -> R:
 
 
 def prepare(tell: Sequence[Callable[[], None]] = (), first: Any = None, shared: Any = None) -> None:
-    """Leave Ctrl-C to the main process, and end with it however it ends.
+    """Leave Ctrl-C to the main process, and end when it ends.
 
     Args:
         tell: functions of a module that the first worker to compile a kernel calls.

@@ -1,4 +1,4 @@
-"""What campaigns store, by kind: `campaign_of_kind` reads the file of its name."""
+"""Storage of campaigns by kind: `campaign_of_kind` loads the file of its name."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from rbfrag.solver.kinds import KINDS
 
 
 def campaign_kinds() -> tuple[str, ...]:
-    """Return the names of the kinds that campaigns store, in alphabetical order."""
+    """Return the names of the kinds that campaigns support, in alphabetical order."""
     return tuple(sorted(module.name for module in iter_modules(__path__)))
 
 
 @cache
 def campaign_of_kind(kind: str) -> CampaignKind:
-    """Return what campaigns of the kind of that name store.
+    """Return the campaign of a kind by name.
 
     Raises:
         InputError: there is no such kind, or campaigns do not store it.
     """
-    known = campaign_kinds()
-    if kind not in known:
+    names = campaign_kinds()
+    if kind not in names:
         why = KINDS[kind].no_search if kind in KINDS else ""
         raise InputError(
-            f"kind {kind}: campaigns are of {', '.join(known)}{': ' if why else ''}{why}",
+            f"kind {kind}: campaigns are of {', '.join(names)}{': ' if why else ''}{why}",
             fields=("kind",),
         )
     campaign: CampaignKind = import_module(f"{__name__}.{kind}").CAMPAIGN

@@ -25,7 +25,7 @@ FAMILY = tuple(
 
 
 class ConfinedCampaign(ScaledRecords):
-    """The outcome grid of every block of a family."""
+    """Outcome grid of every block of a family."""
 
     # every second: a run takes some four times as long as of a slumping block
     ratios = ScaledRecords.ratios[::2]

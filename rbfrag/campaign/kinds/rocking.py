@@ -1,4 +1,4 @@
-"""Campaigns of free-standing blocks: rectangles on level ground, of every size and restitution."""
+"""Campaigns of rocking: free-standing rectangles on level ground, of every size and restitution."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ first of them, none does from 5.5 on."""
 
 
 class RockingCampaign(CampaignKind):
-    """The outcome grid of every size and factor; their mirror image is another polarity."""
+    """Outcome grid of every size and restitution factor; the mirror image is the other polarity."""
 
     options = ("p2", "restitution_factors")
     polarities = ("forward",)
@@ -65,13 +65,13 @@ class RockingCampaign(CampaignKind):
         )
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
+        """Return k_r/PGA of blocks at fixed ratios of toppling velocity to PGV."""
         return strengths_at(case.size, measures, Y_OVER_PGV)
 
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return the outcome grid of every case under one motion, all blocks in one call."""
+        """Return the outcome grid of every case under one motion, in one call for all blocks."""
         strengths = [self.grid(case, shaking.motion) for case in cases]
         if not request.grid or not any(map(len, strengths)):
             return [CaseResult(None, None)] * len(cases)
@@ -92,16 +92,18 @@ class RockingCampaign(CampaignKind):
         words = [OUTCOMES[code].value for code in runs.outcome.tolist()]
         results, start = [], 0
         for ratios in strengths:
-            own = slice(start, start + len(ratios))
+            part = slice(start, start + len(ratios))
             start += len(ratios)
-            sensitive = runs.sensitive[own] > 0
-            points = SearchPoints(ratios, runs.theta_n[own], tuple(words[own]), sensitive=sensitive)
+            sensitive = runs.sensitive[part] > 0
+            points = SearchPoints(
+                ratios, runs.theta_n[part], tuple(words[part]), sensitive=sensitive
+            )
             results.append(CaseResult(None, points))
         return results
 
 
 def _factor_of(case: Case) -> float:
-    """Return the factor on the restitution of the blocks of a case."""
+    """Return the restitution factor of a case."""
     factor = (case.block or {}).get(FACTOR)
     if not isinstance(factor, int | float):
         raise InputError(f"its block {case.block} is not described as free-standing ones are")

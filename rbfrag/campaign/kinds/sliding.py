@@ -1,4 +1,4 @@
-"""Campaigns of sliding: displacements on a level plane, which serve every shape and dip."""
+"""Campaigns of sliding: displacements on a level plane, valid for every shape and dip."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ LEVEL_PLANE = {"plane": "level"}
 
 
 class SlidingCampaign(Sequences):
-    """The first motion and every stated displacement, with the displacements of a grid."""
+    """Onset of sliding and every displacement limit, with the displacements of a grid."""
 
     options = ("displacements_m",)
     measure = "displacement_m"
 
     def cases(self, *, displacements_m: Sequence[float] = THRESHOLDS_M) -> tuple[Case, ...]:
-        """Return the first motion and every stated displacement [m]."""
-        stated = [positive(value, "displacement_m", "m") for value in displacements_m]
-        each_once(stated, "displacement_m")
+        """Return the onset of sliding and every displacement limit [m]."""
+        displacements = [positive(value, "displacement_m", "m") for value in displacements_m]
+        each_once(displacements, "displacement_m")
         settings = {"search_limit": SEARCH_LIMIT, "tolerance": TOLERANCE}
         return tuple(
             Case(self.kind, None, LEVEL_PLANE, {**settings, "displacement_m": value})
-            for value in (0.0, *stated)
+            for value in (0.0, *displacements)
         )
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
@@ -44,7 +44,7 @@ class SlidingCampaign(Sequences):
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return critical strength and displacements of every case under one motion."""
+        """Return the critical strength and the displacements of every case under one motion."""
         excited = shaking.excitation
         # where 1 + k_v reaches zero the block leaves its base: no displacement is known
         leaves = excited.jump_node < excited.w.size
@@ -69,15 +69,15 @@ class SlidingCampaign(Sequences):
         return results
 
     def blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
-        """Return blocks of stated yield accelerations on a level plane."""
+        """Return blocks of given yield accelerations on a level plane."""
         return tuple({**LEVEL_PLANE, "ky": ky} for ky in SEQUENCE_KY_G)
 
     def limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
-        """Return the stated displacements [m]."""
+        """Return the displacement limits [m]."""
         limits: list[Any] = [case.settings["displacement_m"] for case in cases]
         return tuple(limit for limit in limits if limit > 0.0)
 
-    def site(self, block: Mapping[str, Any]) -> SupportedBlock:
+    def supported_block(self, block: Mapping[str, Any]) -> SupportedBlock:
         """Return the block on its level plane."""
         return level_plane(block["ky"])
 

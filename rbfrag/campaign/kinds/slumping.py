@@ -27,7 +27,7 @@ FAMILY = tuple(
 
 
 class SlumpingCampaign(ScaledRecords):
-    """The outcome grid of every block of a family and rotation that counts as failure."""
+    """Outcome grid of every block of a family and every rotation limit."""
 
     options = ("rotations_deg", "family")
     rotations_deg = (2.0, None)

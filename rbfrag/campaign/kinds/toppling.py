@@ -1,4 +1,4 @@
-"""Campaigns of toppling: every size p², whose blocks stand at fixed ratios of y to PGV."""
+"""Campaigns of toppling: every size p², with blocks at fixed ratios of toppling velocity to PGV."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Y_OVER_PGV = np.concatenate([0.1 * 40.0 ** (np.arange(-10, 0) / 24.0), np.geomsp
 
 
 class TopplingCampaign(SingleBlockCampaign):
-    """Critical block and outcome grid of every size."""
+    """Critical strength and outcome grid of every size."""
 
     options = ("p2", "grid", "store_responses", "full_map")
 
@@ -41,13 +41,13 @@ class TopplingCampaign(SingleBlockCampaign):
         return tuple(Case(self.kind, size, settings=settings) for size in sizes)
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
-        """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
+        """Return k_r/PGA of blocks at fixed ratios of toppling velocity to PGV."""
         return strengths_at(case.size, measures, Y_OVER_PGV)
 
     def run_cases(
         self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return critical block and outcome grid of every case under one motion."""
+        """Return the critical strength and the outcome grid of every case under one motion."""
         results = []
         for case in cases:
             settings: dict[str, Any] = dict(case.settings)
@@ -69,7 +69,7 @@ class TopplingCampaign(SingleBlockCampaign):
         return results
 
     def run_blocks(self, shaking: Shaking, case: Case, k_over_pga: Sequence[float]) -> SearchPoints:
-        """Run one block at each k_r/PGA, in their order; the PGA must be positive."""
+        """Run one block at each k_r/PGA, in the given order; the PGA must be positive."""
         # that of the search: what it has worked out about the record is kept with it
         excited = kept_excitation(shaking.motion, shaking.vertical, shaking.polarity)
         strengths = np.array(k_over_pga, dtype=np.float64)
@@ -81,7 +81,7 @@ class TopplingCampaign(SingleBlockCampaign):
         )
 
     def history(self, shaking: Shaking, case: Case, k_over_pga: float) -> Response:
-        """Return the motion in time of the block of that k_r/PGA."""
+        """Return the response history of the block with this k_r/PGA."""
         return respond(
             shaking.motion,
             p2=case.size,

@@ -1,4 +1,4 @@
-"""`rbfrag bench`: speed against error, on this machine."""
+"""`rbfrag bench`: computing time against error on this machine."""
 
 from __future__ import annotations
 

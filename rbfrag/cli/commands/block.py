@@ -1,4 +1,4 @@
-"""`rbfrag block`: how one block fails, and at which acceleration."""
+"""`rbfrag block`: failure mode and yield acceleration of one block."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Annotated
 from rbfrag.cli.output import check_files, print_json, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import MeshOptions
-from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
 from rbfrag.results.diagnostic import Diagnostic
-from rbfrag.vocabulary.quantities import AT_REST, JOINT, PLANES, SHAPE, WHOLE
+from rbfrag.vocabulary.quantities import AT_REST, COMMON, JOINT, PLANES, SHAPE
 
 FREE_STANDING = Diagnostic(
     "free-standing: rbfrag predict --kind rocking gives the probability of overturning, rbfrag "
@@ -24,9 +24,9 @@ EXAMPLE = "Example:  rbfrag block --height 2.4 --width 0.5 --dip 3 --phi 35"
 @stacked
 def block(
     *,
-    given: Annotated[
-        Given,
-        fields_of(*SHAPE, *PLANES, *JOINT, *WHOLE, *AT_REST, without=("kind", "phi_residual_deg")),
+    inputs: Annotated[
+        ParsedInputs,
+        fields_of(*SHAPE, *PLANES, *JOINT, *COMMON, *AT_REST, without=("kind", "phi_residual_deg")),
     ],
     mesh: MeshOptions,
     plot: str | None = option(
@@ -59,14 +59,14 @@ def block(
             print(f"predict --blocks {written}  with an intensity measure, as --pgv 0.6")
         return
     if mesh.mesh is not None:
-        _mesh(mesh.mesh, mesh, given.get("density_kg_m3"), plot, printing)
+        _mesh(mesh.mesh, mesh, inputs.get("density_kg_m3"), plot, printing)
         return
     from rbfrag.question.blocks import on_planes
     from rbfrag.solver.kinds import kind_of_mode
     from rbfrag.solver.stability.single import stability
 
-    with given.named():
-        body, planes, _, remarks = on_planes(given)
+    with inputs.named():
+        body, planes, _, remarks = on_planes(inputs)
     result = stability(body, **planes)
     result = replace(result, warnings=tuple(dict.fromkeys((*remarks, *result.warnings))))
     unbacked = planes.get("back_fracture") is False
@@ -86,7 +86,7 @@ def _mesh(
     plot: str | None,
     printing: options.Printing,
 ) -> None:
-    """Answer for a mesh: its weakest azimuth, and what the height of contact changes."""
+    """Print the weakest azimuth of a mesh, and the effect of the contact height."""
     from rbfrag.exchange.mesh_file import block_from_mesh
 
     check_files(table=about.out, plot=plot, excel_text=about.excel_text)

@@ -1,4 +1,4 @@
-"""`rbfrag critical`: the strongest block that fails under a motion."""
+"""`rbfrag critical`: the strongest block that fails in a ground motion."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from rbfrag.cli.output import check_files, print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.vocabulary.quantities import JOINT, PLANES, SHAPE, WHOLE
+from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -26,7 +26,7 @@ FINE_ENOUGH_TO_DRAW = 1e-7
 
 @dataclass(frozen=True, kw_only=True)
 class Searched:
-    """What is searched for."""
+    """Kind of failure and failure limit of the search."""
 
     kind: str | None = option(
         "Kind of failure: toppling, sliding, slumping or confined_toppling [default: "
@@ -45,9 +45,9 @@ class Searched:
 def critical(
     *,
     motion: options.Motion,
-    given: Annotated[
-        Given,
-        fields_of("p2", *SHAPE, *PLANES, *JOINT, *WHOLE, without=("kind",)),
+    inputs: Annotated[
+        ParsedInputs,
+        fields_of("p2", *SHAPE, *PLANES, *JOINT, *COMMON, without=("kind",)),
     ],
     direction: options.Direction,
     reading: options.ReadingOptions,
@@ -79,7 +79,7 @@ def critical(
     rotation, displacement = searched.rotation, searched.displacement
     if searched.kind is not None and (why := facts_of(searched.kind).no_search):
         raise InputError(f"--kind {searched.kind} has no critical value: {why}")
-    block, block_kr, remarks = _searched_block(given, searched.kind)
+    block, block_kr, remarks = _searched_block(inputs, searched.kind)
     model = _chosen_kind(searched.kind, block, displacement)
     _refuse_options_of_other_kinds(
         model,
@@ -101,7 +101,7 @@ def critical(
         distances = (
             None if displacement is None else options.number_list(displacement, "--displacement")
         )
-        with given.named():
+        with inputs.named():
             slides = _slides(ground, distances, about, kind=model.kind, **block, **shaking)
         print_result(slides, json=printing.json, verbose=printing.verbose)
         return
@@ -109,7 +109,7 @@ def critical(
     if "full_map" in model.search_options:
         settings["full_map"] = full_map or plot is not None
         settings["map_depth"] = MAP_DEPTH if plot is None else FINE_ENOUGH_TO_DRAW
-    with given.named():
+    with inputs.named():
         result = search(ground, kind=model.kind, **settings, **shaking)
         if block_kr is not None and model.search_needs == "p2":
             response = respond(ground, kind=model.kind, p2=result.p2, kr=block_kr, **shaking)
@@ -152,20 +152,20 @@ def _chosen_kind(kind: str | None, block: dict[str, Any], displacement: str | No
     return kind_of_mode("topple" if displacement is None else "slide")
 
 
-def _refuse_options_of_other_kinds(model: KindSpec, given: dict[str, bool]) -> None:
+def _refuse_options_of_other_kinds(model: KindSpec, used_options: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import KINDS
 
-    for word, is_given in given.items():
+    for word, is_given in used_options.items():
         if is_given and SEARCH_OPTION[word] not in model.search_options:
             name = SEARCH_OPTION[word]
             owners = [kind for kind, its in KINDS.items() if name in its.search_options]
             raise InputError(f"{word} requires --kind {' or '.join(owners)}")
-    if model.search_needs == "p2" and not (given["--p2"] or given["--block"]):
+    if model.search_needs == "p2" and not (used_options["--p2"] or used_options["--block"]):
         raise InputError("--p2 is missing: the critical strength is computed for one p² [1/s²]")
 
 
 def _searched_block(
-    given: Given, kind: str | None
+    inputs: ParsedInputs, kind: str | None
 ) -> tuple[dict[str, Any], float | None, tuple[str, ...]]:
     """Return the block of a search by keyword, its k_r if it topples, and warnings."""
     from rbfrag.question.blocks import shape_of, without_kv
@@ -177,21 +177,21 @@ def _searched_block(
     )
     from rbfrag.solver.stability.single import stability
 
-    with given.named():
-        shape = shape_of(without_kv(given))
+    with inputs.named():
+        shape = shape_of(without_kv(inputs))
         if shape is None:
-            return {name: given[name] for name in ("p2",) if name in given}, None, ()
-        if "p2" in given:
+            return {name: inputs[name] for name in ("p2",) if name in inputs}, None, ()
+        if "p2" in inputs:
             raise InputError(
                 "p2 cannot be combined with the geometry of a block: give one of them",
                 fields=("p2",),
             )
     topples = kind_of_mode("topple") if kind is None else facts_of(kind)
     if "phi_deg" not in shape.planes and topples.search_needs == "p2":
-        _, numbers, remarks = numbers_of(given, topples.kind)
+        _, numbers, remarks = numbers_of(inputs, topples.kind)
         return {"p2": numbers["p2"]}, numbers["kr"], remarks
-    with given.named():
-        planes, after = after_first_slip(shape.block, shape.known().planes)
+    with inputs.named():
+        planes, after = after_first_slip(shape.block, shape.require_friction().planes)
         refuse_before_slip(shape.block, planes, kind)
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if planes.pop(name, nothing) != nothing:
@@ -207,7 +207,7 @@ def _searched_block(
 def _slides(
     ground: GroundMotion, distances: list[float] | None, remarks: list[str], **question: Any
 ) -> SlidingStrengths:
-    """Return the critical strengths by displacement, displacements by strength, and the block's."""
+    """Return the critical strengths by displacement, and the displacements by strength."""
     import numpy as np
 
     from rbfrag.solver.critical import critical as search

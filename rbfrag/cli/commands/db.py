@@ -1,4 +1,4 @@
-"""`rbfrag db`: the database itself."""
+"""`rbfrag db`: maintenance of the database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`rbfrag demo`: the whole chain on real recorded motions in one go."""
+"""`rbfrag demo`: a complete example on recorded ground motions."""
 
 from __future__ import annotations
 

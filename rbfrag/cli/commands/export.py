@@ -10,7 +10,7 @@ import typer
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, command_group, fields_of, option, stacked
 from rbfrag.vocabulary.quantities import ANSWERING
 
 if TYPE_CHECKING:
@@ -21,14 +21,14 @@ app = command_group(
     "Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml",
 )
 
-Answering = Annotated[Given, fields_of(*ANSWERING, without=("level",))]
+Answering = Annotated[ParsedInputs, fields_of(*ANSWERING, without=("level",))]
 
 Out = Annotated[str, typer.Option("--out", help="Output file")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionOptions(BlocksOptions):
-    """The blocks, one function each, and what a function is of."""
+    """Options of the exported fragility functions, one per block."""
 
     name: str = option("Identifier of the single block or of the rock mass", "block")
     imt: str = option("Intensity measure of the fragility function: PGV, PGA, or SA at 1 s", "PGV")
@@ -46,9 +46,11 @@ class FunctionOptions(BlocksOptions):
         metavar="LIST",
     )
 
-    def keywords(self, given: Given, answering: Given) -> tuple[dict[str, Any], tuple[str, ...]]:
-        """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        several = self.given_blocks(given, one_kind=True)
+    def keywords(
+        self, inputs: ParsedInputs, answering: ParsedInputs
+    ) -> tuple[dict[str, Any], tuple[str, ...]]:
+        """Return the keywords of `rbfrag.export`, and warnings about the blocks."""
+        several = self.given_blocks(inputs, one_kind=True)
         of_many = several.is_class or several.rows is not None
         keywords = {
             **({"blocks": several.question} if of_many else several.numbers),
@@ -64,7 +66,7 @@ class FunctionOptions(BlocksOptions):
 @stacked
 def nrml(
     out: Out,
-    given: options.Block,
+    inputs: options.Block,
     blocks: FunctionOptions,
     answering: Answering,
     json: options.Json = False,
@@ -75,7 +77,7 @@ def nrml(
     """
     from rbfrag.exchange.export import nrml as written
 
-    keywords, remarks = blocks.keywords(given, answering)
+    keywords, remarks = blocks.keywords(inputs, answering)
     _print(written(out, **keywords), remarks, json=json)
 
 
@@ -85,7 +87,7 @@ def nrml(
 @stacked
 def pelicun(
     out: Out,
-    given: options.Block,
+    inputs: options.Block,
     blocks: FunctionOptions,
     answering: Answering,
     json: options.Json = False,
@@ -97,7 +99,7 @@ def pelicun(
     """
     from rbfrag.exchange.export import pelicun as written
 
-    keywords, remarks = blocks.keywords(given, answering)
+    keywords, remarks = blocks.keywords(inputs, answering)
     _print(written(out, **keywords), remarks, json=json)
 
 

@@ -1,4 +1,4 @@
-"""`rbfrag fit`: a fragility model from the stored critical values."""
+"""`rbfrag fit`: fit a fragility model to the stored simulations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _described(term: Term) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Data:
-    """What is fitted."""
+    """Data selection of the fit."""
 
     suite: options.Suite = None
     include_structures: bool = option(options.INCLUDE_STRUCTURES, False)
@@ -36,7 +36,7 @@ class Data:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """How the model is stored, and what its bootstrap draws."""
+    """Name and default of the stored model, and the seed of its bootstrap."""
 
     name: str | None = option("Name of the model [default: METHOD-TERM]")
     seed: int = option("Seed of the bootstrap by earthquake", 0)

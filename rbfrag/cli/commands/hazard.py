@@ -1,4 +1,4 @@
-"""`rbfrag hazard`: how often per year blocks topple."""
+"""`rbfrag hazard`: annual failure rate of blocks."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from rbfrag.cli.commands.simulate import WorkerOptions
 from rbfrag.cli.output import check_files, print_result, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
-from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.results.diagnostic import diagnostics
-from rbfrag.vocabulary.quantities import BLOCK, WHOLE
+from rbfrag.vocabulary.quantities import BLOCK, COMMON
 
 if TYPE_CHECKING:
     from rbfrag.hazards.curve import CurveKeywords
@@ -25,7 +25,7 @@ EXAMPLE = (
 
 @dataclass(frozen=True, kw_only=True)
 class RateOptions:
-    """Which rates are asked for."""
+    """Options of the annual rates."""
 
     years: float = option("Exposure time of the probability [years]", 50.0)
     weights: str | None = option(
@@ -45,7 +45,7 @@ class RateOptions:
     )
 
     def counts(self) -> list[int] | None:
-        """Return the numbers of failures whose rates are wanted at a site."""
+        """Return the numbers of failures at a site whose rates are requested."""
         if self.at_least is None:
             return None
         try:
@@ -66,11 +66,11 @@ def hazard(
         "logic tree",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
+    inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON)],
     blocks: BlocksOptions,
     meaning: options.Curve,
     answering: options.Answering,
-    wanted: RateOptions,
+    rate_options: RateOptions,
     workers: WorkerOptions,
     out: str | None = option(
         "Output table with one row per block and site (.csv, .xlsx, .parquet)"
@@ -109,16 +109,16 @@ def hazard(
 
     check_files(table=out, plot=plot, excel_text=excel_text)
     check_files(table=release)
-    table, is_class, remarks, rows = blocks.given_blocks(given, reads=(*RELEASE, "count"))
+    table, is_class, remarks, rows = blocks.given_blocks(inputs, reads=(*RELEASE, "count"))
     if release is not None and is_class:
         raise InputError(
             "--release requires the coordinates of blocks: use --blocks instead of --rockmass"
         )
     if rows is None:
-        table = {**{name: [given[name]] for name in SIDES if name in given}, **table}
+        table = {**{name: [inputs[name]] for name in SIDES if name in inputs}, **table}
     files = [suited_in(path, **vars(meaning)) for path in curve]
     at = blocks_at_sites(
-        files, table, site_chosen=meaning.site is not None, within_km=wanted.within_km
+        files, table, site_chosen=meaning.site is not None, within_km=rate_options.within_km
     )
     if rows is not None:
         of_none = np.isin(np.arange(rows.blocks["row"].size), [*at.missing])
@@ -131,21 +131,21 @@ def hazard(
     elsewhere = workers.scheduler is not None or (workers.jobs or 1) > 1
     run = workers.runner(rate_part) if elsewhere else None
     answer = hazard_at_sites(
-        at.sites, at.site, at.given, cast("CurveKeywords", vars(meaning)),
+        at.sites, at.site, at.inputs, cast("CurveKeywords", vars(meaning)),
         cast("AnsweringFields", answering),
-        weight=branch_weights(wanted.weights, at.sites[0]), joint=wanted.joint,
-        at_least=wanted.counts(), years=wanted.years, one_class=is_class,
+        weight=branch_weights(rate_options.weights, at.sites[0]), joint=rate_options.joint,
+        at_least=rate_options.counts(), years=rate_options.years, one_class=is_class,
         count=None if is_class else at.columns.get("count"), run=run,
     )  # fmt: skip
-    if is_wet(given) if rows is None else rows.wet is not None:
+    if is_wet(inputs) if rows is None else rows.wet is not None:
         try:
             dry = blocks.given_blocks(
-                Given(without_water(given)), reads=(*RELEASE, "count"), dry=True
+                ParsedInputs(without_water(inputs)), reads=(*RELEASE, "count"), dry=True
             )
             bound = hazard_at_sites(
                 at.sites, at.site, numbers_of_dry(dry.columns, at),
                 cast("CurveKeywords", vars(meaning)), cast("AnsweringFields", answering),
-                years=wanted.years, run=run,
+                years=rate_options.years, run=run,
             )  # fmt: skip
             drained = bound.annual_rate
             if rows is not None and rows.wet is not None:

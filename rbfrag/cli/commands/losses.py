@@ -1,4 +1,4 @@
-"""`rbfrag losses`: how many blocks fail a year by an event set of OpenQuake, and at what loss."""
+"""`rbfrag losses`: annual failures and losses of blocks from an OpenQuake event set."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50
 
 @dataclass(frozen=True, kw_only=True)
 class JobFileOptions:
-    """The exports of one job."""
+    """Export files of one OpenQuake job."""
 
     gmf_data: str | None = option(
         "Ground-motion fields, CSV or HDF5 (gmf-data, which also names the sites)",
@@ -30,13 +30,13 @@ class JobFileOptions:
     )
 
     def named(self) -> dict[str, str]:
-        """Return the files that are named, by what they hold."""
+        """Return the named files by their content."""
         return {name: path for name, path in vars(self).items() if path is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Time:
-    """How long the events took, where no file of ruptures states it."""
+    """Duration of the event set, if no file of ruptures gives it."""
 
     investigation_time: float | None = option(
         "Investigation time of one stochastic event set [years], as in job.ini, if no "
@@ -50,7 +50,7 @@ class Time:
 
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """How the blocks of one event are taken together."""
+    """Sampling of the blocks of one event."""
 
     samples: int = option("Number of samples per event", 100)
     expected: bool = option("Expected values only, without samples and curves", False)
@@ -59,7 +59,7 @@ class Sampling:
 
 @dataclass(frozen=True, kw_only=True)
 class Meaning:
-    """What shakes the blocks, and how they fail."""
+    """Interpretation of the shaking and kind of failure of the blocks."""
 
     imt: str | None = option(
         "Intensity measure: PGV, 'SA(1.0)', or PGA, converted to PGV with the magnitudes of "
@@ -77,7 +77,7 @@ class Meaning:
 
 @dataclass(frozen=True, kw_only=True)
 class LossTable:
-    """The table of blocks."""
+    """Table of blocks."""
 
     blocks: str = option(
         "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "

@@ -1,4 +1,4 @@
-"""`rbfrag motions`: the accelerograms of a database."""
+"""`rbfrag motions`: the ground motions of a database."""
 
 from __future__ import annotations
 

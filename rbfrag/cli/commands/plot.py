@@ -1,4 +1,4 @@
-"""`rbfrag plot`: pictures of models, data, responses and failure modes."""
+"""`rbfrag plot`: figures of models, data, responses and failure modes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
-from rbfrag.cli.parameters.stack import Given, command_group, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, command_group, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.vocabulary.quantities import JOINT, PLANES, SHAPE, SPACE, WHOLE
+from rbfrag.vocabulary.quantities import COMMON, JOINT, PLANES, SHAPE, SPACE
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -31,7 +31,7 @@ Out = Annotated[str, typer.Option("--out", help="Output file (.png, .pdf, .svg)"
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """What lines of equal probability are drawn for."""
+    """Fixed variables of lines of equal probability."""
 
     p2: float | None = option(
         "Frequency parameter p² of the blocks [1/s²] [default: middle of the fitted range]"
@@ -105,7 +105,7 @@ def plot_chart(
 def plot_curve(
     *,
     out: Out,
-    given: options.Block,
+    inputs: options.Block,
     held: options.Measures,
     over: str | None = option(
         "Intensity measure on the horizontal axis: pgv, pga, pgd or sa10 [default: pgv, or "
@@ -126,16 +126,16 @@ def plot_curve(
     """
     from rbfrag.plots import plot
 
-    def others(measure: str) -> Any:
+    def published(measure: str) -> Any:
         if compare is None:
             return {}
         from rbfrag.exchange.other_fragilities import of_measure
 
         return of_measure(compare, measure)
 
-    question: dict[str, Any] = {**given, **held, **answering}
-    with given.named():
-        picture = plot.curve(out=out, over=over, compared=others, **question)
+    question: dict[str, Any] = {**inputs, **held, **answering}
+    with inputs.named():
+        picture = plot.curve(out=out, over=over, compared=published, **question)
     print_warnings(picture.warnings)
     print(out)
 
@@ -198,10 +198,10 @@ def plot_spectrum(
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
-    sizes, wanted = options.number_list(p2, "--p2"), options.polarities(polarity)
+    sizes, chosen = options.number_list(p2, "--p2"), options.polarities(polarity)
     plot_path(out)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
-    plot.spectrum(records, out, polarities=wanted, p2=sizes)
+    plot.spectrum(records, out, polarities=chosen, p2=sizes)
     print(out)
 
 
@@ -212,7 +212,7 @@ def plot_spectrum(
 def plot_response(
     motion: options.Motion,
     out: Out,
-    given: Annotated[Given, fields_of("p2", "kr", *SHAPE, *PLANES, *JOINT, *WHOLE)],
+    inputs: Annotated[ParsedInputs, fields_of("p2", "kr", *SHAPE, *PLANES, *JOINT, *COMMON)],
     direction: options.Direction,
     reading: options.ReadingOptions,
     db: options.Db = None,
@@ -225,7 +225,7 @@ def plot_response(
     from rbfrag.fragility.method import TOPPLING_BLOCK
     from rbfrag.plots import plot
 
-    _, numbers, about = numbers_of(given, TOPPLING_BLOCK.kind)
+    _, numbers, about = numbers_of(inputs, TOPPLING_BLOCK.kind)
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
     say_when_compiling()
     plot.response(
@@ -243,7 +243,7 @@ def plot_response(
 @stacked
 def plot_planes(
     *,
-    planes: Annotated[Given, fields_of(*SPACE)],
+    planes: Annotated[ParsedInputs, fields_of(*SPACE)],
     out: Out,
 ) -> None:
     """Draw base, back and face of a block on a stereonet.
@@ -260,7 +260,7 @@ def plot_planes(
 
 @dataclass(frozen=True, kw_only=True)
 class Ultimate:
-    """The motion under which the cells of a chart are followed."""
+    """Ground motion for the simulation of the cells of a chart."""
 
     ultimate: bool = option(
         "Simulate the block of each 3° cell, with the spacing --s1 (default 1 m), to its end",
@@ -278,7 +278,7 @@ class Ultimate:
 def plot_modes(
     *,
     planes: Annotated[
-        Given,
+        ParsedInputs,
         fields_of(*PLANES, "back_fracture", "s1_m", *JOINT, "cohesion_pa", "density_kg_m3"),
     ],
     out: Out,
@@ -321,7 +321,7 @@ def plot_modes(
         with ProgressBar("plot modes", "cells") as bar:
             ran = shake(
                 chart_cells(**planes), ground, vertical=upward, polarity=direction.polarity,
-                jobs=ended.jobs, on_progress=lambda each: bar.show(each.done, each.total),
+                jobs=ended.jobs, on_progress=lambda state: bar.show(state.completed, state.total),
             )  # fmt: skip
         warnings += [*remarks, *ran.warnings]
     plot.modes(out, alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg, ended=ran, **planes)
@@ -338,7 +338,7 @@ def plot_modes(
 def plot_rotation(
     *,
     out: Out,
-    given: Annotated[Given, fields_of(*SHAPE, *PLANES, *WHOLE, without=("kind",))],
+    inputs: Annotated[ParsedInputs, fields_of(*SHAPE, *PLANES, *COMMON, without=("kind",))],
     back_follows: str = option(
         "Rotations of the back plane as fractions of the block rotation, 0–1",
         "0,0.5,1",
@@ -354,8 +354,8 @@ def plot_rotation(
     from rbfrag.plots.rotation import yield_lines
     from rbfrag.question.blocks import on_planes, without_kv
 
-    with given.named():
-        block, planes, *_ = on_planes(without_kv(given))
+    with inputs.named():
+        block, planes, *_ = on_planes(without_kv(inputs))
     if not planes.pop("back_fracture", True):
         raise InputError(
             "--no-back is not supported: slumping and confined toppling require a back plane"

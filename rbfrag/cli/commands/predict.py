@@ -1,4 +1,4 @@
-"""`rbfrag predict`: the probability that a block fails."""
+"""`rbfrag predict`: probability of failure of blocks."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Annotated, Any
 
 from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
-from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
+from rbfrag.vocabulary.quantities import BLOCK, COMMON, REQUEST
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordOptions:
-    """The accelerogram itself."""
+    """Accelerogram and polarity."""
 
     motion: str | None = option(
         "Accelerogram instead of intensity measures: a file, FILE#INDEX or a database id; P "
@@ -29,7 +29,7 @@ class RecordOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
-    """A table of blocks, and one of answers."""
+    """Table of blocks and table of results."""
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns such as p2_1_s2 and kr, "
@@ -52,9 +52,9 @@ class BatchOptions:
 @stacked
 def predict(
     *,
-    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
+    block_inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON)],
     measures: options.Shaking,
-    request: Annotated[Given, fields_of(*REQUEST)],
+    request: Annotated[ParsedInputs, fields_of(*REQUEST)],
     block_draws: options.BlockDraws = None,
     record: RecordOptions,
     reading: options.ReadingOptions,
@@ -86,12 +86,12 @@ def predict(
         from rbfrag.exchange.table_answers import SHOWN, predict_table
 
         check_files(table=table.out, excel_text=table.excel_text)
-        for_all = {**given, **measures}
+        for_all = {**block_inputs, **measures}
         kind = for_all.pop("kind", None)
         answer = predict_table(
-            table.blocks, table.out, given=for_all, kind=kind,
+            table.blocks, table.out, inputs=for_all, kind=kind,
             sheet=table.sheet, ignore_columns=options.column_names(table.ignore_columns),
-            excel_text=table.excel_text, remarks=(*given.notes, *measures.notes), **request,
+            excel_text=table.excel_text, remarks=(*block_inputs.notes, *measures.notes), **request,
         )  # fmt: skip
         print_result(answer, json=printing.json, verbose=printing.verbose, fields=())
         if answer.blocks is not None and answer.rows > SHOWN and not printing.json:
@@ -105,11 +105,11 @@ def predict(
 
         question["motion"] = find_motion(record.motion, db=request.get("db"), reading=reading)
         question["polarity"] = record.polarity
-    question["remarks"] = (*given.notes, *measures.notes)
-    inputs = {**given, **measures}
+    question["remarks"] = (*block_inputs.notes, *measures.notes)
+    inputs = {**block_inputs, **measures}
     kind = inputs.pop("kind", None)
     if block_draws is None:
-        with given.named():
+        with block_inputs.named():
             result = answer_block(inputs, kind=kind, **question)
     else:
         from rbfrag.exchange.block_draws import read_draws

@@ -1,4 +1,4 @@
-"""`rbfrag report`: a question about blocks, answered in a document."""
+"""`rbfrag report`: PDF or HTML report on blocks."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rbfrag.cli.output import (
     print_warnings,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.vocabulary.quantities import BLOCK, REQUEST, WHOLE
+from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.vocabulary.quantities import BLOCK, COMMON, REQUEST
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Heading:
-    """What stands above a report."""
+    """Title and date of a report."""
 
     title: str | None = option("Title of the page [default: Seismic fragility of a rock block]")
     date: str = option("Date on the page [default: none]", "")
@@ -30,7 +30,7 @@ class Heading:
 
 @dataclass(frozen=True, kw_only=True)
 class Hazard:
-    """How often a year the block is asked to fail."""
+    """Hazard curve and period of the annual failure rate."""
 
     hazard: list[str] | None = option(
         "Hazard curve as in rbfrag hazard, for the return period of failure; once for each "
@@ -56,9 +56,9 @@ def report(
     sheet: str | None = option(options.SHEET, metavar="NAME"),
     ignore_columns: str | None = option(options.IGNORE_COLUMNS, metavar="NAME,NAME"),
     out: str = option("Output file: .pdf or .png (A4 page), or .html (single file)", ...),
-    given: Annotated[Given, fields_of(*BLOCK, *WHOLE)],
+    block_inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON)],
     shaking: options.Shaking,
-    request: Annotated[Given, fields_of(*REQUEST, without=("component",))],
+    request: Annotated[ParsedInputs, fields_of(*REQUEST, without=("component",))],
     rate: Hazard,
     meaning: options.Curve,
     heading: Heading,
@@ -76,17 +76,17 @@ def report(
     from rbfrag.plots.report.contents import COLUMNS, RateQuestion
     from rbfrag.plots.report.write import TITLE, write_report
 
-    inputs: dict[str, Any] = {**given, **shaking, **request}
+    inputs: dict[str, Any] = {**block_inputs, **shaking, **request}
     if meaning.component is not None:
         inputs["component"] = meaning.component
-    rows, remarks = [inputs], (*given.notes, *shaking.notes)
+    rows, remarks = [inputs], (*block_inputs.notes, *shaking.notes)
     if blocks:
         names = options.column_names(ignore_columns)
         rows, of_table = read_rows(blocks, inputs, sheet=sheet, ignore_columns=names)
         remarks += of_table
     title = heading.title or (TITLE if len(rows) == 1 else "Seismic fragility of rock blocks")
     question = RateQuestion(rate.hazard, rate.years, vars(meaning), rate.weights)
-    with given.named():
+    with block_inputs.named():
         report = write_report(out, rows, question, title=title, date=heading.date, warnings=remarks)
     contents = [entry.contents for entry in report.entries if entry.contents is not None]
     if json:

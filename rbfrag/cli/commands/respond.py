@@ -1,4 +1,4 @@
-"""`rbfrag respond`: one block under one motion."""
+"""`rbfrag respond`: response of one block to one ground motion."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rbfrag.cli.output import print_result, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import numbers_of
 from rbfrag.cli.parameters.motion import find_shaking
-from rbfrag.cli.parameters.stack import Given, fields_of, option, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option, stacked
 from rbfrag.errors import InputError
-from rbfrag.vocabulary.quantities import FAILURE, JOINT, PLANES, SCATTER, SHAPE, WHOLE
+from rbfrag.vocabulary.quantities import COMMON, FAILURE, JOINT, PLANES, SCATTER, SHAPE
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -23,7 +23,7 @@ EXAMPLE = "Example:  rbfrag respond record.AT2 --height 2.4 --width 0.5 --plot r
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
-    """How a block slides or rocks, and by which model."""
+    """Kind of failure and model options of the response."""
 
     two_way: bool = option("Two-way sliding: upslope displacement is possible", False)
     horizontal: bool = option(
@@ -38,7 +38,7 @@ class Model:
 
 @dataclass(frozen=True, kw_only=True)
 class Directions(options.Direction):
-    """How several motions act on the block."""
+    """Direction in which each of several ground motions acts on the block."""
 
     vertical: list[str] | None = option(  # type: ignore[assignment]
         "Vertical accelerogram of the same recording, positive upward; for several motions "
@@ -47,8 +47,8 @@ class Directions(options.Direction):
     )
     gap: float | None = option("Time between two motions [s] [default: until the block is at rest]")
 
-    def each(self, count: int) -> list[options.Direction]:
-        """Return the direction of each of so many motions."""
+    def for_motions(self, count: int) -> list[options.Direction]:
+        """Return the direction of each of several ground motions."""
         texts: list[str | None] = [None] * count if self.vertical is None else [*self.vertical]
         if len(texts) != count:
             raise InputError(
@@ -60,7 +60,7 @@ class Directions(options.Direction):
 
 @dataclass(frozen=True, kw_only=True)
 class BlockDrawOptions:
-    """What the block may be, and how many of it are run."""
+    """Block uncertainty: draws and their number."""
 
     draws: int | None = option(
         "Number of draws of an uncertain block, from its standard deviations or "
@@ -76,7 +76,7 @@ class BlockDrawOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseFiles:
-    """What is written."""
+    """Output files of the response."""
 
     csv: str | None = option("Response history (.csv)")
     plot: str | None = option(
@@ -94,8 +94,8 @@ class ResponseFiles:
 def respond(
     *,
     motions: options.Motions,
-    given: Annotated[
-        Given,
+    inputs: Annotated[
+        ParsedInputs,
         fields_of(
             "p2",
             "kr",
@@ -105,7 +105,7 @@ def respond(
             *PLANES,
             *JOINT,
             *SCATTER,
-            *WHOLE,
+            *COMMON,
             without=("kind", "ks_sigma", "ps2_sigma", "kct_sigma", "pct2_sigma"),
         ),
     ],
@@ -136,11 +136,11 @@ def respond(
     if drawn.draws is not None:
         from rbfrag.solver.respond_draws import respond_draws
 
-        possible, remarks = _possible(drawn, given, model.kind)
+        possible, remarks = _possible(drawn, inputs, model.kind)
         if len(motions) > 1:
             raise InputError("--draws supports a single motion: omit the others")
-        one = direction.each(1)[0]
-        ground, upward, about = find_shaking(motions[0], one, db=db, reading=reading)
+        motion_direction = direction.for_motions(1)[0]
+        ground, upward, about = find_shaking(motions[0], motion_direction, db=db, reading=reading)
         say_when_compiling()
         result = respond_draws(
             ground,
@@ -150,13 +150,13 @@ def respond(
             horizontal=model.horizontal,
             draws=drawn.draws,
             seed=drawn.seed,
-            displacement_m=given.get("displacement_m"),
-            **{"restitution": given.get("restitution"), **possible},
+            displacement_m=inputs.get("displacement_m"),
+            **{"restitution": inputs.get("restitution"), **possible},
         )
         result = replace(result, warnings=(*about, *remarks, *result.warnings))
         print_result(result, json=printing.json, verbose=printing.verbose)
         return
-    body, what, remarks = _body(given, model.kind)
+    body, kwargs, remarks = _body(inputs, model.kind)
     if files.film is not None:
         if body is None:
             raise InputError(
@@ -166,16 +166,18 @@ def respond(
 
         film_path(files.film)
     read = [
-        find_shaking(each, one, db=db, reading=reading)
-        for each, one in zip(motions, direction.each(len(motions)), strict=True)
+        find_shaking(record, motion_direction, db=db, reading=reading)
+        for record, motion_direction in zip(
+            motions, direction.for_motions(len(motions)), strict=True
+        )
     ]
     about = [text for *_, texts in read for text in texts]
-    grounds, upwards = [each for each, *_ in read], [each for _, each, _ in read]
+    grounds, upwards = [ground for ground, *_ in read], [upward for _, upward, _ in read]
     title = ",\nthen ".join(ground.label for ground in grounds)
     several = len(grounds) > 1
     say_when_compiling()
     settings = {name for facts in KINDS.values() for name in facts.settings}
-    with given.named():
+    with inputs.named():
         response = run(
             grounds if several else grounds[0],
             vertical=upwards if several else upwards[0],
@@ -183,51 +185,57 @@ def respond(
             gap_s=direction.gap,
             two_way=model.two_way,
             horizontal=model.horizontal,
-            **{name: given[name] for name in settings if name in given},
+            **{name: inputs[name] for name in settings if name in inputs},
             history=any((files.csv, files.plot, files.film)),
-            **what,
+            **kwargs,
         )
     response = replace(response, warnings=(*about, *remarks, *response.warnings))
     if files.csv is not None:
         write_history(response, files.csv)
     if files.plot is not None:
-        p2 = what.get("p2") if body is None else body.p2
-        _draw(response, files.plot, p2, what.get("kr"), title, direction.reverse)
+        p2 = kwargs.get("p2") if body is None else body.p2
+        _draw(response, files.plot, p2, kwargs.get("kr"), title, direction.reverse)
     if files.film is not None and body is not None:
         from rbfrag.plots.film import film
         from rbfrag.solver.kinds import facts_of
 
         backed = not facts_of(response.kind).free_standing
         film(
-            response, body, files.film, beta_deg=what["beta_deg"],
-            exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
+            response, body, files.film, beta_deg=kwargs["beta_deg"],
+            exaggerate=files.exaggerate, back_fracture=backed and kwargs.get("back_fracture", True),
             title=title,
         )  # fmt: skip
     print_result(response, json=printing.json, verbose=printing.verbose)
 
 
 def _possible(
-    drawn: BlockDrawOptions, given: Given, kind: str | None
+    drawn: BlockDrawOptions, inputs: ParsedInputs, kind: str | None
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the keywords that say what the one block may be, and warnings."""
+    """Return the keywords of the block uncertainty, and warnings."""
     if drawn.block_draws is not None:
         from rbfrag.exchange.block_draws import read_draws
 
         values, weights = read_draws(drawn.block_draws)
         return {"kind": kind, **values, "weights": weights}, ()
-    body, what, remarks = _body(given, kind)
+    body, kwargs, remarks = _body(inputs, kind)
     if body is not None:
-        what = {"kind": what["kind"], **_numbers_of(body, what)}
-    sigmas = {name: value for name, value in given.items() if name.endswith("_sigma")}
-    return {**what, **sigmas}, remarks
+        kwargs = {"kind": kwargs["kind"], **_numbers_of(body, kwargs)}
+    sigmas = {name: value for name, value in inputs.items() if name.endswith("_sigma")}
+    return {**kwargs, **sigmas}, remarks
 
 
-def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
-    """Return the numbers of a block that stands free, evenly and level, or refuse its shape."""
+def _numbers_of(body: Block, kwargs: dict[str, Any]) -> dict[str, float]:
+    """Return the parameters of a symmetric free-standing block on level ground; reject other
+    geometries.
+    """
     from rbfrag.solver.kinds import facts_of
 
-    free = what["kind"] is not None and facts_of(what["kind"]).free_standing
-    if free and what["beta_deg"] == 0.0 and math.isclose(body.alpha1_deg, -body.alpha3_deg):
+    is_free_standing = kwargs["kind"] is not None and facts_of(kwargs["kind"]).free_standing
+    if (
+        is_free_standing
+        and kwargs["beta_deg"] == 0.0
+        and math.isclose(body.alpha1_deg, -body.alpha3_deg)
+    ):
         return {"p2": body.p2, "kr": body.tan_alpha3}
     raise InputError(
         "--draws supports blocks given by --p2 and --kr, by --ky, as rectangles or in tables; "
@@ -236,27 +244,31 @@ def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
     )
 
 
-def _body(given: Given, kind: str | None) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
-    """Return the block where its shape decides, the keywords that say it, and warnings."""
+def _body(
+    inputs: ParsedInputs, kind: str | None
+) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
+    """Return the block if its geometry is simulated, its keywords, and warnings."""
     from rbfrag.question.blocks import shape_of, without_kv
     from rbfrag.question.shapes import TAKEN_NOT_TO_SLIP
     from rbfrag.solver.kinds import facts_of, kind_of_mode
 
-    with given.named():
-        shape = shape_of(without_kv(given))
-        stated = {name: given[name] for name in ("p2", "kr", "ky", "beta_deg") if name in given}
+    with inputs.named():
+        shape = shape_of(without_kv(inputs))
+        parameters = {
+            name: inputs[name] for name in ("p2", "kr", "ky", "beta_deg") if name in inputs
+        }
         if shape is None:
-            return None, {"kind": kind, **stated}, ()
-        if len(stated.keys() - {"beta_deg"}):
-            numbers_of(given)  # refuses a block that is described twice
+            return None, {"kind": kind, **parameters}, ()
+        if len(parameters.keys() - {"beta_deg"}):
+            numbers_of(inputs)  # refuses a block that is described twice
         if "phi_deg" in shape.planes:
             return shape.block, {"kind": kind, "block": shape.block, **shape.planes}, ()
         backed = shape.planes.get("back_fracture", True)
         model = kind_of_mode("topple", back_fracture=backed) if kind is None else facts_of(kind)
         if model.free_standing:
-            free = {"kind": model.kind, "block": shape.block, **shape.planes}
-            return shape.block, free, (TAKEN_NOT_TO_SLIP,)
-    _, numbers, remarks = numbers_of(given, model.kind)
+            kwargs = {"kind": model.kind, "block": shape.block, **shape.planes}
+            return shape.block, kwargs, (TAKEN_NOT_TO_SLIP,)
+    _, numbers, remarks = numbers_of(inputs, model.kind)
     return None, {"kind": kind, **numbers}, remarks
 
 

@@ -1,4 +1,4 @@
-"""`rbfrag rockmass`: the blocks between two fracture sets that scatter."""
+"""`rbfrag rockmass`: blocks between two random joint sets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """How many blocks are drawn."""
+    """Number of random blocks and seed."""
 
     n: int | None = option("Number of realisations [default: from the file, else 20000]")
     seed: int | None = option("Seed of the random numbers [default: from the file, else 1]")
@@ -29,7 +29,7 @@ class Drawn:
 
 @dataclass(frozen=True, kw_only=True)
 class ShakenBy(options.Direction):
-    """The motion that every block is run under."""
+    """Ground motion for the simulation of every block."""
 
     motion: str | None = option(
         "Accelerogram for the response of every block in its mode: a file, FILE#INDEX for "
@@ -44,7 +44,7 @@ class ShakenBy(options.Direction):
 
 @dataclass(frozen=True, kw_only=True)
 class LimitOptions:
-    """What counts as failure."""
+    """Failure limits."""
 
     displacement: float | None = option(
         "Displacement limit of sliding [m] [default with --motion: 0.05]; with --pgv "
@@ -57,7 +57,7 @@ class LimitOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RockMassFiles:
-    """What is written."""
+    """Output files of the rock mass."""
 
     out: str | None = option(
         "Output table with one row per block, with a motion one per block and scale (.csv, "
@@ -103,16 +103,18 @@ def rockmass(
             shaken.motion, shaken, db=answering.get("db"), reading=reading
         )
         say_when_compiling()
-    stated: dict[str, Any] = {**measures}
-    spectrum = {period: stated.pop(name) for period, name in SPECTRAL.items() if name in stated}
+    intensities: dict[str, Any] = {**measures}
+    spectrum = {
+        period: intensities.pop(name) for period, name in SPECTRAL.items() if name in intensities
+    }
     with ProgressBar("rockmass", "blocks") as bar:
         answer = answered(
-            file, n=drawn.n, seed=drawn.seed, **stated, sa_g=spectrum or None, motion=ground,
+            file, n=drawn.n, seed=drawn.seed, **intensities, sa_g=spectrum or None, motion=ground,
             vertical=upward, polarity=shaken.polarity,
             scales=options.number_list("1" if shaken.scales is None else shaken.scales, "--scales"),
             displacement_m=limits.displacement, rotation_deg=limits.rotation, jobs=shaken.jobs,
             **answering,
-            on_progress=lambda progress: bar.show(progress.done, progress.total),
+            on_progress=lambda progress: bar.show(progress.completed, progress.total),
         )  # fmt: skip
     answer = replace(answer, warnings=(*answer.warnings, *about))
     if files.out is not None:

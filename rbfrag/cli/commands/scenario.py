@@ -1,4 +1,4 @@
-"""`rbfrag scenario`: the shaking of an earthquake at a site."""
+"""`rbfrag scenario`: shaking at a site in a scenario earthquake."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 from rbfrag.cli.output import print_result
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import Given, fields_of, stacked
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, stacked
 from rbfrag.vocabulary.quantities import SOURCE
 
 EXAMPLE = "Example:  rbfrag scenario --magnitude 6.8 --rjb 12 --vs30 760 --mechanism reverse"
@@ -17,8 +17,8 @@ _SITE = ("rjb_km", "vs30_m_s", "amplification", "amplification_sigma")
 @stacked
 def scenario(
     *,
-    given: Annotated[Given, fields_of("magnitude", *_SITE)],
-    source: Annotated[Given, fields_of(*SOURCE)],
+    inputs: Annotated[ParsedInputs, fields_of("magnitude", *_SITE)],
+    source: Annotated[ParsedInputs, fields_of(*SOURCE)],
     json: options.Json = False,
 ) -> None:
     """Print median and dispersion of the shaking in an earthquake.
@@ -28,4 +28,4 @@ def scenario(
     """
     from rbfrag.question.scenario import Source, scenario_shaking
 
-    print_result(scenario_shaking(given, Source(**source)), json=json)
+    print_result(scenario_shaking(inputs, Source(**source)), json=json)

@@ -1,4 +1,4 @@
-"""`rbfrag serve`: the answers over HTTP."""
+"""`rbfrag serve`: HTTP API and web interface."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 
 @dataclass(frozen=True, kw_only=True)
 class RequestLimits:
-    """What a request may take."""
+    """Limits of a request."""
 
     body_limit_mb: float = option("Maximum size of a request body [MB]", 16.0)
     body_time: float = option("Maximum time to receive a request body [s]", 30.0)

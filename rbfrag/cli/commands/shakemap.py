@@ -1,4 +1,4 @@
-"""`rbfrag shakemap`: where blocks topple in one earthquake."""
+"""`rbfrag shakemap`: probability of failure of blocks over a ShakeMap."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg", *RASTERS)
 
 @dataclass(frozen=True, kw_only=True)
 class MapOptions:
-    """What a ShakeMap means."""
+    """Interpretation of a ShakeMap."""
 
     uncertainty: str | None = option(
         "uncertainty.xml of the same map, over which P is integrated", metavar="FILE"
@@ -38,7 +38,7 @@ class MapOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class DrawOptions:
-    """How the number of failures is drawn."""
+    """Sampling of the number of failures."""
 
     draws: int | None = option(
         "Number of draws of shaking and blocks [default: 100, more for few blocks]"
@@ -56,7 +56,7 @@ def shakemap(
         ...,
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
-    given: options.Block,
+    inputs: options.Block,
     blocks: BlocksOptions,
     meaning: MapOptions,
     drawing: DrawOptions,
@@ -79,7 +79,7 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    several = blocks.given_blocks(given, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
+    several = blocks.given_blocks(inputs, n=n, reads=(*PLACE, "weight", "count"), one_kind=True)
     if target.suffix.lower() in RASTERS and "lon" in several.columns:
         raise InputError(
             f"{target}: GeoTIFF is supported for grid nodes only, not for blocks with "

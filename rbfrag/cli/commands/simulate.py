@@ -32,7 +32,7 @@ AFTER_A_DEATH = "run the same command again"
 
 @dataclass(frozen=True, kw_only=True)
 class WorkerOptions:
-    """Who does the work."""
+    """Worker processes or cluster of a campaign."""
 
     jobs: options.Jobs = None
     scheduler: str | None = option(
@@ -40,7 +40,7 @@ class WorkerOptions:
     )
 
     def runner(self, work: Callable[..., Any]) -> Callable[..., Iterator[Any]]:
-        """Return what does the parts of some work, by local processes or by a cluster.
+        """Return the function that runs work on local processes or on a cluster.
 
         Args:
             work: does one part, after what all have in common, if there is anything; a function of
@@ -61,7 +61,7 @@ class WorkerOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class BlockOptions:
-    """Which blocks are run, and what counts as their failure; each kind has its own."""
+    """Blocks to simulate and their failure criteria; each kind has its own."""
 
     p2: str | None = option(
         "Frequency parameters p² of toppling and rocking [1/s²], separated by commas "
@@ -85,7 +85,7 @@ class BlockOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Sequence:
-    """Two motions, one after the other."""
+    """Options of motions in sequence."""
 
     sequence: bool = option(
         "Conditional fragility under two consecutive motions (sliding, slumping, "
@@ -105,7 +105,7 @@ class Sequence:
 
 @dataclass(frozen=True, kw_only=True)
 class StorageOptions:
-    """What is stored of each motion."""
+    """Additional results to store for each motion."""
 
     vertical: str = option(
         "Horizontal motions alone, with the vertical motion of the recording, or both",
@@ -171,7 +171,7 @@ def simulate(
 
         def show(progress: CampaignProgress) -> None:
             before = f"{progress.resumed} stored before" if progress.resumed else ""
-            bar.show(progress.done, progress.total, before)
+            bar.show(progress.completed, progress.total, before)
 
         summary = run(
             db,

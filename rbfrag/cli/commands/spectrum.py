@@ -1,4 +1,4 @@
-"""`rbfrag spectrum`: the toppling spectrum X(p) of motions."""
+"""`rbfrag spectrum`: toppling spectrum X(p) of ground motions."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def spectrum(
 
 
 def _columns(spectra: Sequence[TopplingSpectrum]) -> dict[str, NDArray[Any]]:
-    """Return the columns of all spectra, one row a size."""
+    """Return the columns of all spectra, one row per p²."""
     import numpy as np
 
     tables = [spectrum.table_columns() for spectrum in spectra]

@@ -1,4 +1,4 @@
-"""`rbfrag survival`: what standing blocks say of a seismic hazard."""
+"""`rbfrag survival`: test of a seismic hazard curve against blocks that still stand."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated
 from rbfrag.cli.output import check_files, print_result
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import TableOptions
-from rbfrag.cli.parameters.stack import Given, argument, fields_of, option, stacked
-from rbfrag.vocabulary.quantities import BLOCK, WHOLE
+from rbfrag.cli.parameters.stack import ParsedInputs, argument, fields_of, option, stacked
+from rbfrag.vocabulary.quantities import BLOCK, COMMON
 
 EXAMPLE = (
     "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kind toppling "
@@ -19,7 +19,7 @@ EXAMPLE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Uncertainty:
-    """How well the blocks and their age are known."""
+    """Uncertainty of the age of the blocks."""
 
     age: float = option("Mean age of the blocks in their present position [years]", default=...)
     age_sd: float = option("Standard deviation of the lognormal age [years]", 0.0)
@@ -35,7 +35,7 @@ def survival(
         "branches), USGS NSHM JSON, or CSV of two columns with units in the header",
         metavar="CURVE...",
     ),
-    given: Annotated[Given, fields_of(*BLOCK, *WHOLE, without=("kind",))],
+    inputs: Annotated[ParsedInputs, fields_of(*BLOCK, *COMMON, without=("kind",))],
     kind: str | None = option(
         "Kind of failure: rocking (free-standing), toppling (backed by a rock face), slumping, "
         "confined_toppling or sliding; required except for tables with a column kind, and with "
@@ -43,7 +43,7 @@ def survival(
         rich_help_panel="Block and shaking",
     ),
     blocks: TableOptions,
-    known: Uncertainty,
+    uncertainty: Uncertainty,
     meaning: options.Curve,
     answering: options.Answering,
     weights: str | None = option(
@@ -71,20 +71,20 @@ def survival(
 
     check_files(plot=plot)
     if kind is not None:
-        given["kind"] = kind
+        inputs["kind"] = kind
     if blocks.blocks is None:
-        require_kind(given)
-    several = blocks.given_blocks(given, reads=("count",), need_kind=KIND_MISSING)
+        require_kind(inputs)
+    several = blocks.given_blocks(inputs, reads=("count",), need_kind=KIND_MISSING)
     remarks, rows, numbers = several.remarks, several.rows, several.numbers
     if rows is not None:
-        rows.whole(ALL_STAND)
+        rows.require_all(ALL_STAND)
         remarks += rows.remarks
         count = rows.blocks.get("count", np.ones(len(numbers["kind"]))).astype(np.intp)
         numbers = {name: np.repeat(values, count).tolist() for name, values in numbers.items()}
     read = as_curves(curves, **vars(meaning))
     answer = answered(
-        read, age_years=known.age, age_sd_years=known.age_sd, weights=weights, draws=known.draws,
-        seed=known.seed, **numbers, **vars(meaning), **answering,
+        read, age_years=uncertainty.age, age_sd_years=uncertainty.age_sd, weights=weights,
+        draws=uncertainty.draws, seed=uncertainty.seed, **numbers, **vars(meaning), **answering,
     )  # fmt: skip
     answer = replace(answer, warnings=(*remarks, *answer.warnings))
     if plot is not None:

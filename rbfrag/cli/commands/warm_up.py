@@ -1,4 +1,4 @@
-"""`rbfrag warm-up`: compiling the kernels at install time."""
+"""`rbfrag warm-up`: compile the kernels at installation."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def warm_up() -> None:
 
     say_when_compiling()
     started = time.perf_counter()
-    for what in prepared():
-        print(f"warm-up: {what}", file=sys.stderr, flush=True)
+    for step in prepared():
+        print(f"warm-up: {step}", file=sys.stderr, flush=True)
     print(f"Every kernel is compiled, in {time.perf_counter() - started:.0f} s.")

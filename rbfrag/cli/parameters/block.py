@@ -1,4 +1,4 @@
-"""The blocks of a command: numbers, a shape, a file that describes one, a table, a rock mass."""
+"""Block options of a command: parameters, geometry, geometry file, table or rock mass."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.cli.parameters.options import CRS, EXCEL_TEXT, IGNORE_COLUMNS, SHEET, column_names
-from rbfrag.cli.parameters.stack import Given, option
+from rbfrag.cli.parameters.stack import ParsedInputs, option
 from rbfrag.errors import InputError
 from rbfrag.results.numbers import percent
 from rbfrag.vocabulary.quantities import column_of
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class MeshOptions:
-    """A free-standing block by its surface."""
+    """Free-standing block given by its surface mesh."""
 
     mesh: str | None = option(
         "Closed mesh of a free-standing block [m] in its measured resting pose on level "
@@ -42,7 +42,7 @@ class MeshOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class TableOptions:
-    """A table of blocks in the place of one."""
+    """Table of blocks instead of a single block."""
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
@@ -56,7 +56,7 @@ class TableOptions:
 
     def given_blocks(
         self,
-        given: Given,
+        inputs: ParsedInputs,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
@@ -67,7 +67,7 @@ class TableOptions:
         """Return the blocks that the options describe.
 
         Args:
-            given: what they say of one block, or of all rows of a table.
+            inputs: what they say of one block, or of all rows of a table.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
@@ -76,27 +76,29 @@ class TableOptions:
         """
         from rbfrag.exchange.block_rows import read_blocks
 
-        kind = given.get("kind")
-        stated = {field: value for field, value in given.items() if field != "kind"}
+        kind = inputs.get("kind")
+        block_inputs = {field: value for field, value in inputs.items() if field != "kind"}
         if self.blocks is not None:
             table: Any = self.blocks
             rows = read_blocks(
-                table, kind, reads=reads, one_kind=one_kind, for_all=stated, sheet=self.sheet,
+                table, kind, reads=reads, one_kind=one_kind, for_all=block_inputs, sheet=self.sheet,
                 ignore_columns=column_names(self.ignore_columns), crs=self.crs, need_kind=need_kind,
                 dry=dry,
             )  # fmt: skip
-            return GivenBlocks(rows.blocks, False, given.notes, rows)
-        kind, numbers, remarks = numbers_of(given)
+            return GivenBlocks(rows.blocks, False, inputs.notes, rows)
+        kind, numbers, remarks = numbers_of(inputs)
         columns = {column_of(field): [value] for field, value in numbers.items()}
         names = {} if name is None else {"block_id": [name]}
-        read = read_blocks({**columns, **names}, kind, one_kind=True).whole()
-        own = {column: values for column, values in read.items() if column not in ("row", "line")}
-        return GivenBlocks({**own, "block_id": [name]}, False, remarks)
+        read = read_blocks({**columns, **names}, kind, one_kind=True).require_all()
+        block_columns = {
+            column: values for column, values in read.items() if column not in ("row", "line")
+        }
+        return GivenBlocks({**block_columns, "block_id": [name]}, False, remarks)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BlocksOptions(TableOptions):
-    """A table of blocks or a rock mass in the place of one block."""
+    """Table of blocks or rock mass instead of a single block."""
 
     rockmass: str | None = option(
         "Rock mass file (.toml, .csv), for the mean over its stable toppling blocks", metavar="FILE"
@@ -104,7 +106,7 @@ class BlocksOptions(TableOptions):
 
     def given_blocks(
         self,
-        given: Given,
+        inputs: ParsedInputs,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
@@ -116,7 +118,7 @@ class BlocksOptions(TableOptions):
         """Return the blocks that the options describe.
 
         Args:
-            given: what they say of one block, or of all rows of a table.
+            inputs: what they say of one block, or of all rows of a table.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
             one_kind: whether all must be of one kind, as for `read_blocks`.
@@ -126,25 +128,25 @@ class BlocksOptions(TableOptions):
         """
         if self.rockmass is None:
             return super().given_blocks(
-                given, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind, dry=dry
+                inputs, name=name, reads=reads, one_kind=one_kind, need_kind=need_kind, dry=dry
             )
         from rbfrag.fragility.method import TOPPLING_BLOCK
 
-        if given.get("kind") not in (None, TOPPLING_BLOCK.kind):
+        if inputs.get("kind") not in (None, TOPPLING_BLOCK.kind):
             raise InputError(
-                f"--rockmass cannot be combined with --kind {given['kind']}: only toppling blocks "
+                f"--rockmass cannot be combined with --kind {inputs['kind']}: only toppling blocks "
                 "of a rock mass are supported"
             )
         return _of_rock_mass(self.rockmass, n)
 
 
 def numbers_of(
-    given: Given, kind: str | None = None, pga_g: float | None = None
+    inputs: ParsedInputs, kind: str | None = None, pga_g: float | None = None
 ) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
-    """Return the kind of the one block that options describe, its numbers, and warnings.
+    """Return the kind and the model inputs of the single block in the options, and warnings.
 
     Args:
-        given: what they say, by field.
+        inputs: what they say, by field.
         kind: how it fails where they do not say so; None for what they say of it.
         pga_g: PGA at which it is said whether the toe of a block that topples holds [g].
 
@@ -153,15 +155,15 @@ def numbers_of(
     """
     from rbfrag.question.blocks import one_block
 
-    stated = {field: value for field, value in given.items() if field != "kind"}
-    with given.named():
-        blocks = one_block(stated, given.get("kind", kind), pga_g)
+    block_inputs = {field: value for field, value in inputs.items() if field != "kind"}
+    with inputs.named():
+        blocks = one_block(block_inputs, inputs.get("kind", kind), pga_g)
     (group,) = blocks.groups
-    return group.kind, {**group.numbers}, (*given.notes, *blocks.remarks)
+    return group.kind, {**group.numbers}, (*inputs.notes, *blocks.remarks)
 
 
 class GivenBlocks(NamedTuple):
-    """Blocks that a command answers for.
+    """Blocks of a command.
 
     Args:
         columns: ``block_id``, ``kind`` and the numbers that the kinds read, and of a table that has
@@ -178,7 +180,7 @@ class GivenBlocks(NamedTuple):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What answers read of the blocks, by field, and their kinds."""
+        """Model inputs of the blocks, by field, and their kinds."""
         from rbfrag.question.blocks import numbers_in
 
         kinds = [str(kind) for kind in self.columns["kind"]]
@@ -186,7 +188,7 @@ class GivenBlocks(NamedTuple):
 
     @property
     def question(self) -> BlockRows | dict[str, Any]:
-        """What says of the blocks all that an answer reads of them."""
+        """Block table for an answer, with everything it uses."""
         if self.rows is not None:
             return self.rows
         # a class has more blocks than names
@@ -213,7 +215,7 @@ def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
 
 
 class ChartedBlocks(NamedTuple):
-    """Block angles to be shown.
+    """Block angles to show in a chart.
 
     Args:
         alpha1_deg: angles of the heel [deg]; None for no blocks.
@@ -233,7 +235,7 @@ def charted_blocks(
     *,
     sheet: str | None = None,
 ) -> ChartedBlocks:
-    """Return the blocks of one of two files.
+    """Return the block angles from a table or a rock mass file.
 
     Args:
         blocks: the option --blocks, a table with alpha1_deg and alpha3_deg.
@@ -248,7 +250,7 @@ def charted_blocks(
 
         with opened_table(blocks, names, (), sheet=sheet) as table:
             table.need(names)
-            columns, _, _ = table.whole()
+            columns, _, _ = table.read_all()
     elif rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
         from rbfrag.rockmasses.report import block_columns
@@ -259,32 +261,32 @@ def charted_blocks(
     else:
         return ChartedBlocks(None, None, warnings)
     alpha1, alpha3 = (columns[name] for name in names)
-    known = (alpha1 > -90.0) & (alpha1 < alpha3) & (alpha3 < 90.0)
-    if not known.any():
+    is_valid = (alpha1 > -90.0) & (alpha1 < alpha3) & (alpha3 < 90.0)
+    if not is_valid.any():
         raise InputError(
             f"{blocks or rockmass}: no valid block: alpha1_deg and alpha3_deg must be between -90 "
             "and 90 degrees, and alpha1_deg below alpha3_deg"
         )
-    if not known.all():
+    if not is_valid.all():
         warnings.append(
-            f"{(~known).sum()} of {known.size} rows have invalid angles and are not shown"
+            f"{(~is_valid).sum()} of {is_valid.size} rows have invalid angles and are not shown"
         )
-    return ChartedBlocks(alpha1[known], alpha3[known], warnings)
+    return ChartedBlocks(alpha1[is_valid], alpha3[is_valid], warnings)
 
 
 def _differences(mass: RockMass, planes: Mapping[str, Any]) -> list[str]:
-    """Return where a rock mass and the chart it is shown on do not agree."""
+    """Return where a rock mass and its chart are inconsistent."""
     warnings = []
     phi = planes["phi_deg"]
-    stated = mass.variables["friction.phi_deg"]
-    if stated.law != "constant" or stated.location != phi:
+    friction = mass.variables["friction.phi_deg"]
+    if friction.law != "constant" or friction.location != phi:
         warnings.append(
             f"the chart is drawn for a friction angle of {phi:g} deg, and that of the rock mass "
-            f"is: {stated}"
+            f"is: {friction}"
         )
-    back = mass.variables.get("friction.phi_back_deg", stated)
+    back = mass.variables.get("friction.phi_back_deg", friction)
     of_chart = planes.get("phi_back_deg", phi)
-    if back != stated and (back.law != "constant" or back.location != of_chart):
+    if back != friction and (back.law != "constant" or back.location != of_chart):
         warnings.append(
             f"the chart is drawn for a friction angle of the back of {of_chart:g} deg, and that "
             f"of the rock mass is: {back}"

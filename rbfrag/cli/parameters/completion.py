@@ -1,4 +1,4 @@
-"""What a shell offers while an option is typed: model names, and ids of motions.
+"""Shell completion of model names and motion ids.
 
 A shell asks with what is typed so far; what cannot be read offers nothing, and says nothing.
 """
@@ -11,7 +11,7 @@ from rbfrag.errors import RbfragError
 
 
 def model_names(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
-    """Return the models whose names begin so, each with what it is.
+    """Return the models whose names begin with a text, each with a description.
 
     Args:
         ctx: of typer, with the options that are typed already.
@@ -31,7 +31,7 @@ def model_names(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 
 def motion_ids(ctx: typer.Context, incomplete: str) -> list[tuple[str, str]]:
-    """Return the stored motions whose ids begin so, each with its name and PGV.
+    """Return the stored motions whose ids begin with a text, each with its name and PGV.
 
     Args:
         ctx: of typer, with the options that are typed already.

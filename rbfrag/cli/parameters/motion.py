@@ -18,7 +18,7 @@ AS_STATED = ReadingOptions()
 def find_motion(
     text: str, *, db: str | None, reading: ReadingOptions = AS_STATED, allow_partial: bool = False
 ) -> GroundMotion:
-    """Return the motion that a MOTION argument means.
+    """Return the ground motion of a MOTION argument.
 
     Args:
         text: a path, ``path#index``, or the id of a stored motion. A number that is also the
@@ -45,7 +45,7 @@ def find_motion(
 
 
 def stored_row(text: str, *, db: str | None) -> tuple[MotionRow, VerticalPair | None] | None:
-    """Return what the database knows of the motion that a MOTION argument means by its id.
+    """Return the database row of a MOTION argument that is an id.
 
     Args:
         text: as for :func:`find_motion`.
@@ -73,7 +73,7 @@ def _is_id(text: str) -> bool:
 def find_shaking(
     text: str, direction: Direction, *, db: str | None, reading: ReadingOptions
 ) -> tuple[GroundMotion, GroundMotion | None, list[str]]:
-    """Return the motion that a MOTION argument means, its vertical one, and what to warn of.
+    """Return the ground motion of a MOTION argument, its vertical component, and warnings.
 
     Args:
         text: as for :func:`find_motion`.

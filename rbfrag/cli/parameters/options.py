@@ -1,4 +1,4 @@
-"""Options that several commands share, with one wording each, and what their values mean."""
+"""Options shared by several commands, with one wording each."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rbfrag.cli.parameters.completion import motion_ids
-from rbfrag.cli.parameters.stack import Given, fields_of, option
+from rbfrag.cli.parameters.stack import ParsedInputs, fields_of, option
 from rbfrag.errors import InputError
 from rbfrag.vocabulary.quantities import (
     ANSWERING,
+    COMMON,
     FAILURE,
     INTENSITY,
     NUMBERS,
@@ -20,7 +21,6 @@ from rbfrag.vocabulary.quantities import (
     RANGE,
     SHAKING,
     SHAPE,
-    WHOLE,
     option_of,
 )
 
@@ -40,7 +40,7 @@ CRS = "Coordinate reference system of x and y of rows without one, such as EPSG:
 
 
 def column_names(text: str | None) -> tuple[str, ...]:
-    """Return the names of columns that an option lists."""
+    """Return the column names in an option value."""
     return () if text is None else tuple(name.strip() for name in text.split(","))
 
 
@@ -98,19 +98,19 @@ Suite = Annotated[
     str | None, typer.Option("--suite", help="Suite of motions [default: all motions]")
 ]
 
-Block = Annotated[Given, fields_of(*NUMBERS, *FAILURE, *SHAPE, *PLANES, *WHOLE)]
+Block = Annotated[ParsedInputs, fields_of(*NUMBERS, *FAILURE, *SHAPE, *PLANES, *COMMON)]
 """One block of which all is known that is stated, by field."""
 
-Measures = Annotated[Given, fields_of(*INTENSITY)]
+Measures = Annotated[ParsedInputs, fields_of(*INTENSITY)]
 """What may be known of a motion, by field."""
 
-Shaking = Annotated[Given, fields_of(*SHAKING)]
+Shaking = Annotated[ParsedInputs, fields_of(*SHAKING)]
 """The same, how well it is known, and what may stand for it."""
 
-Answering = Annotated[Given, fields_of(*ANSWERING)]
+Answering = Annotated[ParsedInputs, fields_of(*ANSWERING)]
 """Which fragility model answers, and how wide its interval is, by field."""
 
-Ranging = Annotated[Given, fields_of(*RANGE)]
+Ranging = Annotated[ParsedInputs, fields_of(*RANGE)]
 """The same, and what the range of one earthquake is of."""
 
 BlockDraws = Annotated[
@@ -131,7 +131,7 @@ Jobs = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Printing:
-    """How an answer is printed: a sentence and a short table unless more is asked for."""
+    """Output format: headline and short table by default."""
 
     verbose: bool = option("Print all values, with six digits", False)
     json: Json = False
@@ -139,7 +139,7 @@ class Printing:
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions:
-    """What the file of an accelerogram leaves open."""
+    """Properties of an accelerogram that its file does not give."""
 
     units: str | None = option(
         "Acceleration unit of a text file without one: g, m/s2, cm/s2 or mm/s2"
@@ -152,7 +152,7 @@ class ReadingOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Direction:
-    """How a motion acts on the block."""
+    """Direction in which a ground motion acts on the block."""
 
     vertical: str | None = option(
         "Vertical accelerogram of the same recording, positive upward", metavar="MOTION"
@@ -163,7 +163,7 @@ class Direction:
 
     @property
     def polarity(self) -> Literal["forward", "reverse"]:
-        """The polarity of the motion."""
+        """Polarity of the ground motion."""
         return "reverse" if self.reverse else "forward"
 
 
@@ -177,7 +177,7 @@ WITHIN_HELP = (
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """What a hazard curve means."""
+    """Interpretation of a hazard curve."""
 
     imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'")
     site: str | None = option("Site in the file, by number (from 1) or name")
@@ -200,7 +200,7 @@ class Curve:
 
 
 def number_list(text: str, option: str) -> list[float]:
-    """Return the numbers of a list separated by commas."""
+    """Return the numbers of a comma-separated list."""
     values = []
     for part in text.split(","):
         try:
@@ -213,12 +213,12 @@ def number_list(text: str, option: str) -> list[float]:
 
 
 def polarities(text: str) -> Sequence[PolarityName]:
-    """Return the polarities that forward, reverse or both means."""
+    """Return the polarities of the value forward, reverse or both."""
     from rbfrag.motions.polarity import POLARITIES
 
     if text == "both":
         return POLARITIES
-    chosen = [each for each in POLARITIES if each == text]
+    chosen = [polarity for polarity in POLARITIES if polarity == text]
     if not chosen:
         raise InputError(f"--polarity {text!r}: use forward, reverse or both")
     return chosen

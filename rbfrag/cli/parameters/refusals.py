@@ -1,4 +1,4 @@
-"""Which options do not go together, and which need another: one table for all commands."""
+"""Rules for combining options: conflicts and requirements, one table for all commands."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rbfrag.vocabulary import quantities
 
 
 def _options(names: Collection[str]) -> tuple[str, ...]:
-    """Return the options of inputs, with all that they are called."""
+    """Return all names of the options of inputs."""
     words = (word for word, name in quantities.OTHER_WORDS.items() if name in names)
     return (*map(quantities.option_of, names), *(f"--{word}" for word in words))
 
@@ -18,7 +18,7 @@ def _options(names: Collection[str]) -> tuple[str, ...]:
 NUMBERS = ("--p2", "--kr")
 SHAPE = _options(quantities.SHAPE)
 PLANES = (*_options(quantities.PLANES), "--no-back")
-FRICTION = tuple(each for each in PLANES if each not in ("--beta", "--dip"))
+FRICTION = tuple(option for option in PLANES if option not in ("--beta", "--dip"))
 SIGMAS = _options(quantities.SCATTER)
 MEASURES = _options(quantities.SHAKING)
 
@@ -26,34 +26,34 @@ ONCE = "give one description of the block"
 
 
 class OptionConflict(NamedTuple):
-    """Options of which none goes with any of some others.
+    """Options that cannot be combined with certain other options.
 
     Args:
         options: those that are refused.
-        others: those that they cannot be combined with.
+        other_options: those that they cannot be combined with.
         why: what to do instead, or why not.
         commands: where this holds; () for all that have both.
     """
 
     options: tuple[str, ...]
-    others: tuple[str, ...]
+    other_options: tuple[str, ...]
     why: str
     commands: tuple[str, ...] = ()
 
 
 class Need(NamedTuple):
-    """Options that do nothing unless one of some others is given.
+    """Options that require at least one of certain other options.
 
     Args:
         options: those that are refused.
-        others: what they need one of.
+        other_options: what they need one of.
         goes_with: these others in words.
         why: what to do.
         commands: where this holds; () for all that have one of the others.
     """
 
     options: tuple[str, ...]
-    others: tuple[str, ...]
+    other_options: tuple[str, ...]
     goes_with: str
     why: str
     commands: tuple[str, ...] = ()
@@ -68,7 +68,7 @@ CONFLICTS = (
     OptionConflict((*FILES, "--rockmass"), NUMBERS, ONCE),
     OptionConflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
     OptionConflict(
-        tuple(each for each in SHAPE if each != "--gamma"), FILES, "the geometry is in the file"
+        tuple(word for word in SHAPE if word != "--gamma"), FILES, "the geometry is in the file"
     ),
     OptionConflict(("--polygon",), ("--block",), ONCE),
     OptionConflict(TABLES, (*SHAPE, *FILES), ONCE),
@@ -214,28 +214,30 @@ NEEDS = (
 )
 
 
-def refuse(command: str, given: Collection[str], known: Collection[str]) -> None:
-    """Refuse options that do not go together.
+def refuse(command: str, used: Collection[str], available: Collection[str]) -> None:
+    """Reject options that cannot be combined.
 
     Args:
         command: name of the command's function.
-        given: the options that were given.
-        known: all that the command has; what it cannot be given, nothing needs.
+        used: the options that were given.
+        available: all that the command has; what it cannot be given, nothing needs.
 
     Raises:
         InputError: the first option that cannot be combined with the others, with both names.
     """
     for rule in CONFLICTS:
         if not rule.commands or command in rule.commands:
-            one = _first(rule.options, given)
-            other = _first(rule.others, given)
-            if one and other:
-                raise InputError(f"{one} cannot be combined with {other}: {rule.why}")
+            option = _first(rule.options, used)
+            other = _first(rule.other_options, used)
+            if option and other:
+                raise InputError(f"{option} cannot be combined with {other}: {rule.why}")
     for need in NEEDS:
-        if (not need.commands or command in need.commands) and _first(need.others, known):
-            one = _first(need.options, given)
-            if one and not _first(need.others, given):
-                raise InputError(f"{one} requires {need.goes_with}: {need.why}")
+        if (not need.commands or command in need.commands) and _first(
+            need.other_options, available
+        ):
+            option = _first(need.options, used)
+            if option and not _first(need.other_options, used):
+                raise InputError(f"{option} requires {need.goes_with}: {need.why}")
 
 
 def _first(options: Collection[str], among: Collection[str]) -> str | None:

@@ -1,4 +1,4 @@
-"""Objects of several options, declared once and shared by commands, and the help of commands."""
+"""Groups of options shared by commands, and the help of commands."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _declared(make: Any, help: str, default: Any, about: dict[str, Any]) -> Any:
 
 
 def command_group(help: str, epilog: str) -> typer.Typer:
-    """Return an empty group of commands.
+    """Return an empty command group.
 
     Args:
         help: what the group does.
@@ -64,8 +64,8 @@ def command_group(help: str, epilog: str) -> typer.Typer:
     )
 
 
-class Given(dict[str, Any]):
-    """What options say, by field.
+class ParsedInputs(dict[str, Any]):
+    """Values of the options, by field.
 
     Attributes:
         file: the file that describes the block; None for none.
@@ -77,7 +77,7 @@ class Given(dict[str, Any]):
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Let what is wrong with the block name its file."""
+        """Prefix errors about the block with the name of its file."""
         try:
             yield
         except InputError as error:
@@ -87,7 +87,7 @@ class Given(dict[str, Any]):
 
 
 class _WithComma(float):
-    """A number that was typed with a decimal comma.
+    """Number entered with a decimal comma.
 
     Attributes:
         text: what was typed.
@@ -97,7 +97,7 @@ class _WithComma(float):
 
 
 class FieldOptions(NamedTuple):
-    """Inputs, each of which is an option of a command.
+    """Inputs that are options of a command.
 
     Args:
         names: the inputs.
@@ -108,7 +108,7 @@ class FieldOptions(NamedTuple):
     without: tuple[str, ...] = ()
 
     def options(self) -> Iterator[inspect.Parameter]:
-        """Yield the options, as typer reads them."""
+        """Yield the options as typer parameters."""
         for name in self.names:
             if name in self.without:
                 continue
@@ -116,36 +116,38 @@ class FieldOptions(NamedTuple):
             panel = next((group for group, of in PANELS.items() if name in of), None)
             if name == "block":
                 for word, help in FILES.items():
-                    own = option(help, metavar="FILE", rich_help_panel=panel)
-                    yield _parameter(word, str | None, own)
+                    file_option = option(help, metavar="FILE", rich_help_panel=panel)
+                    yield _parameter(word, str | None, file_option)
                 continue
             further = {"rich_help_panel": panel, **FURTHER.get(name, {})}
             kind = bool if type_ is bool else str | None if type_ is str else float | None
             # the usual name has the help
-            *others, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
+            *aliases, first = word_of(name), *(w for w, of in OTHER_WORDS.items() if of == name)
             help = about.help(option_of)
-            own = option(help, False if type_ is bool else None, **further)
-            yield _parameter(first, kind, own)
-            for word in others:
+            file_option = option(help, False if type_ is bool else None, **further)
+            yield _parameter(first, kind, file_option)
+            for word in aliases:
                 other = option(f"Same as --{first}", rich_help_panel=panel)
                 yield _parameter(word, kind, other)
 
-    def read(self, words: Mapping[str, Any]) -> Given:
-        """Return what was given, by field; of a block file what no option states anew."""
+    def read(self, words: Mapping[str, Any]) -> ParsedInputs:
+        """Return the values of the options, by field; options override a block file."""
         files = [words[word] for word in FILES if words.get(word) is not None]
-        given = Given(inputs_from({name: words[name] for name in words if name not in FILES}))
-        for name, value in given.items():
+        inputs = ParsedInputs(
+            inputs_from({name: words[name] for name in words if name not in FILES})
+        )
+        for name, value in inputs.items():
             if isinstance(value, _WithComma):
                 note = f"{option_of(name)} {value.text} is {float(value):g}"
-                given.notes = (*given.notes, Diagnostic(note, "decimal_comma"))
-                given[name] = float(value)
+                inputs.notes = (*inputs.notes, Diagnostic(note, "decimal_comma"))
+                inputs[name] = float(value)
         if files:
             from rbfrag.solver.block.file import read_block
 
-            (given.file,) = files
-            read = read_block(given.file, gamma_deg=given.pop("gamma_deg", None))
-            given |= {"block": read.block, **read.conditions, **given}
-        return given
+            (inputs.file,) = files
+            read = read_block(inputs.file, gamma_deg=inputs.pop("gamma_deg", None))
+            inputs |= {"block": read.block, **read.conditions, **inputs}
+        return inputs
 
 
 FILES = {
@@ -187,7 +189,7 @@ def fields_of(*names: str, without: tuple[str, ...] = ()) -> FieldOptions:
 
 
 class Stacked:
-    """A command whose parameters are objects, each of which stands for several options.
+    """A command whose parameters are option groups.
 
     The command line sees the options, made when it asks for them; the command gets the objects:
     dataclasses of options, and what was given by field. Options that do not go together are refused
@@ -202,7 +204,7 @@ class Stacked:
 
     @property
     def __signature__(self) -> inspect.Signature:
-        """The options, as typer reads them."""
+        """The options as typer parameters."""
         hints = get_type_hints(self._command, include_extras=True)
         flat: list[inspect.Parameter] = []
         for name, parameter in inspect.signature(self._command).parameters.items():
@@ -213,12 +215,12 @@ class Stacked:
                 make: Callable[..., Any] = of_fields[0].read
             elif is_dataclass(hint):
                 types = get_type_hints(hint, include_extras=True)
-                options = [_parameter(each.name, types[each.name], each) for each in fields(hint)]
-                make = partial(_whole, hint)
+                options = [_parameter(item.name, types[item.name], item) for item in fields(hint)]
+                make = partial(_build_object, hint)
             else:
                 flat.append(_parameter(name, hint, parameter.default))
                 continue
-            self._objects[name] = make, [each.name for each in options]
+            self._objects[name] = make, [item.name for item in options]
             flat += options
         return inspect.Signature(flat)
 
@@ -226,26 +228,26 @@ class Stacked:
         """Run the command with the values of its options."""
         options = self.__signature__.parameters
         words = {name: word for name in options if (word := _word(options[name]))}
-        given = [word for name, word in words.items() if values[name] != options[name].default]
-        refuse(self._command.__name__, given, frozenset(words.values()))
-        whole = {
-            name: make({option: values.pop(option) for option in own})
-            for name, (make, own) in self._objects.items()
+        used = [word for name, word in words.items() if values[name] != options[name].default]
+        refuse(self._command.__name__, used, frozenset(words.values()))
+        objects = {
+            name: make({option: values.pop(option) for option in names})
+            for name, (make, names) in self._objects.items()
         }
-        self._command(**values, **whole)
+        self._command(**values, **objects)
 
 
 def stacked(command: Callable[..., None]) -> Callable[..., None]:
-    """Make a command of a function with objects of options; see :class:`Stacked`."""
+    """Make a command from a function with option groups; see :class:`Stacked`."""
     return Stacked(command)
 
 
-def _whole(kind: Any, values: Mapping[str, Any]) -> Any:
+def _build_object(kind: Any, values: Mapping[str, Any]) -> Any:
     return kind(**values)
 
 
 def _parameter(name: str, annotation: Any, declared: Any) -> inspect.Parameter:
-    """Return a parameter as typer reads it."""
+    """Return a typer parameter."""
     default = declared.default if isinstance(declared, Field) else declared
     if isinstance(declared, Field) and declared.metadata:
         about = dict(declared.metadata)
@@ -262,7 +264,7 @@ def _parameter(name: str, annotation: Any, declared: Any) -> inspect.Parameter:
 
 
 def _word(option: inspect.Parameter) -> str | None:
-    """Return what a parameter is called on the command line; None for an argument."""
+    """Return the name of a parameter on the command line; None for an argument."""
     for about in getattr(option.annotation, "__metadata__", ()):
         names = (about.default, *(about.param_decls or ()))
         return next((name for name in names if str(name).startswith("--")), None)
@@ -274,7 +276,7 @@ _NEEDS: dict[type, str] = {float: "a number with a decimal point", int: "a whole
 
 
 def read_plainly(command: Any) -> None:
-    """Let a command and those below it read numbers and texts by themselves.
+    """Let a command and its subcommands parse numbers and texts themselves.
 
     typer loads pydantic for this, even for options that are not given, which takes longer than
     most answers.
@@ -288,14 +290,14 @@ def read_plainly(command: Any) -> None:
             if not help_all:
                 help_all.append(_help_all_option(every[-1]))
             every = [*every, *help_all]
-        for each in every:
-            each.process_value = partial(_read, each, type(each).process_value)
+        for parameter in every:
+            parameter.process_value = partial(_read, parameter, type(parameter).process_value)
         return every
 
     command.get_params = params
     command.format_options = partial(_write_panels, command)
-    for each in getattr(command, "commands", {}).values():
-        read_plainly(each)
+    for subcommand in getattr(command, "commands", {}).values():
+        read_plainly(subcommand)
 
 
 ALL_OPTIONS = "rbfrag.all_options"
@@ -303,7 +305,7 @@ ALL_OPTIONS = "rbfrag.all_options"
 
 
 def _help_all_option(help: Any) -> Any:
-    """Return the option --help-all of a command from its option --help."""
+    """Return the option --help-all of a command, based on its option --help."""
     option = copy(help)
     option.name, option.opts = "help_all", ["--help-all"]
     option.help = "Show all options and exit."
@@ -326,7 +328,7 @@ def _panel(option: Any) -> str:
 
 
 def _shown(options: list[Any], context: Any) -> list[Any]:
-    """Return the options that the help shows: all, or the arguments and the most used options."""
+    """Return the options in the help: all, or the arguments and the most used options."""
     rank = {name: position for position, name in enumerate(MOST_USED)}
 
     def position(option: Any) -> tuple[bool, int]:
@@ -334,20 +336,20 @@ def _shown(options: list[Any], context: Any) -> list[Any]:
 
     if context.meta.get(ALL_OPTIONS):
         return options
-    arguments = [each for each in options if each.param_type_name == "argument"]
-    most_used = sorted((each for each in options if each not in arguments), key=position)
+    arguments = [item for item in options if item.param_type_name == "argument"]
+    most_used = sorted((item for item in options if item not in arguments), key=position)
     chosen = [*arguments, *most_used[:LONGEST_HELP]]
-    return [each for each in options if each in chosen]
+    return [item for item in options if item in chosen]
 
 
 def _write_panels(command: Any, context: Any, formatter: Any) -> None:
-    """Write the options of a command by the headings that their fields declare."""
+    """Write the options of a command under the headings of their fields."""
     panels: dict[str, list[Any]] = {
         name: [] for name in ("Arguments", *PANELS, "Options", "Output")
     }
-    options = [each for each in command.get_params(context) if each.get_help_record(context)]
-    for each in _shown(options, context):
-        panels[_panel(each)].append(each.get_help_record(context))
+    options = [item for item in command.get_params(context) if item.get_help_record(context)]
+    for item in _shown(options, context):
+        panels[_panel(item)].append(item.get_help_record(context))
     for name, records in panels.items():
         if records:
             with formatter.section(name):
@@ -357,7 +359,7 @@ def _write_panels(command: Any, context: Any, formatter: Any) -> None:
 
 
 def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
-    """Return the value of an option or argument as a command takes it."""
+    """Return the parsed value of an option or argument."""
     kind = parameter.type_descriptor.annotation
     if parameter.multiple or parameter.nargs == -1:
         value = () if value is None else list(value)
@@ -372,7 +374,7 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
         # the vocabulary of tables, which plain numbers do not load
         from rbfrag.question.table import number_with_unit
 
-        wanted = _NEEDS[kind]
+        requirement = _NEEDS[kind]
         about = QUANTITIES.get(name_of(parameter.name)) if kind is float else None
         read = None if about is None else number_with_unit(value, about.unit)
         if about is not None and read is not None:
@@ -380,12 +382,12 @@ def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
             typed.text = value
             return typed if "," in value else read
         if about is not None and about.unit:
-            wanted += f", optionally with its unit ({about.unit})"
+            requirement += f", optionally with its unit ({about.unit})"
     else:
         if parameter.min is None or number >= parameter.min:
             return number
-        wanted = f"{parameter.min} or more"
-    raise InputError(f"{name_in_errors(parameter)} must be {wanted}, not {value!r}")
+        requirement = f"{parameter.min} or more"
+    raise InputError(f"{name_in_errors(parameter)} must be {requirement}, not {value!r}")
 
 
 def name_in_errors(parameter: Any) -> str:

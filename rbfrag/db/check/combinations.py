@@ -1,4 +1,4 @@
-"""Stored combinations against their inputs, their brackets and what was simulated."""
+"""Check of stored combinations against their inputs, their brackets and their simulations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ROWS_AT_ONCE = 500
 
 
 def check_combinations(connection: Connection) -> Iterator[Damage]:
-    """Yield what is wrong with combinations, their intervals and their simulations."""
+    """Yield damage of combinations, their intervals and their simulations."""
     query = (
         select(combination, motion.c.pga_g)
         .join(motion, motion.c.id == combination.c.motion_id)
@@ -36,8 +36,8 @@ def check_combinations(connection: Connection) -> Iterator[Damage]:
     inputs = stored_inputs(connection)
     last = 0
     while True:
-        some = query.where(combination.c.id > last).limit(_ROWS_AT_ONCE)
-        rows = connection.execute(some).mappings().all()
+        page = query.where(combination.c.id > last).limit(_ROWS_AT_ONCE)
+        rows = connection.execute(page).mappings().all()
         if not rows:
             return
         last = rows[-1]["id"]
@@ -99,16 +99,16 @@ def _point_problems(
 
 
 def fails_by_outcome(settings: str) -> bool:
-    """Return whether failure is the outcome itself, not a stated rotation or displacement."""
+    """Return whether failure is the outcome itself, not a rotation or displacement limit."""
     try:
-        stated = json.loads(settings)
-        return stated.get("rotation_deg") is None and stated.get("displacement_m") is None
+        criteria = json.loads(settings)
+        return criteria.get("rotation_deg") is None and criteria.get("displacement_m") is None
     except (ValueError, AttributeError):
         return True  # its own finding
 
 
 def displacement_problems(row: RowMapping, points: Sequence[Point]) -> Iterator[str]:
-    """Yield what cannot be of blocks that slide: displacements fall with strength.
+    """Yield impossible displacements of sliding blocks: they decrease with strength.
 
     Args:
         points: its rows of `simulation`, by rising k_y/PGA.

@@ -1,4 +1,4 @@
-"""One thing that is wrong with a database, and what to do about it."""
+"""Damage record of a database check: problem and remedy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FIT_AGAIN = "fit it again in its place, by rbfrag fit"
 
 @dataclass(frozen=True)
 class Damage:
-    """One thing that is wrong, the row as the database numbers or names it, and what to do next."""
+    """One problem: table, row, description and remedy."""
 
     table: str
     row: str

@@ -1,4 +1,4 @@
-"""Looking for damage: `rbfrag db check`."""
+"""Check of a database for damage: `rbfrag db check`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ ALTERED = "its values are not those that were written: its digest differs"
 
 
 def check_database(connection: Connection) -> list[Damage]:
-    """Return everything that is wrong with a database; an empty list is a clean bill.
+    """Return all damage of a database; an empty list if there is none.
 
     Looks at the file itself (SQLite), references, the samples against their sha256 and their
     intensity measures, toppling spectra, keys against what they are hashes of, brackets,
@@ -72,14 +72,14 @@ def check_database(connection: Connection) -> list[Damage]:
             for finding in look(connection):
                 findings.append(finding)  # noqa: PERF402  # one by one: a later row may break off
         except (*_DAMAGE, RbfragError) as error:
-            what = look.__name__.removeprefix("_").removeprefix("check_")
-            problem = f"the check of {what} broke off ({type(error).__name__}: {error})"
+            name = look.__name__.removeprefix("_").removeprefix("check_")
+            problem = f"the check of {name} broke off ({type(error).__name__}: {error})"
             findings.append(Damage("database", "-", problem))
     return findings
 
 
 def coverage(connection: Connection) -> str:
-    """Return a sentence on what :func:`check_database` covers and what it cannot see."""
+    """Describe what :func:`check_database` covers and what it cannot detect."""
     rows = sum(
         connection.scalar(select(func.count()).select_from(table)) or 0
         for table in metadata.tables.values()
@@ -125,7 +125,7 @@ def _check_models(connection: Connection) -> Iterator[Damage]:
 
 
 def check_digests(connection: Connection) -> Iterator[Damage]:
-    """Yield every row whose values were altered after rbfrag wrote it, or are no finite numbers."""
+    """Yield every row altered after rbfrag wrote it, or with a non-finite number."""
     for name, table in sorted(metadata.tables.items()):
         key = list(table.primary_key.columns)
         columns = [column.name for column in table.c]
@@ -155,7 +155,7 @@ def check_digests(connection: Connection) -> Iterator[Damage]:
 
 
 def _digest_or_none(table: Table, columns: Sequence[str], row: Sequence[object]) -> int | None:
-    """Return the digest of a row; None where a value is of another type than its column."""
+    """Return the digest of a row; None if a value has another type than its column."""
     try:
         return table_digests(table, columns, [row])[0]
     except _DAMAGE:
@@ -163,7 +163,7 @@ def _digest_or_none(table: Table, columns: Sequence[str], row: Sequence[object])
 
 
 def _check_types(connection: Connection) -> Iterator[Damage]:
-    """Yield the values that are of another type than their column, which SQLite allows."""
+    """Yield values of another type than their column, which SQLite allows."""
     for name, table in sorted(metadata.tables.items()):
         key: list[ColumnElement[object]] = [
             literal_column(column.name) for column in table.primary_key.columns

@@ -1,4 +1,4 @@
-"""Stored results against what they were made of; histories and pairs of motions in full."""
+"""Check of stored results against their inputs; histories and motion pairs in full."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Inputs = tuple[Mapping[int, tuple[str, float]], Mapping[int, str]]
 
 
 def stored_inputs(connection: Connection) -> Inputs:
-    """Return what results may have been made of."""
+    """Return the inputs that stored results refer to."""
     rows = connection.execute(select(campaign.c.id, campaign.c.numerics_version))
     return samples_of_motions(connection), {row.id: row.numerics_version for row in rows}
 
 
 def input_problems(row: RowMapping, inputs: Inputs) -> Iterator[str]:
-    """Yield what is wrong with the key of a combination, history or pair, or with its numerics."""
+    """Yield problems with the key or the numerics version of a combination, history or pair."""
     samples, numerics = inputs
     motions = {row[name] for name in row if name.endswith("motion_id")} - {None}
     unreadable = []
@@ -50,11 +50,11 @@ def input_problems(row: RowMapping, inputs: Inputs) -> Iterator[str]:
 
 
 def check_responses(connection: Connection) -> Iterator[Damage]:
-    """Yield histories whose key is not the hash of their inputs, or of another length."""
+    """Yield histories with a wrong key or length."""
     inputs = stored_inputs(connection)
-    others = [column for column in response.c if column.name not in _SERIES]
+    columns = [column for column in response.c if column.name not in _SERIES]
     lengths = [func.length(response.c[name]).label(name) for name in _SERIES]
-    query = select(*others, *lengths).order_by(response.c.id)
+    query = select(*columns, *lengths).order_by(response.c.id)
     for row in connection.execute(query).mappings():
         problems = [*input_problems(row, inputs)]
         problems += (
@@ -67,7 +67,7 @@ def check_responses(connection: Connection) -> Iterator[Damage]:
 
 
 def check_shock_pairs(connection: Connection) -> Iterator[Damage]:
-    """Yield pairs of motions whose key is not the hash of their inputs, or that cannot be."""
+    """Yield motion pairs with a wrong key or impossible values."""
     inputs = stored_inputs(connection)
     for row in connection.execute(select(shock_pair).order_by(shock_pair.c.id)).mappings():
         problems = [*input_problems(row, inputs)]

@@ -1,4 +1,4 @@
-"""Rows that another program deleted or added, by the ledger."""
+"""Detection of rows deleted or added by another program, by means of the ledger."""
 
 from __future__ import annotations
 
@@ -23,13 +23,16 @@ from rbfrag.errors import DatabaseError
 
 
 def check_ledger(connection: Connection) -> Iterator[Damage]:
-    """Yield the tables whose rows are not those that rbfrag wrote, by campaign."""
+    """Yield the tables whose rows differ from those rbfrag wrote, by campaign."""
     if not has_ledger(connection):
         return
     written, stored = written_tallies(connection), stored_tallies(connection)
     for key in sorted(written.keys() | stored.keys()):
-        (number, digests), (there, others) = written.get(key, (0, 0)), stored.get(key, (0, 0))
-        if (number, digests) == (there, others):
+        (number, digests), (there, stored_digests) = (
+            written.get(key, (0, 0)),
+            stored.get(key, (0, 0)),
+        )
+        if (number, digests) == (there, stored_digests):
             continue
         table, campaign = key
         if there < number:
@@ -43,7 +46,7 @@ def check_ledger(connection: Connection) -> Iterator[Damage]:
 
 
 def accept_rows(db: str | os.PathLike[str] | None = None) -> list[Damage]:
-    """Take the rows that are there for those that were written; return what differed.
+    """Accept the present rows as complete; return the differences.
 
     Args:
         db: the database (path, URL, or None for the default).
@@ -59,7 +62,7 @@ def accept_rows(db: str | os.PathLike[str] | None = None) -> list[Damage]:
 
 
 def mark_sound(db: str | os.PathLike[str] | None, time: str) -> None:
-    """Note when a check found nothing; a database that cannot be written now goes without."""
+    """Record that a check found nothing; skipped if the database is not writable."""
     token = LONGEST_WAIT_S.set(1.0)
     try:
         with suppress(DatabaseError), opened_database(db) as engine, engine.begin() as connection:

@@ -1,4 +1,4 @@
-"""The map of one combination against its bracket, its simulations and another map of it."""
+"""Check of the map of one combination against its bracket, its simulations and another map."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def interval_problems(
     toppled: Sequence[float],
     stable: Sequence[float],
 ) -> Iterator[str]:
-    """Yield what is wrong with a map.
+    """Yield problems of a map.
 
     Searches that did not ask for one hold none, nor do motions outside the model or that never
     lift a block. A gap says that nothing is known in it.
@@ -60,12 +60,12 @@ def _cover_problems(row: RowMapping, intervals: Sequence[Interval]) -> Iterator[
     if limit is not None and bottom < limit * (1.0 - _ROUNDING):
         yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
     # a map that says where it is undecided leaves nothing out; others hold what was seen alone
-    whole = any(interval.outcome == "undecided" for interval in intervals)
+    is_complete = any(interval.outcome == "undecided" for interval in intervals)
     needed = limit if row["lower"] is None else row["lower"]
-    if whole and needed is not None and bottom > needed * (1.0 + _CLEARANCE):
+    if is_complete and needed is not None and bottom > needed * (1.0 + _CLEARANCE):
         yield f"its map begins at kr/PGA {bottom!r}, above {needed!r}"
     for below, above in itertools.pairwise(intervals):
-        if whole and below.k_hi < above.k_lo:
+        if is_complete and below.k_hi < above.k_lo:
             yield f"its map has a gap from kr/PGA {below.k_hi!r} to {above.k_lo!r}"
         elif below.k_hi > above.k_lo:
             yield f"two of its intervals overlap from kr/PGA {above.k_lo!r} to {below.k_hi!r}"
@@ -104,7 +104,7 @@ def _bracket_problems(row: RowMapping, intervals: Sequence[Interval]) -> Iterato
 
 
 def _holding(intervals: Sequence[Interval], k: float) -> Interval | None:
-    """Return the interval with `k` strictly inside, if there is one."""
+    """Return the interval with `k` strictly inside, if any."""
     for interval in intervals:
         if interval.k_lo * (1.0 + _ROUNDING) < k < interval.k_hi * (1.0 - _ROUNDING):
             return interval
@@ -112,16 +112,16 @@ def _holding(intervals: Sequence[Interval], k: float) -> Interval | None:
 
 
 def contradictions(
-    one: Sequence[Interval], other: Sequence[Interval]
+    first: Sequence[Interval], other: Sequence[Interval]
 ) -> Iterator[tuple[float, float, str, str]]:
-    """Yield stretches that one map has toppling and the other safe.
+    """Yield intervals that topple in one map and are safe in the other.
 
     Returns:
         Lower end, upper end, what the first says, what the second says.
     """
     i = j = 0
-    while i < len(one) and j < len(other):
-        low, high, word = one[i]
+    while i < len(first) and j < len(other):
+        low, high, word = first[i]
         low_2, high_2, word_2 = other[j]
         bottom, top = max(low, low_2), min(high, high_2)
         if {word, word_2} == {"topples", "safe"} and top - bottom > BORDER_ERROR * top:

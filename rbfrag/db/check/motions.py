@@ -1,4 +1,4 @@
-"""Stored motions, and their toppling spectra, against their own samples."""
+"""Check of stored motions and their toppling spectra against their samples."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ROUNDING = 1e-9
 
 
 def check_motions(connection: Connection) -> Iterator[Damage]:
-    """Yield what is wrong with motions: bytes, sha256, and intensity measures calculated anew."""
+    """Yield damage of motions: bytes, SHA-256 and recomputed intensity measures."""
     query = select(motion).order_by(motion.c.id)
     ids = list(connection.scalars(select(motion.c.id).order_by(motion.c.id)))
     for row_id in ids:  # one at a time: the samples of all may not fit into memory
@@ -72,7 +72,7 @@ def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
 
 
 def check_spectra(connection: Connection) -> Iterator[Damage]:
-    """Yield every X(p) of the present numerics that its motion does not give."""
+    """Yield every X(p) of the present numerics that its motion does not reproduce."""
     column = toppling_spectrum.c
     query = (
         select(column.motion_id, column.polarity, column.p2, column.x_m_s)

@@ -1,4 +1,4 @@
-"""Bringing two teams' results together: `rbfrag db merge`."""
+"""Merge of two databases: `rbfrag db merge`."""
 
 from __future__ import annotations
 
@@ -48,8 +48,16 @@ from rbfrag.results.result import Result, TextLine, TextTable
 _CONFLICTS_SHOWN = 5
 
 # What is said of a motion, besides its samples and what follows from them.
-_OWN = (*NOT_DIGESTED, "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added")
-_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *COMPUTED))
+_DATA_COLUMNS = (
+    *NOT_DIGESTED,
+    "recording_id",
+    "dt_s",
+    "npts",
+    "samples_sha256",
+    "samples",
+    "added",
+)
+_LABELS = tuple(c.name for c in motion.c if c.name not in (*_DATA_COLUMNS, *COMPUTED))
 
 _EARTHQUAKE = Rule(
     earthquake,
@@ -67,7 +75,7 @@ _MOTION = Rule(
     {"npts": 0.0},
     (*LATER_MEASURES, "samples"),
 )
-_OTHERS = (
+_OTHER_RULES = (
     Rule(suite, (("name",),)),
     Rule(suite_motion, (("suite_id", "motion_id"),)),
     Rule(
@@ -96,7 +104,7 @@ _OTHERS = (
 
 @dataclass(frozen=True, repr=False)
 class MergeReport(Result):
-    """The rows that :func:`merge_databases` added.
+    """Result of :func:`merge_databases`.
 
     Args:
         added: rows added by table.
@@ -141,7 +149,7 @@ class MergeReport(Result):
 def merge_databases(
     other: str | os.PathLike[str], *, db: str | os.PathLike[str] | None = None
 ) -> MergeReport:
-    """Add everything that another database holds, in one transaction.
+    """Add the contents of another database, in one transaction.
 
     Rows are the same when their natural keys are: samples and interval of a motion, id of an
     earthquake (guessed and stated apart), name of a suite, hash over all inputs of a
@@ -172,7 +180,7 @@ def merge_databases(
             keep_writers_out(target)
             merge = Merge(source, target)
             _merge_motions(merge)
-            for rule in _OTHERS:
+            for rule in _OTHER_RULES:
                 for row in merge.rows(rule.table):
                     merge.bring(rule, row)
             merge_combinations(merge)
@@ -195,21 +203,21 @@ def merge_databases(
     )
 
 
-def _is_same(one: Path | str, other: Path | str) -> bool:
-    if isinstance(one, Path) and isinstance(other, Path):
-        return one.resolve() == other.resolve() or (
-            one.exists() and other.exists() and one.samefile(other)
+def _is_same(first: Path | str, other: Path | str) -> bool:
+    if isinstance(first, Path) and isinstance(other, Path):
+        return first.resolve() == other.resolve() or (
+            first.exists() and other.exists() and first.samefile(other)
         )
-    return one == other
+    return first == other
 
 
 def _merge_motions(merge: Merge) -> None:
-    """Bring motions in, each with its recording and earthquake; a guess gives way."""
-    places = {row["id"]: row for row in stored_rows(merge.source, recording)}
+    """Merge motions, each with its recording and earthquake; guesses are replaced."""
+    recordings = {row["id"]: row for row in stored_rows(merge.source, recording)}
     events = {row["id"]: row for row in stored_rows(merge.source, earthquake)}
-    left: set[int] = set()
+    vacated: set[int] = set()
     for row in stored_rows(merge.source, motion):
-        place = places[row["recording_id"]]
+        place = recordings[row["recording_id"]]
         event = events[place["earthquake_id"]]
         ours = merge.find(_MOTION, row)
         if ours is None:
@@ -222,10 +230,10 @@ def _merge_motions(merge: Merge) -> None:
         merge.bring(_MOTION, theirs)
         peaks = ours["pgv_m_s"], ours["pgd_m"]
         for column in COMPUTED:
-            here, there = ours[column], row[column]
-            unknown = column in LATER_MEASURES and None in (here, there)
-            if not (unknown or same_measure(column, here, there, *peaks)):
-                merge.conflict(_MOTION, theirs, column, here, there)
+            our_value, there = ours[column], row[column]
+            unknown = column in LATER_MEASURES and None in (our_value, there)
+            if not (unknown or same_measure(column, our_value, there, *peaks)):
+                merge.conflict(_MOTION, theirs, column, our_value, there)
         of_ours = select(earthquake).join(recording)
         of_ours = of_ours.where(recording.c.id == ours["recording_id"])
         our_event = merge.target.execute(of_ours).mappings().one()
@@ -234,7 +242,7 @@ def _merge_motions(merge: Merge) -> None:
             values = {name: row[name] for name in _LABELS}
             values["recording_id"] = _recording(merge, row, place, event)
             update_rows(merge.target, motion, motion.c.id == ours["id"], values)
-            left.add(ours["recording_id"])
+            vacated.add(ours["recording_id"])
             merge.restated += 1
         elif same_event and our_event["guessed"] == event["guessed"]:
             merge.bring(_EARTHQUAKE, event)
@@ -246,12 +254,12 @@ def _merge_motions(merge: Merge) -> None:
         if ours["is_vertical"] != row["is_vertical"]:
             both = ours["is_vertical"], row["is_vertical"]
             merge.conflict(_MOTION, theirs, "is_vertical", *both)
-    for recording_id in left:
+    for recording_id in vacated:
         delete_orphans(merge.target, recording_id)
 
 
 def _recording(merge: Merge, row: Row, place: Row, event: Row) -> int:
-    """Return the id here of the recording of a motion that comes in."""
+    """Return the id in the target of the recording of a merged motion."""
     if event["guessed"] and event["event_id"].startswith(UNKNOWN_EVENT):
         stranger = (
             select(motion.c.id)
@@ -276,7 +284,7 @@ def _recording(merge: Merge, row: Row, place: Row, event: Row) -> int:
 
 
 def _merge_models(merge: Merge) -> None:
-    """Bring models in; of two that differ under one name, the other's gets a number.
+    """Merge models; of two different ones with the same name, the other's gets a number.
 
     A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
     free. Chosen defaults stay; a database without models of a kind takes the other's choice.
@@ -302,5 +310,5 @@ def _merge_models(merge: Merge) -> None:
 
 
 def _content(row: ModelRow) -> dict[str, Any]:
-    """Return what a model says, whatever its name and the time of its fit."""
+    """Return the content of a model without its name and time of fit."""
     return encode_model(replace(row, name="-", is_default=False, created=""))

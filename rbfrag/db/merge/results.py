@@ -1,4 +1,4 @@
-"""Bringing in the combinations of another database, with their maps and simulations."""
+"""Merge of the combinations of another database, with their maps and simulations."""
 
 from __future__ import annotations
 
@@ -31,16 +31,18 @@ _SIMULATION = Rule(simulation)
 
 
 def merge_combinations(merge: Merge) -> None:
-    """Bring combinations in, each with its map and its simulations."""
+    """Merge combinations, each with its map and its simulations."""
     rows = merge.rows(combination)
     while portion := list(islice(rows, _AT_ONCE)):
         keys = [row["natural_key"] for row in portion]
-        known = _combinations_here(merge.target, keys).keys()
+        existing = _combinations_here(merge.target, keys).keys()
         values = [tuple(row[name] for name in _COLUMNS) for row in portion]
         insert_rows(merge.target, combination, _COLUMNS, values)
-        here = _combinations_here(merge.target, keys)
-        merge.added["combination"] += len(here.keys() - known)
-        _merge_results(merge, [(here[row["natural_key"]], row) for row in portion], known)
+        combinations = _combinations_here(merge.target, keys)
+        merge.added["combination"] += len(combinations.keys() - existing)
+        _merge_results(
+            merge, [(combinations[row["natural_key"]], row) for row in portion], existing
+        )
 
 
 def _combinations_here(target: Connection, keys: Sequence[str]) -> dict[str, Row]:
@@ -49,8 +51,10 @@ def _combinations_here(target: Connection, keys: Sequence[str]) -> dict[str, Row
     return {row.natural_key: row._mapping for row in rows}
 
 
-def _merge_results(merge: Merge, pairs: Sequence[tuple[Row, Row]], known: Collection[str]) -> None:
-    """Bring maps and simulations in, and compare those of combinations known before."""
+def _merge_results(
+    merge: Merge, pairs: Sequence[tuple[Row, Row]], existing: Collection[str]
+) -> None:
+    """Merge maps and simulations, and compare those of existing combinations."""
     our_ids, their_ids = ([row["id"] for row in rows] for rows in zip(*pairs, strict=True))
     our_maps = intervals_of(merge.target, our_ids)
     their_maps = intervals_of(merge.source, their_ids)
@@ -62,7 +66,7 @@ def _merge_results(merge: Merge, pairs: Sequence[tuple[Row, Row]], known: Collec
         our_id, their_id = ours["id"], theirs["id"]
         maps = our_maps[our_id], their_maps[their_id]
         band = None
-        if theirs["natural_key"] in known:
+        if theirs["natural_key"] in existing:
             merge.same["combination"] += 1
             compared = (*_OF_A_SEARCH, *_OF_A_MAP) if all(maps) else _OF_A_SEARCH
             exact = all(ours[name] == theirs[name] for name in compared)
@@ -87,7 +91,7 @@ def _merge_results(merge: Merge, pairs: Sequence[tuple[Row, Row]], known: Collec
 def _is_same_search(
     merge: Merge, ours: Row, theirs: Row, our_map: Sequence[Interval], their_map: Sequence[Interval]
 ) -> bool:
-    """Return whether two searches agree within the solver's error; note where they do not."""
+    """Return whether two searches agree within the solver's error; record a conflict otherwise."""
     if ours["status"] != theirs["status"]:
         merge.conflict(_COMBINATION, theirs, "status", ours["status"], theirs["status"])
         return False
@@ -97,9 +101,9 @@ def _is_same_search(
             both = ours["kr_over_pga"], theirs["kr_over_pga"]
             merge.conflict(_COMBINATION, theirs, "kr_over_pga", *both)
             return False
-    for bottom, top, here, there in contradictions(our_map, their_map):
+    for bottom, top, our_outcome, there in contradictions(our_map, their_map):
         column = f"the outcome from kr/PGA {bottom!r} to {top!r}"
-        merge.conflict(_COMBINATION, theirs, column, here, there)
+        merge.conflict(_COMBINATION, theirs, column, our_outcome, there)
         return False
     return True
 
@@ -111,36 +115,38 @@ def _more_points(
     theirs: Sequence[Point],
     band: tuple[float, float] | None,
 ) -> Iterator[Point]:
-    """Yield the simulations there that are not here; note those that contradict each other.
+    """Yield the simulations missing in the target; record contradictory ones.
 
     Args:
         band: where runs of the other search belong to its bracket, not to the one here.
     """
-    known = {point.kr_over_pga: point for point in ours}
+    by_strength = {point.kr_over_pga: point for point in ours}
     numbered = {point.grid: point for point in ours if point.grid is not None}
     for there in theirs:
         k, number = there.kr_over_pga, there.grid
         # another processor may have given a block of the grid a strength of other last bits
-        here = known.get(k) if number is None else numbered.get(number, known.get(k))
+        our_point = (
+            by_strength.get(k) if number is None else numbered.get(number, by_strength.get(k))
+        )
         in_band = band is not None and band[0] <= k <= band[1]
-        if here is None:
+        if our_point is None:
             if number is not None or not in_band:
                 yield there
             continue
-        if number is not None and here.grid is None:
-            yield here._replace(grid=number)
+        if number is not None and our_point.grid is None:
+            yield our_point._replace(grid=number)
         slid = f"displacement_m at ky/PGA {k!r}"
         compared: list[tuple[str, object, object]]
-        compared = [(slid, here.displacement_m, there.displacement_m)]
-        if here.outcome != there.outcome:
+        compared = [(slid, our_point.displacement_m, there.displacement_m)]
+        if our_point.outcome != there.outcome:
             # another processor's last bits turn a sensitive outcome as other motions do
-            if not (in_band or here.sensitive or there.sensitive):
-                compared.append((f"the outcome at kr/PGA {k!r}", here.outcome, there.outcome))
-        elif here.sensitive is None:  # elsewhere the size of peaks may be chaotic
-            compared.append((f"theta_n at kr/PGA {k!r}", here.theta_n, there.theta_n))
-        for column, one, other in compared:
-            if not agree(one, other, ROTATION_ERROR):
-                merge.conflict(_SIMULATION, row, column, one, other)
+            if not (in_band or our_point.sensitive or there.sensitive):
+                compared.append((f"the outcome at kr/PGA {k!r}", our_point.outcome, there.outcome))
+        elif our_point.sensitive is None:  # elsewhere the size of peaks may be chaotic
+            compared.append((f"theta_n at kr/PGA {k!r}", our_point.theta_n, there.theta_n))
+        for column, our_value, other in compared:
+            if not agree(our_value, other, ROTATION_ERROR):
+                merge.conflict(_SIMULATION, row, column, our_value, other)
 
 
 def _bracket(row: Row) -> tuple[float, float]:
@@ -149,7 +155,7 @@ def _bracket(row: Row) -> tuple[float, float]:
 
 
 def _band(ours: Row, theirs: Row) -> tuple[float, float] | None:
-    """Return where runs of the other search belong to its bracket, not to the one here."""
+    """Return the range of k/PGA in which runs of the other search belong to its own bracket."""
     if ours["status"] != "found":
         return None
     (low, high), (low_2, high_2) = _bracket(ours), _bracket(theirs)

@@ -1,4 +1,4 @@
-"""Rows of one database among those of another: inserted, completed, or refused."""
+"""Merge of rows: inserted, completed or rejected."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Row = RowMapping | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Rule:
-    """How rows of a table are told apart, and what becomes of those that are there.
+    """Unique keys of a table, and the treatment of existing rows.
 
     Args:
         keys: columns by which rows are the same, the ones tried first before others; one that
@@ -40,7 +40,7 @@ class Rule:
 
 @dataclass
 class Merge:
-    """Two databases, and what was done and stood in the way so far.
+    """Source and target of a merge, with its counts and conflicts.
 
     Args:
         target: the database that is merged into, inside the caller's transaction.
@@ -71,7 +71,7 @@ class Merge:
         self.warnings.append(Diagnostic(text, "renamed"))
 
     def rows(self, table: Table) -> Iterator[Row]:
-        """Yield the rows there as they would stand here, apart from their own number."""
+        """Yield the source rows with the ids of the target, without their own id."""
         references = [(c.name, key.column.table.name) for c in table.c for key in c.foreign_keys]
         samples = samples_of_motions(self.target) if self.other_bits else {}
         for row in stored_rows(self.source, table):
@@ -83,11 +83,11 @@ class Merge:
             yield values
 
     def bring(self, rule: Rule, theirs: Row) -> int:
-        """Insert a row that is not here yet, compare and complete one that is; return its id."""
+        """Insert a new row, or compare and complete an existing one; return its id."""
         name, number = rule.table.name, theirs.get("id")
-        known = self.ids[name]
-        if number in known:
-            return known[number]
+        id_map = self.ids[name]
+        if number in id_map:
+            return id_map[number]
         ours = self.find(rule, theirs)
         if ours is None:
             columns = [c.name for c in rule.table.c if c.name not in NOT_DIGESTED]
@@ -98,11 +98,11 @@ class Merge:
             self.same[name] += 1
             self.compare(rule, ours, theirs)
         if number is not None:
-            known[number] = row_id
+            id_map[number] = row_id
         return row_id
 
     def find(self, rule: Rule, theirs: Row) -> Row | None:
-        """Return the row here that is the same."""
+        """Return the same row of the target."""
         for key in rule.keys:
             values = {column: theirs[column] for column in key}
             if None in values.values():
@@ -114,16 +114,16 @@ class Merge:
         return None
 
     def compare(self, rule: Rule, ours: Row, theirs: Row) -> None:
-        """Note what contradicts, and fill in what is missing here."""
+        """Record contradictions, and fill in missing values of the target."""
         exact = True
         for column, error in rule.compared.items():
-            here, there = ours[column], theirs[column]
-            unknown = column in rule.filled and None in (here, there)
+            our_value, there = ours[column], theirs[column]
+            unknown = column in rule.filled and None in (our_value, there)
             if unknown or ours.get("guessed"):
                 continue
-            exact &= here == there
-            if not agree(here, there, error):
-                self.conflict(rule, theirs, column, here, there)
+            exact &= our_value == there
+            if not agree(our_value, there, error):
+                self.conflict(rule, theirs, column, our_value, there)
                 return
         self.within_error += not exact
         missing = {
@@ -134,22 +134,22 @@ class Merge:
         if missing:
             update_rows(self.target, rule.table, rule.table.c.id == ours["id"], missing)
 
-    def conflict(self, rule: Rule, row: Row, column: str, here: object, there: object) -> None:
-        """Note that two values cannot both be kept."""
+    def conflict(self, rule: Rule, row: Row, column: str, our_value: object, there: object) -> None:
+        """Record a conflict between two values."""
         name = rule.label.format_map(row)
         self.conflicts.append(
-            f"{rule.table.name} {name}: {column} is {here!r} here and {there!r} there"
+            f"{rule.table.name} {name}: {column} is {our_value!r} here and {there!r} there"
         )
 
 
 def stored_rows(connection: Connection, table: Table) -> Iterator[Row]:
-    """Yield the rows of a table in the order of its key, few in memory at once."""
+    """Yield the rows of a table in key order, a few in memory at once."""
     query = select(table).order_by(*table.primary_key.columns)
     yield from connection.execute(query, execution_options={"yield_per": 16}).mappings()
 
 
-def agree(here: object, there: object, error: float) -> bool:
-    """Return whether two values are the same, to a relative error if they are numbers."""
-    if isinstance(here, float) and isinstance(there, float):
-        return math.isclose(here, there, rel_tol=error, abs_tol=1e-6 * error)
-    return here == there
+def agree(our_value: object, there: object, error: float) -> bool:
+    """Return whether two values are equal; numbers within a relative error."""
+    if isinstance(our_value, float) and isinstance(there, float):
+        return math.isclose(our_value, there, rel_tol=error, abs_tol=1e-6 * error)
+    return our_value == there

@@ -1,4 +1,4 @@
-"""Tables of the OpenQuake engine, as its own HDF5 files hold them: calc_N.hdf5, gmf-data.hdf5."""
+"""Tables of the OpenQuake engine in its HDF5 files: calc_N.hdf5, gmf-data.hdf5."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rbfrag.files import reading
 SUFFIXES = (".hdf5", ".h5")
 """How names of HDF5 files end."""
 
-_WHAT = "the datastore of an OpenQuake job"
+_DATASTORE = "the datastore of an OpenQuake job"
 _TIMES = ("investigation_time", "ses_per_logic_tree_path")
 _JOBS = {"checksum": "checksum32", "start_date": "date"}
 """What tells jobs apart: names in the comments of exports, and those of the file's attributes."""
@@ -52,7 +52,7 @@ _LEAST_S, _BYTES_A_SECOND = 20.0, 1e7
 
 @lru_cache
 def _refuse_endless(path: Path, size: int, _changed_ns: int) -> None:
-    """Refuse a damaged file with which the HDF5 library never ends, or that makes it crash.
+    """Reject a damaged file that makes the HDF5 library hang or crash.
 
     Only another process can be stopped in the library; an exception there comes here again.
     """
@@ -64,12 +64,12 @@ def _refuse_endless(path: Path, size: int, _changed_ns: int) -> None:
             command, env=surroundings, timeout=limit, stdin=subprocess.DEVNULL,
             capture_output=True, check=False,
         ).returncode  # fmt: skip
-        what = "crashes" if ended < 0 else ""
+        fault = "crashes" if ended < 0 else ""
     except subprocess.TimeoutExpired:
-        what = f"does not end in {limit:.0f} s"
-    if what:
+        fault = f"does not end in {limit:.0f} s"
+    if fault:
         raise InputError(
-            f"{path}: damaged: the HDF5 library {what} in reading it: copy it again, or name the "
+            f"{path}: damaged: the HDF5 library {fault} in reading it: copy it again, or name the "
             "CSV files (oq export … -e csv)"
         )
 
@@ -79,54 +79,54 @@ class StoredTable(Table):
     """A table of an HDF5 file.
 
     Args:
-        what: name of the group or dataset that it lies in.
+        node_name: name of the group or dataset that it lies in.
         size: number of rows.
         members: where each column lies inside; an empty text is the dataset itself, None a number
             from 0 on.
     """
 
-    what: str = ""
+    node_name: str = ""
     size: int = 0
     members: Mapping[str, str | None] = None  # type: ignore[assignment]
 
     @property
     def head(self) -> str:
-        """The place of the names of the columns."""
-        return f"{self.path}, {self.what}"
+        """Position of the column names, for messages."""
+        return f"{self.path}, {self.node_name}"
 
     top = head
 
     def line(self, row: int | np.integer[Any]) -> str:
-        """Return the place of a row of data for messages, from 1 on."""
+        """Return the position of a row of data for messages, from 1 on."""
         return f"{self.head}, row {1 + int(row)}"
 
     def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
-        """Yield some columns, some hundred thousand rows at a time.
+        """Yield columns, some hundred thousand rows at a time.
 
         Raises:
             InputError: the file cannot be read, or a number is none; the message names the row.
         """
         with _opened(self.path) as file:
             for start in range(0, self.size, ROWS):
-                some = slice(start, min(start + ROWS, self.size))
-                yield {name: self._cells(file, name, some, kind) for name, kind in columns.items()}
+                rows = slice(start, min(start + ROWS, self.size))
+                yield {name: self._cells(file, name, rows, kind) for name, kind in columns.items()}
 
-    def _cells(self, file: Any, name: str, some: slice, kind: type) -> NDArray[Any]:
-        member, node = self.members[name], file[self.what]
+    def _cells(self, file: Any, name: str, rows: slice, kind: type) -> NDArray[Any]:
+        member, node = self.members[name], file[self.node_name]
         if member is None:
-            return np.arange(some.start, some.stop)
-        values = np.asarray(_member(node, member)[some])
+            return np.arange(rows.start, rows.stop)
+        values = np.asarray(_member(node, member)[rows])
         if kind is str:
             texts = np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
             return texts.astype(str).astype(object)
         if kind is float and not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise InputError(f"{self.line(some.start + row)}: {name} is {values[row]}, no number")
+            raise InputError(f"{self.line(rows.start + row)}: {name} is {values[row]}, no number")
         return values.astype(np.int64 if kind is int else np.float64)
 
 
-def stored_table(path: Path, what: str) -> StoredTable | None:
-    """Return a table of an HDF5 file by what it holds; None for the ruptures of a scenario.
+def stored_table(path: Path, content: str) -> StoredTable | None:
+    """Return a table of an HDF5 file by its content; None for the ruptures of a scenario.
 
     The layout is that of the engine's version 3: ``gmf_data`` (one dataset a measure), ``events``
     (compound), ``sitecol`` or ``complete`` (one dataset a column), ``weights`` of the realizations,
@@ -134,76 +134,86 @@ def stored_table(path: Path, what: str) -> StoredTable | None:
 
     Args:
         path: calc_N.hdf5 or gmf-data.hdf5.
-        what: gmf_data, events, sitemesh, realizations or ruptures.
+        content: gmf_data, events, sitemesh, realizations or ruptures.
 
     Raises:
         InputError: no such file, or it does not hold that table.
         MissingExtraError: h5py is not installed.
     """
     with _opened(path) as file:
-        stated = {name: str(file.attrs[own]) for name, own in _JOBS.items() if own in file.attrs}
-        if what == "ruptures":
-            return _times(path, file, stated)
-        if what == "sitemesh":
-            return _sites(path, file, stated)
-        node = _node(path, file, "weights" if what == "realizations" else what)
-        if what == "realizations":
+        metadata = {
+            name: str(file.attrs[attribute])
+            for name, attribute in _JOBS.items()
+            if attribute in file.attrs
+        }
+        if content == "ruptures":
+            return _times(path, file, metadata)
+        if content == "sitemesh":
+            return _sites(path, file, metadata)
+        node = _node(path, file, "weights" if content == "realizations" else content)
+        if content == "realizations":
             if node.ndim != 1:
                 raise InputError(
                     f"{path}, weights: of shape {node.shape}, one per realization is required"
                 )
             members: dict[str, str | None] = {"rlz_id": None, "weight": ""}
-            return _table(path, "weights", node.size, members, stated)
-        if what == "events":
+            return _table(path, "weights", node.size, members, metadata)
+        if content == "events":
             members = {{"id": "event_id"}.get(name, name): name for name in node.dtype.names}
-            return _table(path, what, node.size, members, stated)
+            return _table(path, content, node.size, members, metadata)
         members = {name if name in ("eid", "sid") else f"gmv_{name}": name for name in node}
-        return _table(path, what, _member(node, "eid").size, members, stated)
+        return _table(path, content, _member(node, "eid").size, members, metadata)
 
 
 def _table(
-    path: Path, what: str, size: int, members: Mapping[str, str | None], stated: Mapping[str, str]
+    path: Path,
+    node_name: str,
+    size: int,
+    members: Mapping[str, str | None],
+    metadata: Mapping[str, str],
 ) -> StoredTable:
     if size > _MOST_ROWS * path.stat().st_size:
-        raise InputError(f"{path}, {what}: declares {size:,} rows, more than the file size allows")
-    return StoredTable(path, stated, tuple(members), 0, what, size, members)
+        raise InputError(
+            f"{path}, {node_name}: declares {size:,} rows, more than the file size allows"
+        )
+    return StoredTable(path, metadata, tuple(members), 0, node_name, size, members)
 
 
-def _sites(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable:
-    what = "complete" if "complete" in file else "sitecol"
-    node = _node(path, file, what)
+def _sites(path: Path, file: Any, metadata: Mapping[str, str]) -> StoredTable:
+    node_name = "complete" if "complete" in file else "sitecol"
+    node = _node(path, file, node_name)
     name = "custom_site_id" if "custom_site_id" in node else "sids"
     members = {"site_id" if name == "sids" else name: name, "lon": "lon", "lat": "lat"}
     sids = _member(node, "sids")
-    table = _table(path, what, sids.size, members, stated)
+    table = _table(path, node_name, sids.size, members, metadata)
     if (sids[()] != np.arange(sids.size)).any():
-        raise InputError(f"{path}, {what}: the sites are not numbered from 0 on")
+        raise InputError(f"{path}, {node_name}: the sites are not numbered from 0 on")
     return table
 
 
-def _times(path: Path, file: Any, stated: Mapping[str, str]) -> StoredTable | None:
-    """Return the table of ruptures without its rows: what it states is how long events took."""
+def _times(path: Path, file: Any, metadata: Mapping[str, str]) -> StoredTable | None:
+    """Return the table of ruptures without rows, with the duration of the event set as metadata."""
     if "oqparam" not in file:
         return None
     settings = json.loads(file["oqparam"][()])
     times = {name: str(settings[name]) for name in _TIMES if settings.get(name) is not None}
     if not times:
         return None
-    return _table(path, "oqparam", 0, {}, {**stated, **times})
+    return _table(path, "oqparam", 0, {}, {**metadata, **times})
 
 
 def _node(path: Path, file: Any, name: str) -> Any:
     if name not in file:
-        what = "ground motion alone" if "gmf_data" in file else "another calculation"
+        data = "ground motion alone" if "gmf_data" in file else "another calculation"
         raise InputError(
-            f"{path} has no {name!r}: it is a file of {what}; name calc_N.hdf5 of the event-based "
+            f"{path} has no {name!r}: it is a file of {data}; name calc_N.hdf5 of the event-based "
             "or scenario job itself, or name the CSV files of what is missing (oq export … -e csv)"
         )
     return file[name]
 
 
 def _member(node: Any, name: str) -> Any:
-    """Return a column that slices can be taken of: of a group, or of a table in one dataset."""
+    """Return a sliceable column of a group, or of a table in one dataset."""
     if not name:
         return node
     return node.fields(name) if hasattr(node, "dtype") else node[name]
@@ -215,9 +225,9 @@ def _opened(path: Path) -> Iterator[Any]:
         import h5py
     except ImportError:
         raise MissingExtraError("HDF5 files of OpenQuake require h5py", "hdf5") from None
-    with reading(path, _WHAT):
+    with reading(path, _DATASTORE):
         if not h5py.is_hdf5(path):
-            raise InputError(f"{path}: not an HDF5 file: name {_WHAT}, calc_N.hdf5")
+            raise InputError(f"{path}: not an HDF5 file: name {_DATASTORE}, calc_N.hdf5")
         about = path.stat()
         _refuse_endless(path, about.st_size, about.st_mtime_ns)
         try:
@@ -227,4 +237,4 @@ def _opened(path: Path) -> Iterator[Any]:
             raise
         # what h5py raises of a file that is damaged or of another layout
         except (KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-            raise InputError(f"{path}: cannot be read as {_WHAT}: {error}") from None
+            raise InputError(f"{path}: cannot be read as {_DATASTORE}: {error}") from None

@@ -42,7 +42,7 @@ _MEASURE = re.compile(r"gmv_(.+)")
 
 @dataclass(frozen=True)
 class JobFiles:
-    """Where the files of one job are.
+    """Paths of the files of one job.
 
     Args:
         gmf_data: ground motion by event and site.
@@ -64,7 +64,7 @@ class JobFiles:
         folder: str | os.PathLike[str] | None = None,
         named: Mapping[str, str | os.PathLike[str]] | None = None,
     ) -> JobFiles:
-        """Return the files of a folder, or those that are named.
+        """Return the files of a folder, or the files given by name.
 
         Args:
             folder: the folder, or in its place the datastore of the job, which holds everything.
@@ -84,17 +84,17 @@ class JobFiles:
                     "job, or its datastore calc_N.hdf5"
                 )
             present = [] if is_store else sorted(path.name for path in place.iterdir())
-            for what, pattern in FILES.items():
-                if what in chosen:
+            for content, pattern in FILES.items():
+                if content in chosen:
                     continue
                 fits = [name for name in present if pattern.fullmatch(name)]
                 if len(fits) > 1:
                     raise InputError(
                         f"{place} has {' and '.join(fits[:3])}: keep the files of one job in a "
-                        f"folder of their own, or give the file of {what.replace('_', '-')}"
+                        f"folder of their own, or give the file of {content.replace('_', '-')}"
                     )
                 if fits:
-                    chosen[what] = place / fits[0]
+                    chosen[content] = place / fits[0]
         if (gmf_data := chosen.get("gmf_data")) and gmf_data.suffix.lower() in SUFFIXES:
             chosen.setdefault("sitemesh", gmf_data)
         missing = [name for name in FILES if name not in chosen and name != "ruptures"]
@@ -107,7 +107,7 @@ class JobFiles:
         return cls(**chosen)
 
     def paths(self) -> dict[str, Path]:
-        """Return the files by what they hold."""
+        """Return the files by their content."""
         return {name: path for name in FILES if (path := getattr(self, name)) is not None}
 
 
@@ -118,7 +118,7 @@ def read_events(
     investigation_time: float | None = None,
     ses: int | None = None,
 ) -> EventSet:
-    """Return the events of one job and how they shook its sites.
+    """Return the events of one job, with the ground motion at its sites.
 
     Columns are read by name, the sites joined on their identifiers. PGV stands in cm/s in the
     files, PGA and spectral accelerations in g.
@@ -153,18 +153,18 @@ def read_events(
     return EventSet(
         event_id, realization, year, event_weights(realization, weights, duration),
         sites, event, site, measures, duration, weights, tuple(remarks),
-        _places(heads["sitemesh"]),
+        _site_coordinates(heads["sitemesh"]),
     )  # fmt: skip
 
 
 def measures_in(files: JobFiles) -> tuple[str, ...]:
-    """Return the measures of a job's ground motion that models read, as OpenQuake names them."""
+    """Return the OpenQuake names of the measures of a job that models use."""
     names = (_MEASURE.fullmatch(column) for column in _named(files.gmf_data, "gmf_data").names)
     return tuple(name.group(1) for name in names if name and is_read(name.group(1)))
 
 
 def read_magnitudes(files: JobFiles) -> FloatArray | None:
-    """Return the magnitude of every event by rising number; None without a file of ruptures.
+    """Return the magnitude of every event by event number; None without a file of ruptures.
 
     Raises:
         InputError: a column is missing, or an event is of a rupture that the file does not have.
@@ -173,41 +173,43 @@ def read_magnitudes(files: JobFiles) -> FloatArray | None:
         return None
     ruptures, events = _named(files.ruptures, "ruptures"), _named(files.events, "events")
     ruptures.column(("mag",))
-    known = ruptures.whole({str(ruptures.column(_RUPTURE)): int, "mag": float})
-    number, magnitude = known.values()
+    rupture_columns = ruptures.read_all({str(ruptures.column(_RUPTURE)): int, "mag": float})
+    number, magnitude = rupture_columns.values()
     event = str(events.column(_EVENT))
-    own = events.whole({event: int, (of := str(events.column(_RUPTURE))): int})
+    columns = events.read_all({event: int, (of := str(events.column(_RUPTURE))): int})
     order = np.argsort(number, kind="stable")
-    at = np.minimum(np.searchsorted(number[order], own[of]), number.size - 1)
-    absent = np.full(own[of].size, True) if not number.size else number[order][at] != own[of]
+    at = np.minimum(np.searchsorted(number[order], columns[of]), number.size - 1)
+    absent = (
+        np.full(columns[of].size, True) if not number.size else number[order][at] != columns[of]
+    )
     if absent.any():
         row = int(np.flatnonzero(absent)[0])
         raise InputError(
-            f"{events.line(row)}: the rupture {own[of][row]} is not in {files.ruptures.name}, "
+            f"{events.line(row)}: the rupture {columns[of][row]} is not in {files.ruptures.name}, "
             "which has the magnitudes: are both from the same job?"
         )
-    return np.asarray(magnitude[order][at][np.argsort(own[event], kind="stable")])
+    return np.asarray(magnitude[order][at][np.argsort(columns[event], kind="stable")])
 
 
-def _named(path: Path, what: str) -> Table:
-    table = _table(path, what)
+def _named(path: Path, content: str) -> Table:
+    table = _table(path, content)
     if table is None:
-        raise InputError(f"{path} has no {what.replace('_', '-')}: give the file that has them")
+        raise InputError(f"{path} has no {content.replace('_', '-')}: give the file that has them")
     return table
 
 
-def _table(path: Path, what: str) -> Table | None:
-    return stored_table(path, what) if path.suffix.lower() in SUFFIXES else Table.of(path)
+def _table(path: Path, content: str) -> Table | None:
+    return stored_table(path, content) if path.suffix.lower() in SUFFIXES else Table.of(path)
 
 
 def _refuse_other_jobs(heads: Mapping[str, Table]) -> None:
     first = heads["gmf_data"]
     for head in heads.values():
         for name in ("checksum", "start_date"):
-            one, other = first.stated.get(name), head.stated.get(name)
-            if one is not None and other is not None and one != other:
+            value, other = first.metadata.get(name), head.metadata.get(name)
+            if value is not None and other is not None and value != other:
                 raise InputError(
-                    f"{head.top}: {name} is {other}, and that of {first.path.name} is {one}: use "
+                    f"{head.top}: {name} is {other}, and that of {first.path.name} is {value}: use "
                     "files of one job"
                 )
 
@@ -216,8 +218,8 @@ def _sites(head: Table) -> tuple[str, ...]:
     name = head.column((_SITE_NAME, *_SITE_NUMBER), needed=False)
     if name is None:  # numbered from 0 on
         head.column((_SITE_NAME, *_SITE_NUMBER, "lon"))
-        return tuple(str(i) for i in range(head.whole({"lon": float})["lon"].size))
-    ids = head.whole({name: str})[name].tolist()
+        return tuple(str(i) for i in range(head.read_all({"lon": float})["lon"].size))
+    ids = head.read_all({name: str})[name].tolist()
     first: dict[str, int] = {}
     for row, text in enumerate(ids):
         if text in first:
@@ -230,18 +232,18 @@ def _sites(head: Table) -> tuple[str, ...]:
     return tuple(ids)
 
 
-def _places(head: Table) -> FloatArray | None:
+def _site_coordinates(head: Table) -> FloatArray | None:
     """Return longitudes and latitudes of the sites [deg], shape (sites, 2); None without them."""
     if not {"lon", "lat"} <= {*head.names}:
         return None
-    columns = head.whole({"lon": float, "lat": float})
+    columns = head.read_all({"lon": float, "lat": float})
     return np.column_stack([columns["lon"], columns["lat"]])
 
 
 def _weights(head: Table) -> tuple[dict[int, float], list[str]]:
     name = str(head.column(_REALIZATION))
     head.column(("weight",))
-    columns = head.whole({name: int, "weight": float})
+    columns = head.read_all({name: int, "weight": float})
     numbers, values = columns[name].tolist(), columns["weight"]
     for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
         if not 0.0 <= value < np.inf:
@@ -262,9 +264,9 @@ def _weights(head: Table) -> tuple[dict[int, float], list[str]]:
 
 
 def _events(head: Table, weights: Mapping[int, float]) -> tuple[IntArray, IntArray, IntArray]:
-    """Return number, realization and year of every event, by rising number."""
+    """Return number, realization and year of every event, in order of event number."""
     names = [str(head.column(choices)) for choices in (_EVENT, _REALIZATION, ("year",))]
-    columns = head.whole(dict.fromkeys(names, int))
+    columns = head.read_all(dict.fromkeys(names, int))
     event_id, realization, year = (columns[name] for name in names)
     unknown = ~np.isin(realization, list(weights))
     if unknown.any():
@@ -289,19 +291,19 @@ def _events(head: Table, weights: Mapping[int, float]) -> tuple[IntArray, IntArr
 def _duration(
     heads: Mapping[str, Table], year: IntArray, investigation_time: float | None, ses: int | None
 ) -> Duration | None:
-    """Return how long a realization lasts; None for a scenario, whose year is 0."""
-    given = {"investigation_time": investigation_time, "ses_per_logic_tree_path": ses}
-    known = {name: float(value) for name, value in given.items() if value is not None}
+    """Return the duration of a realization; None for a scenario, whose year is 0."""
+    options = {"investigation_time": investigation_time, "ses_per_logic_tree_path": ses}
+    settings = {name: float(value) for name, value in options.items() if value is not None}
     ruptures = heads.get("ruptures")
-    if not year.any() and (ruptures is None or not given.keys() & ruptures.stated.keys()):
-        if known:
+    if not year.any() and (ruptures is None or not options.keys() & ruptures.metadata.keys()):
+        if settings:
             raise InputError(
                 f"{heads['events'].path}: the events are those of a scenario (year 0), which has "
                 "no rate: omit investigation_time and ses"
             )
         return None
-    for name in given:
-        text = None if ruptures is None else ruptures.stated.get(name)
+    for name in options:
+        text = None if ruptures is None else ruptures.metadata.get(name)
         if text is None or ruptures is None:
             continue
         try:
@@ -310,11 +312,11 @@ def _duration(
             raise InputError(f"{ruptures.top}: {name} = {text!r} is not a number") from None
         if not 0.0 < value < math.inf:
             raise InputError(f"{ruptures.top}: {name} = {text!r} is not above zero")
-        if known.setdefault(name, value) != value:
+        if settings.setdefault(name, value) != value:
             raise InputError(
-                f"{ruptures.top}: {name} is {value:g}, given is {known[name]:g}: omit it"
+                f"{ruptures.top}: {name} is {value:g}, given is {settings[name]:g}: omit it"
             )
-    missing = [name for name in given if name not in known]
+    missing = [name for name in options if name not in settings]
     if missing:
         where = (
             "there is no file of ruptures"
@@ -326,11 +328,11 @@ def _duration(
             "and ses as in job.ini",
             fields=("investigation_time", "ses"),
         )
-    sets = known["ses_per_logic_tree_path"]
+    sets = settings["ses_per_logic_tree_path"]
     if not math.isfinite(sets) or sets != int(sets):
         where = "" if ruptures is None or ses is not None else f"{ruptures.top}: "
         raise InputError(f"{where}ses_per_logic_tree_path = {sets:g} is not a whole number")
-    return Duration(known["investigation_time"], int(sets))
+    return Duration(settings["investigation_time"], int(sets))
 
 
 def _shaking(
@@ -340,7 +342,7 @@ def _shaking(
     event_id: IntArray,
     imts: Sequence[str],
 ) -> tuple[IntArray, IntArray, dict[str, FloatArray]]:
-    """Return event and site of each row, and its measures, by event and site."""
+    """Return event, site and measures of each row, sorted by event and site."""
     columns = _measure_columns(head, imts)
     event_name = str(head.column(_EVENT))
     site_name = str(head.column((_SITE_NAME, *_SITE_NUMBER)))
@@ -352,8 +354,8 @@ def _shaking(
     kinds = {event_name: int, site_name: str, **{c: float for c, _ in columns.values()}}
     with closing(head.read(kinds)) as read:
         for part in read:
-            parts["event"].append(_event_places(head, part[event_name], event_id, row))
-            parts["site"].append(_site_places(head, part[site_name], index, row, mesh))
+            parts["event"].append(_event_indices(head, part[event_name], event_id, row))
+            parts["site"].append(_site_indices(head, part[site_name], index, row, mesh))
             for measure, (column, factor) in columns.items():
                 values = part[column]
                 wrong = ~((values >= 0.0) & (values < np.inf))
@@ -365,11 +367,13 @@ def _shaking(
                     )
                 parts[measure].append(factor * values)
             row += part[event_name].size
-    whole = {
-        name: np.concatenate([np.empty(0, np.int64 if name in ("event", "site") else float), *some])
-        for name, some in parts.items()
+    arrays = {
+        name: np.concatenate(
+            [np.empty(0, np.int64 if name in ("event", "site") else float), *chunks]
+        )
+        for name, chunks in parts.items()
     }
-    event, site = whole.pop("event"), whole.pop("site")
+    event, site = arrays.pop("event"), arrays.pop("site")
     key = event * len(sites) + site
     order = np.argsort(key, kind="stable")
     again = order[1:][np.diff(key[order]) == 0]
@@ -379,11 +383,11 @@ def _shaking(
             f"{head.line(line)}: the event {event_id[event[line]]} has a second row for the site "
             f"{sites[site[line]]!r}: one row per event and site is required"
         )
-    return event[order], site[order], {name: values[order] for name, values in whole.items()}
+    return event[order], site[order], {name: values[order] for name, values in arrays.items()}
 
 
 def _measure_columns(head: Table, imts: Sequence[str]) -> dict[str, tuple[str, float]]:
-    """Return column and factor of each measure, by the name that `predict` has for it."""
+    """Return the column and unit factor of each measure, by its name in `predict`."""
     present: dict[IntensityType, str] = {}
     for column in head.names:
         match = _MEASURE.fullmatch(column)
@@ -406,28 +410,28 @@ def _measure_columns(head: Table, imts: Sequence[str]) -> dict[str, tuple[str, f
     return chosen
 
 
-def _event_places(head: Table, numbers: IntArray, event_id: IntArray, row: int) -> IntArray:
-    """Return which of the events, by rising number, each row is of."""
-    places = np.searchsorted(event_id, numbers)
-    absent = event_id[np.minimum(places, event_id.size - 1)] != numbers
+def _event_indices(head: Table, numbers: IntArray, event_id: IntArray, row: int) -> IntArray:
+    """Return the index of the event of each row, in order of event number."""
+    indices = np.searchsorted(event_id, numbers)
+    absent = event_id[np.minimum(indices, event_id.size - 1)] != numbers
     if absent.any():
         first = int(np.flatnonzero(absent)[0])
         raise InputError(
             f"{head.line(row + first)}: the event {numbers[first]} is not in the file of events: "
             "are both from the same job?"
         )
-    return places
+    return indices
 
 
-def _site_places(
+def _site_indices(
     head: Table, texts: NDArray[Any], index: Mapping[str, int], row: int, mesh: Table
 ) -> IntArray:
-    """Return which of the sites each row is of."""
-    places = np.fromiter((index.get(text, -1) for text in texts.tolist()), np.int64, texts.size)
-    if (places < 0).any():
-        first = int(np.flatnonzero(places < 0)[0])
+    """Return the index of the site of each row."""
+    indices = np.fromiter((index.get(text, -1) for text in texts.tolist()), np.int64, texts.size)
+    if (indices < 0).any():
+        first = int(np.flatnonzero(indices < 0)[0])
         raise InputError(
             f"{head.line(row + first)}: the site {texts[first]!r} is not in {mesh.path.name}: are "
             "both from the same job?"
         )
-    return places
+    return indices

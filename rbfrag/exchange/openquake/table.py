@@ -1,4 +1,4 @@
-"""Tables of the OpenQuake engine, as the CSV files that it exports."""
+"""Tables of the OpenQuake engine in its exported CSV files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.files import reading
 
-_STATED = re.compile(r"(\w+)\s*=\s*(?:'([^']*)'|([^,\s\"']+))")
+_KEY_VALUE = re.compile(r"(\w+)\s*=\s*(?:'([^']*)'|([^,\s\"']+))")
 ROWS = 1 << 18
 """Rows that are read at a time."""
 
@@ -29,19 +29,19 @@ def _finite(text: str) -> float:
     return value
 
 
-def _whole(text: str) -> int:
+def _integer(text: str) -> int:
     if not -(2**63) <= (value := int(text)) < 2**63:
         raise ValueError(text)
     return value
 
 
-def _some(text: str) -> str:
+def _nonempty(text: str) -> str:
     if not text.strip():
         raise ValueError(text)
     return text
 
 
-_KINDS: Mapping[type, Callable[[str], object]] = {int: _whole, float: _finite, str: _some}
+_KINDS: Mapping[type, Callable[[str], object]] = {int: _integer, float: _finite, str: _nonempty}
 _IN_WORDS = {int: "a whole number", float: "a number", str: "a name"}
 
 
@@ -58,49 +58,51 @@ def _next(parts: Any, too_many_cells: type[Warning]) -> Any:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a job: what stands above its rows, and how they are read.
+    """A table of a job: metadata above its rows, column names and reader.
 
     Args:
         path: the file.
-        stated: what the comment of its first line states, by name.
+        metadata: what the comment of its first line states, by name.
         names: names of the columns.
         lines: number of lines above the data.
     """
 
     path: Path
-    stated: Mapping[str, str]
+    metadata: Mapping[str, str]
     names: tuple[str, ...]
     lines: int
 
     @classmethod
     def of(cls, path: Path) -> Table:
         """Return the table of a CSV file."""
-        stated: dict[str, str] = {}
+        metadata: dict[str, str] = {}
         with reading(path, "an export of OpenQuake"), closing(_lines(path)) as lines:
             for number, row in lines:
                 if row and row[0].lstrip().startswith("#"):
-                    matches = _STATED.finditer(",".join(row))
-                    stated |= {one.group(1): one.group(2) or one.group(3) or "" for one in matches}
+                    matches = _KEY_VALUE.finditer(",".join(row))
+                    metadata |= {
+                        match.group(1): match.group(2) or match.group(3) or "" for match in matches
+                    }
                     continue
                 names = tuple(cell.strip() for cell in row)
                 for name in names:
                     if names.count(name) > 1:
                         raise InputError(f"{path}, line {number}: the column {name!r} occurs twice")
-                return cls(path, stated, names, number)
+                return cls(path, metadata, names, number)
         raise InputError(f"{path}: it ends before the header: export it again")
 
     @property
     def head(self) -> str:
-        """The place of the names of the columns, for messages."""
+        """Position of the column names, for messages."""
         return f"{self.path}, line {self.lines}"
 
     @property
     def top(self) -> str:
-        """The place of what the file has."""
+        """Position of the metadata of the file, for messages."""
         return f"{self.path}, line 1"
 
     def column(self, choices: Sequence[str], *, needed: bool = True) -> str | None:
-        """Return which of some names a column has."""
+        """Return the first of several names that is a column."""
         name = next((name for name in choices if name in self.names), None)
         if name is None and needed:
             raise InputError(
@@ -110,11 +112,11 @@ class Table:
         return name
 
     def line(self, row: int | np.integer[Any]) -> str:
-        """Return the place of a row of data for messages."""
+        """Return the position of a row of data for messages."""
         return f"{self.path}, line {self.lines + 1 + int(row)}"
 
     def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
-        """Yield some columns, some hundred thousand rows at a time.
+        """Yield columns, some hundred thousand rows at a time.
 
         Raises:
             InputError: a cell holds no such thing, or a line lacks cells; the message names it.
@@ -149,8 +151,8 @@ class Table:
             ) as error:
                 raise self._trouble(columns) or InputError(f"{self.path}: {error}") from None
 
-    def whole(self, columns: Mapping[str, type]) -> dict[str, NDArray[Any]]:
-        """Return some columns whole."""
+    def read_all(self, columns: Mapping[str, type]) -> dict[str, NDArray[Any]]:
+        """Return complete columns."""
         with closing(self.read(columns)) as read:
             parts = list(read)
         empty = {int: np.int64, float: np.float64, str: object}
@@ -160,7 +162,7 @@ class Table:
         }
 
     def _trouble(self, columns: Mapping[str, type]) -> InputError | None:
-        """Return the first line that cannot be read in words."""
+        """Return an error that describes the first unreadable line."""
         place = {name: self.names.index(name) for name in columns}
         for number, row in _lines(self.path):
             where = f"{self.path}, line {number}"

@@ -1,4 +1,4 @@
-"""Critical values out of the table of another database: `rbfrag db import`."""
+"""Critical values imported from the table of another database: `rbfrag db import`."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def import_critical_values(
     *,
     db: str | os.PathLike[str] | None = None,
 ) -> MergeReport:
-    """Merge critical values of toppling, with the measures of their motions, out of a table.
+    """Merge a table of critical values of toppling, with their motions, into the database.
 
     A motion is its earthquake and its name.
 
@@ -78,8 +78,8 @@ def import_critical_values(
 
 
 def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], float]:
-    """Return where each field stands, and the smallest k_r/PGA that was looked at."""
-    document, known = toml_document(source_text(path, "a map of columns"), path), {}
+    """Return the columns of the fields, and the smallest k_r/PGA that was searched."""
+    document, fields = toml_document(source_text(path, "a map of columns"), path), {}
     columns, limit = document.get("columns"), document.get("search_limit", SEARCH_LIMIT)
     if not isinstance(columns, dict) or not is_number(limit) or not 0.0 < limit < 1.0:
         raise InputError(f"{path}: [columns] and search_limit (k_r/PGA, from 0 to 1) are required")
@@ -87,8 +87,8 @@ def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], 
     if missing or len(columns.keys() & set(CRITICAL)) != 1:
         missing = missing or [" or ".join(CRITICAL)]
         raise InputError(f"{path}: [columns] must name {', '.join(missing)}, each once")
-    for field, stated in columns.items():
-        about = {"column": stated} if isinstance(stated, str) else stated
+    for field, entry in columns.items():
+        about = {"column": entry} if isinstance(entry, str) else entry
         words = ("unit",) if field in UNITS else WORDS.get(field, ())
         if field not in FIELDS:
             raise InputError(
@@ -101,12 +101,12 @@ def _read_map(path: str | os.PathLike[str]) -> tuple[dict[str, dict[str, str]], 
         if field in UNITS and unit_factor(UNITS[field], unit) is None:
             ours = ", ".join(FACTORS[UNITS[field]])
             raise InputError(f"{path}: the unit {unit[:40]!r} of {field} is not one of {ours}")
-        known[field] = {key: str(value) for key, value in about.items()}
-    return known, float(limit)
+        fields[field] = {key: str(value) for key, value in about.items()}
+    return fields, float(limit)
 
 
 def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.DataFrame:
-    """Return the fields of each line, in our units; the index are the lines."""
+    """Return the fields of each line, in the units of the database, indexed by line number."""
     import pandas as pd
 
     text = source_text(source, "a table of critical values")
@@ -130,8 +130,8 @@ def _read_rows(source: Path, columns: Mapping[str, Mapping[str, str]]) -> pd.Dat
 
     for field, about in columns.items():
         if about["column"] not in raw:
-            known = ", ".join(map(str, raw))[:200]
-            raise InputError(f"{source} has no column {about['column']!r} of {field}: {known}")
+            header = ", ".join(map(str, raw))[:200]
+            raise InputError(f"{source} has no column {about['column']!r} of {field}: {header}")
         cells = raw[about["column"]]
         if field in KEY[:2]:
             rows[field] = cells
@@ -170,8 +170,8 @@ def _store(rows: pd.DataFrame, place: Path, settings: Mapping[str, Any], started
     records = []
     with opened_database(place, create=True) as engine, engine.begin() as connection:
         for (event, name), group in rows.groupby([*KEY[:2]]):
-            known = {k: v for k, v in group.iloc[0].items() if v == v}
-            info = EarthquakeInfo(event, magnitude=known.get("magnitude"), guessed=False)
+            first_row = {k: v for k, v in group.iloc[0].items() if v == v}
+            info = EarthquakeInfo(event, magnitude=first_row.get("magnitude"), guessed=False)
             sha256 = hashlib.sha256(canonical_json({IMPORTED: [event, name]}).encode()).hexdigest()
             values = {
                 "recording_id": recording_id_for(connection, info, name, ""),
@@ -179,7 +179,7 @@ def _store(rows: pd.DataFrame, place: Path, settings: Mapping[str, Any], started
                 "final_velocity_m_s": 0.0, "final_displacement_m": 0.0, "source_file": name,
                 "trace_index": 0, "file_format": IMPORTED, "flags": json.dumps([IMPORTED]),
                 "remarks": "[]", "source_sha256": sha256, "added": started,
-                "samples_sha256": sha256, **{field: known.get(field) for field in MEASURES},
+                "samples_sha256": sha256, **{field: first_row.get(field) for field in MEASURES},
             }  # fmt: skip
             motion_id = insert_row(connection, motion, values)
             samples: dict[str, Any] = {"motion_sha256": sha256, "dt_s": 1.0}
@@ -192,7 +192,7 @@ def _store(rows: pd.DataFrame, place: Path, settings: Mapping[str, Any], started
 
 
 def _result(row: Mapping[str, Any], settings: Mapping[str, Any]) -> CriticalResult:
-    """Return a critical value as a search returns it: its block was seen to topple."""
+    """Return a critical value in the form of a search result: its block was observed to topple."""
     ratio, p2, kr = row["kr_over_pga"], row["p2"], row["kr_over_pga"] * row["pga_g"]
     values = {"kr_over_pga": ratio, "kr": kr, "y_m_s": kr * STANDARD_GRAVITY_M_S2 / math.sqrt(p2)}
     seen = np.array([ratio] if ratio > 0.0 else [])

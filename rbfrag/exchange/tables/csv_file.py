@@ -1,4 +1,4 @@
-"""A table of blocks as CSV: with commas, or as spreadsheets of decimal commas write it."""
+"""Tables of blocks as CSV: with commas, or with semicolons and decimal commas."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _BOM = b"\xef\xbb\xbf"
 
 
 def dialect_of(origin: Path) -> Dialect:
-    """Return how a file is written, of its header and its first cells."""
+    """Return the dialect of a CSV file, detected from its header and first cells."""
     with origin.open("rb") as file:
         start = file.read(_PEEK)
     encoding = encoding_of(start)
@@ -51,7 +51,9 @@ def dialect_of(origin: Path) -> Dialect:
     def rows(delimiter: str) -> list[list[str]]:
         return list(csv.reader(lines[:ROWS_ABOVE], delimiter=delimiter))
 
-    delimiter = max(",;\t", key=lambda each: (fields_stated(rows(each)), lines[0].count(each)))
+    delimiter = max(
+        ",;\t", key=lambda candidate: (fields_stated(rows(candidate)), lines[0].count(candidate))
+    )
     decimal = "."
     if delimiter != ",":
         edge = f'[{delimiter}"\\s]'
@@ -65,7 +67,7 @@ def dialect_of(origin: Path) -> Dialect:
 
 
 def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
-    """Return a CSV file that is open; the stack closes it.
+    """Return an open CSV file, which the stack closes.
 
     A table of commas is, if it shall be fast, read by pyarrow where that is installed, in a tenth
     of the time; from the first cell on that is not a number, it is read cell by cell as others are.
@@ -76,12 +78,12 @@ def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
     names, line, rows, remarks = split_header(_rows(reader), "line")
 
     def read(numeric: Container[str]) -> Parts:
-        done: int | None = 0
+        rows_read: int | None = 0
         if fast and dialect.delimiter == "," and dialect.encoding != "utf-16":
-            done = yield from _by_arrow(origin, names, line, numeric)
-        if done is not None:
+            rows_read = yield from _by_arrow(origin, names, line, numeric)
+        if rows_read is not None:
             decimal = "," if dialect.decimal == "," else ".,"
-            yield from parts_of_rows(names, islice(rows, done, None), decimal=decimal)
+            yield from parts_of_rows(names, islice(rows, rows_read, None), decimal=decimal)
 
     return TableFile(names, read, remarks, "line", dialect)
 
@@ -98,7 +100,7 @@ def _rows(reader: Any) -> Rows:
 def _by_arrow(
     origin: Path, names: Sequence[str], line: int, numeric: Container[str]
 ) -> Generator[TablePart, None, int | None]:
-    """Yield parts as long as that goes; return how many rows they have, None for all there are."""
+    """Yield parts as far as pyarrow can read them; return the number of rows read, None for all."""
     try:
         arrow, _ = pyarrow()
         from pyarrow import csv as arrow_csv
@@ -106,7 +108,7 @@ def _by_arrow(
         return 0
     columns = keys(names)
     kinds = {name: arrow.float64() if name in numeric else arrow.string() for name in columns}
-    above, done = line + sum(name.count("\n") for name in names), 0
+    above, rows_read = line + sum(name.count("\n") for name in names), 0
     try:
         batches = arrow_csv.open_csv(
             origin,
@@ -119,27 +121,27 @@ def _by_arrow(
             ),
         )
         for batch in batches:
-            if not _is_a_line_each(batch, arrow):
-                return done
+            if not _rows_are_lines(batch, arrow):
+                return rows_read
             cells: dict[str, Any] = {
                 name: np.array(column.to_numpy(zero_copy_only=False)) if name in numeric else column
                 for name, column in zip(columns, batch.columns, strict=True)
             }
-            first = above + done + 1
+            first = above + rows_read + 1
             if batch.num_rows:
                 yield TablePart(range(first, first + batch.num_rows), cells)
-            done += batch.num_rows
+            rows_read += batch.num_rows
     except arrow.ArrowException:
-        return done
+        return rows_read
     return None
 
 
-def _is_a_line_each(batch: Any, arrow: Any) -> bool:
-    """Whether each row is one line of the file, and none of them is blank."""
+def _rows_are_lines(batch: Any, arrow: Any) -> bool:
+    """Return whether each row is one line of the file, and none of them is blank."""
     from pyarrow import compute
 
-    texts = [each for each in batch.columns if arrow.types.is_string(each.type)]
-    if any(compute.any(compute.match_substring(each, "\n")).as_py() for each in texts):
+    texts = [column for column in batch.columns if arrow.types.is_string(column.type)]
+    if any(compute.any(compute.match_substring(column, "\n")).as_py() for column in texts):
         return False
     return not blank_rows(arrow, batch).any()
 

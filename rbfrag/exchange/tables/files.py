@@ -1,4 +1,4 @@
-"""The files that a table of blocks is read from and written to: one reader, one writer."""
+"""Files of block tables: one reader and one writer for all formats."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def open_table(
     *,
     sheet: str | None = None,
 ) -> TableFile:
-    """Return a table that is open.
+    """Return an open table of blocks.
 
     Args:
         source: a table's file, a file of GeoJSON points, or columns by name, such as a pandas
@@ -98,7 +98,7 @@ def _of_one_part(part: TablePart, word: str) -> TableFile:
 
 
 def _given_part(columns: Mapping[str, Any]) -> TablePart:
-    """Return columns by name, such as a pandas table, as the rows of a table."""
+    """Return columns given by name, such as a pandas table, as the rows of a table."""
     cells = {str(name): np.ravel(np.asarray(column)) for name, column in columns.items()}
     if len({column.size for column in cells.values()}) > 1:
         sizes = ", ".join(f"{name} {column.size}" for name, column in cells.items())
@@ -149,7 +149,7 @@ def table_writer(
 
 
 def write_csv_notes(target: Path, notes: Sequence[str]) -> None:
-    """Write the warnings about a CSV table next to it, as CSV on the Web has them (W3C, 2015).
+    """Write the warnings about a CSV table to a metadata file, as CSV on the Web (W3C, 2015).
 
     The file is called as the table, with ``-metadata.json`` behind. Other types of tables hold
     their notes themselves.
@@ -172,7 +172,7 @@ def write_block_table(
     excel_text: bool = False,
     notes: Sequence[str] = (),
 ) -> Path:
-    """Write a table of blocks, whole or not at all, and return its path.
+    """Write a table of blocks, completely or not at all, and return its path.
 
     Numbers keep all their digits. NaN is an empty cell in CSV and null in Parquet.
 

@@ -1,4 +1,4 @@
-"""A table of blocks as Parquet, and as Arrow has it."""
+"""Tables of blocks as Parquet files and Arrow arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rbfrag.results.diagnostic import as_documents
 
 
 def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
-    """Return a Parquet file that is open; the stack closes it."""
+    """Return an open Parquet file, which the stack closes."""
     arrow, parquet = pyarrow()
     try:
         file = stack.enter_context(parquet.ParquetFile(origin))
@@ -68,7 +68,7 @@ def _is_text(arrow: Any, column: Any) -> bool:
 
 
 def _refuse_other_text(arrow: Any, column: Any, where: str, first: int) -> None:
-    """Refuse text that is not UTF-8, which Parquet does not check."""
+    """Reject text that is not UTF-8, which Parquet does not check."""
     try:
         column.validate(full=True)
     except arrow.ArrowInvalid:
@@ -80,7 +80,7 @@ def _refuse_other_text(arrow: Any, column: Any, where: str, first: int) -> None:
 
 
 def blank_rows(arrow: Any, batch: Any) -> NDArray[np.bool_]:
-    """Return which rows have no cell that is filled."""
+    """Return which rows have only empty cells."""
     import pyarrow.compute as compute
 
     blank = np.ones(batch.num_rows, dtype=np.bool_)
@@ -120,7 +120,7 @@ def parquet_writer(
         arrays |= {name: arrow_array(arrow, answer[name]) for name in answers}
         table = arrow.table(arrays)
         if not open_file:
-            texts = [each.name for each in table.schema if arrow.types.is_string(each.type)]
+            texts = [column.name for column in table.schema if arrow.types.is_string(column.type)]
             parquet_file = parquet.ParquetWriter(partial, table.schema, use_dictionary=texts)
             open_file.append(stack.enter_context(parquet_file))
             stack.callback(add_notes)
@@ -130,7 +130,7 @@ def parquet_writer(
 
 
 def arrow_array(arrow: Any, values: NDArray[Any], *, bare: bool = False) -> Any:
-    """Return an array as Arrow has it: NaN is null; `bare` makes empty texts null, too."""
+    """Return an Arrow array: NaN is null; with `bare`, empty texts are null, too."""
     if values.dtype.kind in "OU":
         empty = np.equal(values, "") if bare else None
         return arrow.array(values, type=arrow.string(), mask=empty)
@@ -140,7 +140,7 @@ def arrow_array(arrow: Any, values: NDArray[Any], *, bare: bool = False) -> Any:
 def arrow_columns(
     arrow: Any, columns: Iterable[tuple[str, Any]], *, bare: bool = False
 ) -> dict[str, Any]:
-    """Return columns as Arrow arrays; `bare` leaves empty texts out."""
+    """Return columns as Arrow arrays; with `bare`, empty texts are null."""
     arrays: dict[str, Any] = {}
     for name, column in columns:
         if isinstance(column, list):

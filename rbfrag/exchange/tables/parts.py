@@ -1,4 +1,4 @@
-"""Rows of a table of blocks, some thousand at a time, whatever file they come from."""
+"""Rows of a table of blocks, a few thousand at a time, independent of the file format."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROWS = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class TablePart:
-    """Some rows of a table.
+    """A range of rows of a table.
 
     Args:
         lines: number of each row in its file: of its first line in CSV, of its row of the sheet.
@@ -43,14 +43,14 @@ class TablePart:
             return self
         keep = [i for i in range(len(self.lines)) if i not in {*rows}]
 
-        def kept(column: Any) -> Any:
+        def select(column: Any) -> Any:
             if isinstance(column, list):
                 return [column[i] for i in keep]
             return column[keep] if isinstance(column, np.ndarray) else column.take(keep)
 
         return TablePart(
             [self.lines[i] for i in keep],
-            {name: kept(column) for name, column in self.cells.items()},
+            {name: select(column) for name, column in self.cells.items()},
             {new: self.faults[old] for new, old in enumerate(keep) if old in self.faults},
             self.decimal,
         )
@@ -58,7 +58,7 @@ class TablePart:
     def numbers(
         self, column: str, unit: str = "", factor: float = 1.0
     ) -> tuple[NDArray[np.float64], dict[int, str]]:
-        """Return the numbers of a column, NaN where a cell is empty, and what the others are.
+        """Return the numbers of a column, NaN for empty cells, and the errors of invalid cells.
 
         Args:
             column: its name.
@@ -101,7 +101,7 @@ Rows = Iterator[tuple[int, Sequence[Any]]]
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a CSV file is written.
+    """Format of a CSV file.
 
     Args:
         delimiter: what stands between cells: a comma, a semicolon or a tab.
@@ -118,7 +118,7 @@ class Dialect:
 
 @dataclass(eq=False)
 class TableFile:
-    """A table that is open.
+    """An open table.
 
     Args:
         names: what its columns are called; empty for one without a name.
@@ -138,11 +138,11 @@ class TableFile:
 
     @property
     def header(self) -> list[str]:
-        """What the columns that have a name are called."""
+        """Names of the columns, without unnamed ones."""
         return [name for name in self.names if name]
 
     def parts(self, numeric: Container[str]) -> Parts:
-        """Yield the parts without the columns that have no name."""
+        """Yield the parts without unnamed columns."""
         nameless = [key for key, name in zip(keys(self.names), self.names, strict=True) if not name]
         for part in self.read(numeric):
             for key in nameless:
@@ -153,12 +153,12 @@ class TableFile:
 
 
 def keys(names: Sequence[str]) -> list[str]:
-    """Return what cells are found by: the names of columns, or which has none."""
+    """Return the keys of the cells: the names of columns, or a text for unnamed ones."""
     return [name or f"column {i} without a name" for i, name in enumerate(names, 1)]
 
 
 def split_header(rows: Rows, word: str) -> tuple[list[str], int, Rows, list[Diagnostic]]:
-    """Return the names of columns, the number of their row, the rows below, and what to say.
+    """Return the column names, the number of their row, the rows below, and the remarks.
 
     Args:
         rows: the rows of a table.
@@ -187,22 +187,22 @@ def parts_of_rows(
         decimal: as of :class:`TablePart`.
     """
     width = len(names)
-    while some := list(islice(rows, ROWS)):
-        faults, kept = {}, []
-        for i, (_, row) in enumerate(some):
+    while chunk := list(islice(rows, ROWS)):
+        faults, chunk_rows = {}, []
+        for i, (_, row) in enumerate(chunk):
             if len(row) != width:
                 size = max((j for j, cell in enumerate(row, 1) if cell or cell == 0), default=0)
                 if size > width or (len(row) < width and empty is not None):
                     faults[i] = f"{max(size, len(row[:width]))} cells under {width} columns"
                 row = [*row[:width], *[empty] * (width - len(row))]
-            kept.append(row)
-        columns = map(list, zip(*kept, strict=True))
-        lines = [line for line, _ in some]
+            chunk_rows.append(row)
+        columns = map(list, zip(*chunk_rows, strict=True))
+        lines = [line for line, _ in chunk]
         yield TablePart(lines, dict(zip(keys(names), columns, strict=True)), faults, decimal)
 
 
 def _number(cell: object, decimal: str) -> float:
-    """Return the number of a cell, or raise a ValueError that says what it is instead."""
+    """Return the number of a cell, or raise a ValueError that describes the content."""
     if cell is None:
         return np.nan
     if isinstance(cell, bool):
@@ -236,7 +236,7 @@ def _is_number(text: str) -> bool:
 
 
 def pyarrow() -> tuple[Any, Any]:
-    """Return pyarrow and pyarrow.parquet, or say which extra brings them."""
+    """Return pyarrow and pyarrow.parquet, or name the extra that installs them."""
     try:
         import pyarrow as arrow
         import pyarrow.parquet as parquet
@@ -246,7 +246,7 @@ def pyarrow() -> tuple[Any, Any]:
 
 
 def cells_of(column: Any) -> list[Any]:
-    """Return what a column's cells hold as text: nothing for NaN and null."""
+    """Return the cells of a column as text; empty for NaN and null."""
     if not isinstance(column, np.ndarray):
         values: list[Any] = column if isinstance(column, list) else column.to_pylist()
         return ["" if value is None else value for value in values]
@@ -260,7 +260,7 @@ def cells_of(column: Any) -> list[Any]:
 def columns_to_write(
     part: TablePart, header: Sequence[str], numeric: Container[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the columns of a part: numbers as arrays, but for those with a cell that is none."""
+    """Yield the columns of a part: numbers as arrays, unless a cell is not a number."""
     for name in header:
         cells = part.cells[name]
         if isinstance(cells, list) and name in numeric:

@@ -49,7 +49,7 @@ _NOT_COMPUTED = re.compile(
 
 
 def openpyxl() -> Any:
-    """Return openpyxl, or say which extra brings it."""
+    """Return openpyxl, or name the extra that installs it."""
     try:
         import openpyxl as library
     except ImportError:
@@ -72,7 +72,7 @@ def _open_document_rows(origin: Path) -> dict[str, Iterable[Sequence[Any]]]:
 
 
 def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFile:
-    """Return a sheet that is open; the stack closes its workbook.
+    """Return an open sheet, whose workbook the stack closes.
 
     Formulas are read as the values that Excel has computed and stored; rows without any cell are
     passed over.
@@ -93,9 +93,12 @@ def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFil
         else:
             book = library.load_workbook(origin, read_only=True, data_only=True, keep_links=False)
             stack.callback(book.close)
-            for each in book.worksheets:
-                each.reset_dimensions()  # what programs state there is not always so
-            sheets = {each.title: each.iter_rows(values_only=True) for each in book.worksheets}
+            for worksheet in book.worksheets:
+                worksheet.reset_dimensions()  # what programs state there is not always so
+            sheets = {
+                worksheet.title: worksheet.iter_rows(values_only=True)
+                for worksheet in book.worksheets
+            }
         if not sheets:
             raise InputError(f"{origin}: the workbook has no sheet")
         if sheet is not None and sheet not in sheets:
@@ -140,7 +143,7 @@ def _damage(origin: Path) -> Iterator[None]:
 
 
 def _check(origin: Path) -> None:
-    """Refuse a workbook that is too large, or that holds formulas without values."""
+    """Reject a workbook that is too large, or that has formulas without values."""
     with zipfile.ZipFile(origin) as archive:
         members = archive.infolist()
         if sum(member.file_size for member in members) > MOST_BYTES:
@@ -231,9 +234,9 @@ def workbook_writer(
             return
         other = book.create_sheet("notes")
         other.append(["code", "note", "rows"])
-        for each in as_documents(notes):
-            rows = ", ".join(str(row + 1) for row in each["rows"]) or "all"
-            other.append([each["code"], cell_of(each["text"]), rows])
+        for document in as_documents(notes):
+            rows = ", ".join(str(row + 1) for row in document["rows"]) or "all"
+            other.append([document["code"], cell_of(document["text"]), rows])
 
     def close(kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
@@ -248,7 +251,7 @@ def workbook_writer(
 
 
 def _own_number(text: str) -> int | float | None:
-    """Return the number that a text is to the letter, or nothing: 007 and 1.50 stay texts."""
+    """Return the number that a text represents exactly, or None: 007 and 1.50 remain texts."""
     if not text[-1].isdigit() or len(text) > 24:
         return None
     try:

@@ -1,5 +1,6 @@
-"""Stored models against today's data: whether these changed, and what fits without each earthquake
-say."""
+"""Comparison of stored models with the current data: changes of the data, and
+leave-one-earthquake-out calibration.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ State = Literal["unchanged", "changed", "no data", "unreadable"]
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """Comparison of the data of a model with those that it was fitted to.
+    """State of the data of one model: unchanged, changed or missing.
 
     Args:
         state: ``unchanged``; ``changed`` (fit it again); ``no data`` (the database holds models
@@ -78,7 +79,7 @@ class ModelChecks(ResultList):
 
 
 def selection_of(row: ModelRow) -> Selection:
-    """Return what a fit was asked to read."""
+    """Return the data selection of a fit."""
     diagnostics = cast("Mapping[str, Any]", row.diagnostics)
     return {
         "suite": diagnostics.get("suite"),
@@ -90,19 +91,19 @@ def selection_of(row: ModelRow) -> Selection:
 
 
 def source_of(connection: Connection, row: ModelRow) -> FitSource:
-    """Return what the fit of a stored model would read today."""
+    """Return the current data for the fit of a stored model."""
     block = method_named(row.method).block
     source = read_source(connection, block, kind=row.kind, **selection_of(row))
     return replace(source, narrow=narrow_of(row))
 
 
 def narrow_of(row: ModelRow) -> float:
-    """Return the greatest relative width of critical values that a fit counted as found."""
+    """Return the maximum relative width at which a fit counted a critical value as found."""
     return float(cast("float", row.diagnostics.get("narrow", CERTIFIED)))
 
 
 def check_models(connection: Connection, rows: list[ModelRow]) -> ModelChecks:
-    """Compare the fingerprint of each model with that of the data its fit would read today."""
+    """Compare the fingerprint of each model with that of its current data."""
     sources: dict[tuple[Any, ...], FitSource] = {}
     return ModelChecks([_check(connection, row, sources) for row in rows])
 
@@ -130,7 +131,7 @@ def _check(
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Calibration of one model on earthquakes left out.
+    """Calibration of one model on held-out earthquakes.
 
     Args:
         bins: predicted and observed.
@@ -144,7 +145,7 @@ class HeldOut:
 
 
 def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> HeldOut:
-    """Fit a stored model again, once without each earthquake.
+    """Fit a stored model again, holding out each earthquake in turn.
 
     Args:
         name: the model; None for the default.

@@ -1,4 +1,4 @@
-"""What earthquakes share: clustered covariance, resamples of earthquakes, earthquakes left out."""
+"""Errors clustered by earthquake: sandwich covariance, bootstrap and jackknife over earthquakes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rbfrag.solver.results import FloatArray
 
 
 def event_derivatives(rows: Likelihood, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return score and information of each earthquake, shapes (G, k) and (G, k, k)."""
+    """Return the score and the information of each earthquake, shapes (G, k) and (G, k, k)."""
     parts = [rows.only(rows.event == e).derivatives(b) for e in np.unique(rows.event)]
     return np.array([score for score, _ in parts]), np.array([part for _, part in parts])
 
 
 def jackknife_steps(rows: Likelihood, b: FloatArray) -> FloatArray:
-    """Return d_e = (H - H_e)⁻¹ s_e of each earthquake, shape (G, k).
+    """Return the jackknife steps d_e = (H - H_e)⁻¹ s_e of each earthquake, shape (G, k).
 
     One Newton step from the fit to all data to the one without earthquake e.
     """
@@ -31,7 +31,7 @@ def jackknife_steps(rows: Likelihood, b: FloatArray) -> FloatArray:
 
 
 def cr3(steps: FloatArray) -> FloatArray:
-    """Return (G-1)/G · Σ d dᵀ for the G rows d of `steps`: the covariance by leaving out.
+    """Return the jackknife covariance (CR3), (G-1)/G · Σ d dᵀ for the G rows d of `steps`.
 
     With unequal earthquakes CR1 is too small; this is not (Bell and McCaffrey 2002, Survey
     Methodology 28(2), 169-181).
@@ -89,7 +89,7 @@ def bootstrap(
 def left_out(
     event: NDArray[np.intp], fit: Callable[[NDArray[np.bool_]], FloatArray]
 ) -> dict[int, FloatArray]:
-    """Return the parameters of the fit without each earthquake, by its number.
+    """Return the parameters of the fit without each earthquake, by earthquake index.
 
     Args:
         event: number of each row's earthquake, shape (n,).

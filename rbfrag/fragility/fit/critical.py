@@ -1,4 +1,4 @@
-"""Fits of critical values with normal scatter of a logarithm, some of them censored.
+"""Fits of critical values with a lognormal dispersion; some values are censored.
 
 One likelihood serves all: a block that just fails has eta = 0 on average, with the scatter that the
 method's formula states.
@@ -33,7 +33,7 @@ _LN_SIGMA = "ln_sigma"
 def fit_lognormal(
     data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
-    """Fit ln y* = a + b ln x (+ (M-1) ln p) with normal scatter sigma.
+    """Fit ln y* = a + b ln x (+ (M-1) ln p) with lognormal dispersion sigma.
 
     Combinations without a critical value above the search limit count as "below the limit".
     Covariance is clustered by earthquake; a bootstrap by earthquake is reported beside it.
@@ -45,18 +45,18 @@ def fit_lognormal(
     # ln y* = a + b ln x + (M - 1) ln p + sigma Z with Z standard normal. A critical value
     # contributes its density to the likelihood, a censored one the probability to lie below the
     # search limit.
-    usable = (data.x > 0.0) & (data.y > 0.0)
-    values = {name: value[usable] for name, value in data.values.items()}
+    is_positive = (data.x > 0.0) & (data.y > 0.0)
+    values = {name: value[is_positive] for name, value in data.values.items()}
     line, least = _line(form, names, values), None
     # An undecided interval contributes the probability to lie between its ends.
     if data.least_y_m_s is not None:
-        lower = data.least_y_m_s[usable]
+        lower = data.least_y_m_s[is_positive]
         ratio = np.where(np.isfinite(lower), lower / values["y_m_s"], 1.0)
         ends = {name: values[name] * ratio for name in ("y_m_s", "kr")}
         least = _line(form, names, {**values, **ends})[1]
     # In Olsen's parameters (coefficients/sigma, 1/sigma) the likelihood is concave (Olsen 1978):
     # Newton's method finds its one maximum, which is then transformed back, errors by the Jacobian.
-    rows, start = censored_line(*line, data.observed[usable], data.event[usable], least)
+    rows, start = censored_line(*line, data.observed[is_positive], data.event[is_positive], least)
     theta, _ = maximise(rows, start)
     # Olsen's parameters put the scatter last
     place = names.index(_LN_SIGMA)
@@ -89,18 +89,18 @@ def fit_lognormal(
     )  # fmt: skip
     # Predictions for an earthquake come from the fit to all others: scores are those of unseen
     # shaking.
-    others = left_out(rows.event, lambda rest: maximise(rows.only(rest), theta)[0])
+    jackknife = left_out(rows.event, lambda rest: maximise(rows.only(rest), theta)[0])
     in_sample = probabilities(method, form, data, b)
     held_out, density = in_sample.copy(), rows.log_likelihood(theta)
     held_density = density.copy()
-    for event, part in others.items():
-        own = rows.event == event
-        held_density[own] = rows.only(own).log_likelihood(part)
-        here = data.event == event
-        held_out[here] = probabilities(method, form, data, natural(part))[here]
+    for event, part in jackknife.items():
+        fitted_rows = rows.event == event
+        held_density[fitted_rows] = rows.only(fitted_rows).log_likelihood(part)
+        event_rows = data.event == event
+        held_out[event_rows] = probabilities(method, form, data, natural(part))[event_rows]
     residual = np.full(data.x.size, np.nan)
     line = rows.values["y"] - rows.values["columns"] @ (theta[:-1] / theta[-1])
-    residual[usable] = np.where(rows.observed, line, np.nan)
+    residual[is_positive] = np.where(rows.observed, line, np.nan)
     return method_result(
         data,
         estimates,
@@ -121,17 +121,17 @@ def fit_lognormal(
 
 
 def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> MethodResult:
-    """Fit a method whose formula states eta and scatter, to found and censored rows.
+    """Fit a method whose formula gives eta and the dispersion, to observed and censored rows.
 
     The covariance is that of the fits that each leave an earthquake out.
     """
     form = method.forms[term.name]
     rows = censored_rows(data, form)
     b = most_likely(rows, np.array(form.start))
-    others = left_out(rows.event, lambda rest: most_likely(rows.only(rest), b))
+    jackknife = left_out(rows.event, lambda rest: most_likely(rows.only(rest), b))
     cr1, naive = (np.sqrt(np.diag(c)) for c in sandwich(rows, b))
     estimates = Estimates(
-        form.parameters, b, np.array(list(others.values())) - b,
+        form.parameters, b, np.array(list(jackknife.values())) - b,
         bootstrap(
             rows.event, lambda times: maximise(rows, b, times=times, tolerance=1e-7)[0],
             replicates=REPLICATES // 4, seed=seed,
@@ -141,9 +141,9 @@ def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> Met
     )  # fmt: skip
     in_sample = probabilities(method, form, data, b)
     held_out = in_sample.copy()
-    for event, part in others.items():
-        here = data.event == event
-        held_out[here] = probabilities(method, form, data, part)[here]
+    for event, part in jackknife.items():
+        event_rows = data.event == event
+        held_out[event_rows] = probabilities(method, form, data, part)[event_rows]
     return method_result(data, estimates, in_sample, held_out)
 
 
@@ -158,7 +158,7 @@ def censored_rows(data: FitData, form: Form) -> CensoredNormal:
 
 
 def most_likely(rows: CensoredNormal, start: FloatArray) -> FloatArray:
-    """Return the parameters under which the rows are likeliest."""
+    """Return the maximum-likelihood parameters of the rows."""
     b, _ = maximise(rows, start, tolerance=1e-15)
     if not np.all(np.isfinite(b)) or np.abs(rows.derivatives(b)[0]).max() > 1e-4 * rows.event.size:
         raise FitError(
@@ -169,7 +169,7 @@ def most_likely(rows: CensoredNormal, start: FloatArray) -> FloatArray:
 
 
 def probabilities(method: Method, form: Form, data: FitData, b: FloatArray) -> FloatArray:
-    """Return P of the blocks of the grid, 0 where there is no shaking, shape (n, m)."""
+    """Return P of the blocks of the grid, 0 without shaking, shape (n, m)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         eta = form.eta(b.tolist(), data.blocks, arrays()).eta
         p = np.asarray(method.link.probability(eta, arrays()), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What fits read: critical values and outcomes of one kind, as rows of a fit.
+"""Data of a fit: critical values and outcomes of one kind, as rows.
 
 The same three steps serve every kind: the database's columns are a :class:`FitSource`; what
 describes the block says how they become the points at which blocks just fail and the grid of blocks
@@ -60,7 +60,7 @@ _CENSORED = ("below_limit", "no_motion")
 
 @dataclass(frozen=True, eq=False)
 class FitSource:
-    """Combinations with all that the methods of fitting read, columns of equal length.
+    """Combinations of block and motion with all data for fitting, columns of equal length.
 
     Args:
         xp_m_s: toppling spectrum at each combination's p² and polarity [m/s], shape (n,); NaN
@@ -95,7 +95,7 @@ class FitSource:
         return cls(table, np.full(table.p2.size, np.nan), k, np.full(k.shape, np.nan))
 
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
-        """Return some of the combinations."""
+        """Return a subset of the combinations."""
         columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         for name in ("table", "of_block", "structures", "narrow"):
             del columns[name]
@@ -109,7 +109,7 @@ class FitSource:
     def judged_outcomes(
         self, strength: FloatArray, critical: FloatArray, least: FloatArray
     ) -> tuple[FloatArray, str]:
-        """Return what blocks do, 1, 0 or NaN, and in words where that comes from.
+        """Return the outcomes of blocks, 1, 0 or NaN, and a description of their source.
 
         Args:
             strength: of the blocks, shape (n, m).
@@ -119,8 +119,8 @@ class FitSource:
         if np.isfinite(self.failed).any():
             return self.failed, "simulated outcomes"
         observed = (self.table.status == "found") & np.isnan(least)
-        failed, known = critical_outcomes(critical, observed, strength)
-        failed = np.where(strength <= least[:, None], 1.0, np.where(known, failed, np.nan))
+        failed, is_known = critical_outcomes(critical, observed, strength)
+        failed = np.where(strength <= least[:, None], 1.0, np.where(is_known, failed, np.nan))
         return failed, "critical values (safe islands are not seen)"
 
 
@@ -184,7 +184,7 @@ def read_source(
 
 
 def _number_of(block: str | None, name: str) -> float:
-    """Return a number that is stored of a block."""
+    """Return a stored number of a block."""
     value = json.loads(block or "{}").get(name)
     if not isinstance(value, int | float):
         raise FitError(f"a stored block {block} has no {name}: run  rbfrag db check")
@@ -193,7 +193,7 @@ def _number_of(block: str | None, name: str) -> float:
 
 @dataclass(frozen=True, eq=False)
 class FitData:
-    """Rows of one fit: the points at which blocks just fail, and the blocks of the grid.
+    """Rows of one fit: the points at which blocks just fail, and the blocks of the outcome grid.
 
     Args:
         values: what formulas read at the point of failure, by name, shape (n,): measures of the
@@ -253,16 +253,16 @@ class FitData:
 
     @property
     def y(self) -> FloatArray:
-        """Critical toppling velocity [m/s]; for censored points the value it lies below."""
+        """Critical toppling velocity [m/s]; for censored points its upper bound."""
         return self.values["y_m_s"]
 
     @property
     def censored(self) -> NDArray[np.bool_]:
-        """Rows of which a limit is known alone, shape (n,)."""
+        """Rows with an upper bound only, shape (n,)."""
         return np.asarray(~self.observed & np.isfinite(self.values.get("y_m_s", self.x)))
 
     def between_words(self, treated: str) -> list[str]:
-        """Say how many critical values are wide intervals and how they are treated."""
+        """Describe how many critical values are wide intervals, and their treatment."""
         if self.least_y_m_s is None or not (n := int(np.isfinite(self.least_y_m_s).sum())):
             return []
         return [
@@ -277,31 +277,31 @@ class FitData:
 
     @property
     def judged(self) -> ScoredBlocks:
-        """What the fit is judged on."""
-        known = np.isfinite(self.failed) & self.scored
-        failed = np.where(known, self.failed, 0.0)
-        return ScoredBlocks(failed, known, self.event, self.outcomes)
+        """Blocks on which the fit is scored."""
+        is_known = np.isfinite(self.failed) & self.scored
+        failed = np.where(is_known, self.failed, 0.0)
+        return ScoredBlocks(failed, is_known, self.event, self.outcomes)
 
     @property
     def judged_real(self) -> ScoredBlocks | None:
-        """The part of it of at least `REAL_KR`; None of blocks that are not known by k_r."""
+        """Scored blocks with k_r of at least `REAL_KR`; None for blocks without k_r."""
         if "kr" not in self.blocks:
             return None
         judged = self.judged
-        return replace(judged, known=judged.known & (self.grid("kr") >= REAL_KR))
+        return replace(judged, is_known=judged.is_known & (self.grid("kr") >= REAL_KR))
 
     def grid(self, name: str) -> FloatArray:
-        """Return a value of the blocks of the grid, shape (n, m)."""
+        """Return a variable of the blocks of the grid, shape (n, m)."""
         return np.asarray(np.broadcast_to(self.blocks[name], self.failed.shape))
 
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Points and grid as one description of blocks gives them, before rows are chosen."""
+    """Points and outcome grid before rows are selected."""
 
     values: dict[str, FloatArray]
     observed: NDArray[np.bool_]
-    usable: NDArray[np.bool_]
+    is_valid: NDArray[np.bool_]
     combination: NDArray[np.intp]
     order: FloatArray
     blocks: dict[str, FloatArray]
@@ -343,14 +343,14 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             "lognormal"
         )
     points = _READERS[method.block.points](source, method, term)
-    own = points.combination
-    keys = table.natural_key[own].astype(str)
+    combination = points.combination
+    keys = table.natural_key[combination].astype(str)
     # further keys make the order, and so every sum, independent of the order of the rows
     order = np.lexsort((points.order, keys, points.values["intensity_m_s"]))
-    chosen = order[points.usable[order]]
-    own = own[chosen]
+    chosen = order[points.is_valid[order]]
+    combination = combination[chosen]
     # Rows that share an earthquake are one cluster, whatever the number of records.
-    names, event = np.unique(table.event_id[own].astype(str), return_inverse=True)
+    names, event = np.unique(table.event_id[combination].astype(str), return_inverse=True)
     observed = points.observed[chosen]
     values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
     failed = np.ascontiguousarray(points.failed[chosen])
@@ -361,10 +361,10 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         observed=observed,
         event=event.astype(np.intp),
         event_names=tuple(names.tolist()),
-        motion=np.unique(table.motion_id[own], return_inverse=True)[1].astype(np.int64),
-        polarity=np.where(table.polarity[own] == "forward", 1.0, -1.0),
-        recording=None if source.recording is None else source.recording[own],
-        combination=own,
+        motion=np.unique(table.motion_id[combination], return_inverse=True)[1].astype(np.int64),
+        polarity=np.where(table.polarity[combination] == "forward", 1.0, -1.0),
+        recording=None if source.recording is None else source.recording[combination],
+        combination=combination,
         blocks={name: v[chosen] for name, v in points.blocks.items()},
         failed=failed,
         read=points.read[chosen],
@@ -374,7 +374,9 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         n_total=int(table.p2.size),
         n_excluded=points.undefined,
         n_outside_model=int((table.status == "outside_model").sum()),
-        guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
+        guessed_events=len(
+            set(table.event_id[combination][table.event_guessed[combination]].tolist())
+        ),
         fingerprint=_fingerprint(
             keys[chosen],
             names[event],
@@ -450,17 +452,17 @@ def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the points of blocks of any strength k_r and some size p²."""
+    """Return the points of blocks of any strength k_r at a stored size p²."""
     table = source.table
     simulated = source.failed.shape[1]
     source = _with_safe_blocks(source, method.block.safe_steps)
     # Strengths scale as y = k_r g/p: the critical k_r of a record is a critical toppling velocity
     # y*, and a block of the grid has y0 = (k/PGA) PGA g/p.
     p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
-    given = {**_measures(source), "p": p}
-    x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
+    measures = {**_measures(source), "p": p}
+    x = np.asarray(term.intensity_m_s(measures), dtype=np.float64)
     for name in term.inputs:
-        x = np.where(np.isfinite(given[name]), x, np.nan)
+        x = np.where(np.isfinite(measures[name]), x, np.nan)
     defined = np.isfinite(x)
     if not defined.any() and "tm_s" in term.inputs:
         raise FitError(
@@ -484,7 +486,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     y = np.where(observed, table.y_m_s, np.where(open_above, highest, limit))
     least = np.where(searched & open_above, table.y_m_s, np.nan)
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
-    of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
+    of_motion = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
     of_motion |= source.of_block
     for name, values in method.block.stored.items():
@@ -501,23 +503,27 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     scored[:, simulated:] = False
     scored &= kr <= method.block.judged_kr
     failed, source_of_outcomes = source.judged_outcomes(y0, y, least)
-    some = (read | scored).any(axis=0)
+    has_blocks = (read | scored).any(axis=0)
     of_outcomes = method.reads == "outcomes"
     ranges = {
         "p2": table.p2,
         "intensity_m_s": x,
-        "y_m_s": np.where(read, y0, np.nan)[:, some] if of_outcomes else y,
+        "y_m_s": np.where(read, y0, np.nan)[:, has_blocks] if of_outcomes else y,
         "tm_s": table.tm_s,
-        **{name: given[name] for name in term.inputs if not np.array_equal(given[name], x, True)},
-        **ratio_columns({**given, "p": p}),
+        **{
+            name: measures[name]
+            for name in term.inputs
+            if not np.array_equal(measures[name], x, True)
+        },
+        **ratio_columns({**measures, "p": p}),
     }
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
     ranges["kr"] = np.tile(KR, (x.size, 1))
-    blocks = {**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]}
+    blocks = {**_column(of_motion), "kr": kr[:, has_blocks], "y_m_s": y0[:, has_blocks]}
     if method.block.adjust is not None:
         method.block.adjust(blocks, arrays())
-        fitted = read[:, some] & ~method.block.at_rest.holds(blocks)
+        fitted = read[:, has_blocks] & ~method.block.at_rest.holds(blocks)
         # few blocks lie far down
         for name in method.block.options if fitted.any() else ():
             covered = np.quantile(blocks[name][fitted], 1.0 - INSIDE)
@@ -525,23 +531,23 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     return _Points(
         values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
         observed=observed,
-        usable=defined & readable,
+        is_valid=defined & readable,
         undefined=int((~defined & readable).sum()),
         combination=np.arange(x.size),
         order=np.zeros(x.size),
         blocks=blocks,
-        failed=failed[:, some],
-        read=read[:, some],
+        failed=failed[:, has_blocks],
+        read=read[:, has_blocks],
         outcomes=source_of_outcomes,
         ranges=ranges,
-        scored=scored[:, some],
-        sensitive=None if source.sensitive is None else source.sensitive[:, some],
+        scored=scored[:, has_blocks],
+        sensitive=None if source.sensitive is None else source.sensitive[:, has_blocks],
         least_y_m_s=least if np.isfinite(least).any() else None,
     )
 
 
 def _with_safe_blocks(source: FitSource, steps: int) -> FitSource:
-    """Return a source whose outcome grid goes on above its strongest block, with safe blocks."""
+    """Return a source whose outcome grid continues above its strongest block, with safe blocks."""
     if source.failed.shape[1] < 2:
         return source
     step = Y0_OVER_PGV[1] / Y0_OVER_PGV[0]
@@ -556,7 +562,7 @@ def _with_safe_blocks(source: FitSource, steps: int) -> FitSource:
 
 
 def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the outcomes of stored blocks, which were followed to their end, by scaled record."""
+    """Return the outcomes of stored blocks under scaled records."""
     table, k = source.table, source.k_over_pga
     strength = table.yield_g
     if not np.isfinite(strength).all():
@@ -578,7 +584,7 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
         values={**unscaled, **block, "y_m_s": np.full(size.size, np.nan)},
         observed=np.zeros(size.size, dtype=np.bool_),
         # a searched one ended where the block lost a contact
-        usable=(table.status == "not_searched") & defined & (table.pgv_m_s > 0.0),
+        is_valid=(table.status == "not_searched") & defined & (table.pgv_m_s > 0.0),
         combination=np.arange(size.size),
         order=np.zeros(size.size),
         blocks={**scaled, "intensity_m_s": term.intensity_m_s(scaled), **_column(block)},
@@ -596,16 +602,16 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
 
 
 def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the points of blocks of every stored strength: how far each slides."""
+    """Return the points of blocks of every stored strength: their sliding displacements."""
     from rbfrag.solver.models.sliding import THRESHOLDS_M
 
     # A slid distance d is one point of ln d against ln x and strength; below LEAST_DISPLACEMENT_M
     # it is censored. Outcomes "d exceeds the limit" follow from d for every displacement limit.
     n, m = source.k_over_pga.shape
-    own, k = np.repeat(np.arange(n), m), source.k_over_pga.ravel()
-    given = source.displacement_m
-    slid = np.full(n * m, np.nan) if given is None else given.ravel()
-    measures = {name: value[own] for name, value in _measures(source).items()}
+    combination, k = np.repeat(np.arange(n), m), source.k_over_pga.ravel()
+    displacement = source.displacement_m
+    slid = np.full(n * m, np.nan) if displacement is None else displacement.ravel()
+    measures = {name: value[combination] for name, value in _measures(source).items()}
     beyond = np.maximum(slid, LEAST_DISPLACEMENT_M)
     read = {name: measures[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     strength = k * measures["pga_g"]
@@ -614,17 +620,17 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     }  # fmt: skip
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
-        usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
-        usable &= (strength >= KR[0]) & (strength <= KR[1])
+        is_valid = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
+        is_valid &= (strength >= KR[0]) & (strength <= KR[1])
         defined = np.isfinite([values[name] for name in term.inputs]).all(axis=0)
         observed = slid >= LEAST_DISPLACEMENT_M
         failed = (beyond[:, None] > distances).astype(np.float64)
     return _Points(
         values={**values, "displacement_m": beyond},
         observed=observed,
-        usable=usable & defined,
-        undefined=np.unique(own[usable & ~defined]).size,
-        combination=own,
+        is_valid=is_valid & defined,
+        undefined=np.unique(combination[is_valid & ~defined]).size,
+        combination=combination,
         order=k,
         blocks={**_column(values), "displacement_m": distances},
         failed=failed,

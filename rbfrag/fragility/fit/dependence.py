@@ -1,4 +1,5 @@
-"""How strongly failures of one earthquake go together: the copula estimated from outcomes.
+"""Estimation of the Gaussian copula of failures in one earthquake from outcomes, by pairwise
+likelihood.
 
 Pairwise likelihood. For a pair with probabilities P_i, P_j that were predicted without its
 earthquake, the copula gives the chance of what both did as a function of R alone. These are kept as
@@ -60,7 +61,7 @@ class DependenceEstimate:
 
 
 class ObservedBlocks(TypedDict):
-    """Blocks with what they did, as a dependence is estimated from them; arrays of shape (n,).
+    """Blocks with their outcomes, for the estimation of a dependence model; arrays of shape (n,).
 
     Args:
         probability: P of each block, predicted without its earthquake.
@@ -112,14 +113,14 @@ def estimate_dependence(
         dependence=estimate,
         errors=dict(zip(names, scatter, strict=bool(scatter))),
         earthquakes=events,
-        pairs=(tables.far.pairs, tables.near.pairs, tables.own.pairs),
+        pairs=(tables.far.pairs, tables.near.pairs, tables.component.pairs),
         replicates=replicates,
         seed=seed,
     )
 
 
 def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray) -> ObservedBlocks:
-    """Return the blocks of a fit with what they did, of the strengths that it reads.
+    """Return the blocks of a fit with their outcomes, within the fitted range of strength.
 
     Blocks without a size count as those of one size, their strength as their velocity. Of blocks
     that differ in more than size and strength those are read that have the most of it.
@@ -135,7 +136,7 @@ def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray)
         raise FitError("the motions have no recordings: their components are unknown")
     shape = data.failed.shape
 
-    def each(column: NDArray[np.generic]) -> NDArray[np.generic]:
+    def broadcast(column: NDArray[np.generic]) -> NDArray[np.generic]:
         return np.broadcast_to(column[:, None], shape).ravel()
 
     size = np.ones(shape) if block.size is None else data.grid(block.size)
@@ -146,10 +147,10 @@ def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray)
     return ObservedBlocks(
         probability=held_out.ravel(),
         failed=np.where(data.read & alike[:, None], data.failed, np.nan).ravel(),
-        earthquake=each(data.event),
-        site=each(data.recording),
-        component=each(data.motion),
-        polarity=each(data.polarity),
+        earthquake=broadcast(data.event),
+        site=broadcast(data.recording),
+        component=broadcast(data.motion),
+        polarity=broadcast(data.polarity),
         p2=size.ravel(),
         y_m_s=strength.ravel(),
     )
@@ -157,19 +158,19 @@ def observed_blocks(data: FitData, block: BlockParameters, held_out: FloatArray)
 
 @dataclass(frozen=True, eq=False)
 class PairTables:
-    """The pairwise likelihood of all pairs, from which parameters are found again and again.
+    """Pairwise likelihood of all pairs, tabulated for repeated maximisation.
 
     Args:
         earthquakes: their labels in the order of their numbers.
         far: of pairs of different sites.
         near: of pairs of the components of one site.
-        own: of pairs of one component.
+        component: of pairs of one component.
     """
 
     earthquakes: NDArray[np.str_]
     far: PairTable
     near: PairTable
-    own: PairTable
+    component: PairTable
 
     @classmethod
     def of(cls, *, seed: int = 0, **blocks: Unpack[ObservedBlocks]) -> PairTables:
@@ -177,17 +178,17 @@ class PairTables:
         numeric = (blocks["probability"], blocks["failed"], blocks["polarity"], blocks["p2"],
                    blocks["y_m_s"])  # fmt: skip
         nested = blocks["earthquake"], blocks["site"], blocks["component"]
-        real = [np.asarray(one, dtype=np.float64) for one in numeric]
-        labels = [np.asarray(one).astype(str) for one in nested]
-        if len({one.shape for one in (*real, *labels)}) != 1 or real[0].ndim != 1:
+        real = [np.asarray(column, dtype=np.float64) for column in numeric]
+        labels = [np.asarray(column).astype(str) for column in nested]
+        if len({column.shape for column in (*real, *labels)}) != 1 or real[0].ndim != 1:
             raise InputError("the columns that a dependence is estimated from differ in length")
         p, did, side, size, y = real
         read = np.isfinite(did) & (p > LEAST_P) & (p < GREATEST_P) & (size > 0.0) & (y > 0.0)
         names = np.unique(labels[0][read])
         numbers: list[Indices] = []
-        for one in labels:  # each within the one before
-            own = np.unique(one[read], return_inverse=True)[1].astype(np.intp)
-            within = numbers[-1] * (own.max(initial=0) + 1) + own if numbers else own
+        for column in labels:  # each within the one before
+            codes = np.unique(column[read], return_inverse=True)[1].astype(np.intp)
+            within = numbers[-1] * (codes.max(initial=0) + 1) + codes if numbers else codes
             numbers.append(np.unique(within, return_inverse=True)[1].astype(np.intp))
         rows = PairRows(
             bound=np.asarray(ndtri(p[read])),
@@ -209,7 +210,7 @@ class PairTables:
         for name, table, fewest in (
             ("other sites", self.far, FEWEST_EVENTS),
             ("the two components of a site", self.near, FEWEST_EVENTS),
-            ("one component", self.own, FEWEST_EVENTS),
+            ("one component", self.component, FEWEST_EVENTS),
         ):
             if table.pairs < FEWEST_PAIRS or table.event.size < fewest:
                 raise FitError(
@@ -222,7 +223,7 @@ class PairTables:
     def likeliest(
         self, times: FloatArray | None = None, start: Dependence | None = None
     ) -> Dependence:
-        """Return the parameters of greatest pairwise likelihood.
+        """Return the parameters that maximise the pairwise likelihood.
 
         Args:
             times: how often each earthquake counts, shape of `earthquakes`; None for once.
@@ -230,7 +231,9 @@ class PairTables:
         """
         counted = np.ones(self.earthquakes.size) if times is None else times
         rho_e, rho_s, l_e = _shared(self.far, self.near, counted, start)
-        share, l_v, l_o, l_y = _own(self.own, counted, start, (rho_e + rho_s, l_e))
+        share, l_v, l_o, l_y = _within_component(
+            self.component, counted, start, (rho_e + rho_s, l_e)
+        )
         rho_o = (1.0 - rho_e - rho_s) * share
         rho_v = max(0.0, 1.0 - rho_e - rho_s - rho_o)
         return Dependence(rho_e, rho_s, rho_v, rho_o, l_e, l_v, l_o, l_y)
@@ -239,7 +242,7 @@ class PairTables:
 def _shared(
     far: PairTable, near: PairTable, times: FloatArray, start: Dependence | None
 ) -> tuple[float, float, float]:
-    """Return ρ_e, ρ_s and λ_e of greatest likelihood."""
+    """Return the maximum-likelihood ρ_e, ρ_s and λ_e."""
     of_far, of_near = far.likelihood(times), near.likelihood(times)
 
     def shares(x: FloatArray) -> tuple[float, float, float]:
@@ -253,30 +256,33 @@ def _shared(
 
     starts = [(0.1, 0.2, 0.0), (0.05, 0.05, 1.0)]
     if start is not None:
-        left = _SHARED_MOST - start.rho_e
-        starts = [(start.rho_e / _SHARED_MOST, start.rho_s / left, float(np.log(start.l_e)))]
+        remaining = _SHARED_MOST - start.rho_e
+        starts = [(start.rho_e / _SHARED_MOST, start.rho_s / remaining, float(np.log(start.l_e)))]
     return shares(_least(loss, starts, 2))
 
 
-def _own(
-    own: PairTable, times: FloatArray, start: Dependence | None, shared: tuple[float, float]
+def _within_component(
+    table: PairTable, times: FloatArray, start: Dependence | None, shared: tuple[float, float]
 ) -> tuple[float, float, float, float]:
-    """Return ρ_o as a share of what is left, λ_v, λ_o and λ_y of greatest likelihood.
+    """Return the maximum-likelihood ρ_o (as a fraction of the remaining variance), λ_v, λ_o and
+    λ_y.
 
     Args:
-        own: of pairs of one component.
+        table: of pairs of one component.
         times: how often each earthquake counts.
         start: where the search begins.
         shared: ρ_e + ρ_s and λ_e.
     """
-    of_own, left = own.likelihood(times), 1.0 - shared[0]
-    given = shared[0] * np.exp(-own.distance_l / shared[1])
+    of_own, remaining = table.likelihood(times), 1.0 - shared[0]
+    shared_part = shared[0] * np.exp(-table.distance_l / shared[1])
 
     def loss(x: FloatArray) -> float:
         l_v, l_o, l_y = np.exp(x[1:])  # of a component
-        symmetric = (1.0 - x[0]) * np.exp(-own.distance_l / l_v)
-        antisymmetric = own.sign * x[0] * np.exp(-own.distance_l / l_o)
-        return -of_own(given + left * (symmetric + antisymmetric) * np.exp(-own.distance_y / l_y))
+        symmetric = (1.0 - x[0]) * np.exp(-table.distance_l / l_v)
+        antisymmetric = table.sign * x[0] * np.exp(-table.distance_l / l_o)
+        return -of_own(
+            shared_part + remaining * (symmetric + antisymmetric) * np.exp(-table.distance_y / l_y)
+        )
 
     starts = [(0.6, 0.9, 1.6, -0.6), (0.6, -0.5, 2.0, -0.6), (0.5, 1.0, -0.4, -1.0)]
     if start is not None:
@@ -284,7 +290,7 @@ def _own(
         l_v, l_o, l_y = np.log([start.l_v, start.l_o, start.l_y]).tolist()
         starts = [(share, l_v, l_o, l_y)]
     # blocks run in one polarity alone do not tell what changes its sign with it: nothing does
-    most = 1.0 if (own.sign < 0.0).any() else 0.0
+    most = 1.0 if (table.sign < 0.0).any() else 0.0
     x = _least(loss, starts, 1, most)
     l_v, l_o, l_y = np.exp(x[1:]).tolist()
     return float(x[0]), l_v, l_o, l_y
@@ -296,7 +302,7 @@ def _least(
     shares: int,
     most: float = 1.0,
 ) -> FloatArray:
-    """Return where a function of shares and logarithms of lengths is least, from several starts.
+    """Minimise a function of fractions and log lengths, from several starting points.
 
     Args:
         starts: where the search begins.
@@ -311,4 +317,4 @@ def _least(
         return scale * loss(x)
 
     minima = [minimize(scaled, np.array(start, float), bounds=bounds) for start in starts]
-    return np.asarray(min(minima, key=lambda one: float(one.fun)).x, dtype=np.float64)
+    return np.asarray(min(minima, key=lambda minimum: float(minimum.fun)).x, dtype=np.float64)

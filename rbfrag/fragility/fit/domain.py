@@ -1,4 +1,4 @@
-"""Where the points of a fit lie: the range of each variable and ratio, and their joint scatter."""
+"""Range of the fitted points: of each variable and ratio, and their joint scatter."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rbfrag.solver.results import FloatArray
 
 
 def ranges_of(values: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
-    """Return the range of the finite numbers of each variable that has some."""
+    """Return the range of the finite values of each variable."""
     finite = {name: v[np.isfinite(v)] for name, v in values.items()}
     return {name: (float(v.min()), float(v.max())) for name, v in finite.items() if v.size}
 
 
 def ratio_columns(measures: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return every ratio that the measures suffice for; not finite without shaking."""
+    """Return every ratio that the intensity measures allow; not finite without shaking."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return {ratio.name: np.asarray(ratio.formula(measures)) for ratio in ratios_of(measures)}
 
@@ -26,7 +26,7 @@ def ratio_columns(measures: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 def joint_scatter(
     names: Sequence[str], values: Mapping[str, FloatArray], fitted: NDArray[np.bool_]
 ) -> dict[str, object] | None:
-    """Return how the fitted points scatter in the logarithms of what a model reads.
+    """Return the scatter of the fitted points in the logarithms of the predictors.
 
     Args:
         values: by name, of a shape that broadcasts to that of `fitted`.

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fit with what only a study of fits needs.
+    """A fit with the additional results for studies of fits.
 
     Args:
         result: what the method handed back, with its held-out probabilities.
@@ -44,7 +44,7 @@ class Fitted:
 
 
 class FitOptions(Selection, total=False):
-    """What :func:`fit` takes beside its data."""
+    """Options of :func:`fit`."""
 
     kind: str
     term: Required[str]
@@ -66,7 +66,7 @@ def fit(
     taken: Collection[str] = (),
     **selection: Unpack[Selection],
 ) -> FitReport:
-    """Fit a fragility model as :func:`rbfrag.fit` does, but store nothing.
+    """Fit a fragility model like :func:`rbfrag.fit`, without storing it.
 
     Args:
         source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
@@ -108,7 +108,7 @@ def fit(
 
 
 def methods_of_kind(kind: str) -> tuple[Method, ...]:
-    """Return the methods that read what describes the block of a kind.
+    """Return the methods that use the block parameters of a kind.
 
     Raises:
         InputError: an unknown kind, or one that no method goes with.
@@ -118,7 +118,7 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     names = facts_of(kind).parameters
     reading = [method for method in methods() if names and method.block.names == names]
     # of a kind without methods of its own, all that read what describes its block
-    suited = tuple(each for each in reading if each.block.kind == kind) or tuple(reading)
+    suited = tuple(method for method in reading if method.block.kind == kind) or tuple(reading)
     if not suited:
         raise InputError(f"there is no fragility model of kind {kind}: no method supports it")
     return suited
@@ -127,7 +127,8 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
 def method_of_kind(
     kind: str, name: str | None, term: str = "", *, estimate_m: bool = False, reads: str = ""
 ) -> Method:
-    """Return the named method, or else that of most skill with a term on earthquakes left out.
+    """Return the named method; by default the one with the best cross-validation score for the
+    term.
 
     Args:
         estimate_m: it estimates the exponent M.
@@ -136,23 +137,25 @@ def method_of_kind(
     Raises:
         InputError: an unknown kind or method, or two that do not go together.
     """
-    known = methods_of_kind(kind)
+    candidates = methods_of_kind(kind)
     if name is None:
-        suited = [each for each in known if term in each.forms and reads in ("", each.reads)]
-        able = (each for each in suited if each.exponent or not estimate_m)
-        return min(able, key=lambda each: each.forms[term].rank, default=known[0])
+        suited = [
+            method for method in candidates if term in method.forms and reads in ("", method.reads)
+        ]
+        able = (method for method in suited if method.exponent or not estimate_m)
+        return min(able, key=lambda method: method.forms[term].rank, default=candidates[0])
     chosen = method_named(name)
-    if chosen not in known:
+    if chosen not in candidates:
         raise InputError(
             f"method {name} fits blocks with {' and '.join(chosen.block.names)}, not those of "
-            f"kind {kind}, which are fitted by {', '.join(each.name for each in known)}"
+            f"kind {kind}, which are fitted by {', '.join(method.name for method in candidates)}"
         )
     return chosen
 
 
 def _why(chosen: Method, term: Term, kind: str) -> str:
-    """Return why a method is taken where none is named."""
-    suited = [each.name for each in methods_of_kind(kind) if term.name in each.forms]
+    """Return the reason for the default method."""
+    suited = [method.name for method in methods_of_kind(kind) if term.name in method.forms]
     of = "no outcomes are stored; of critical values" if chosen.reads == "critical" else "of"
     return f"{chosen.name}, {of} {', '.join(suited)} the best on earthquakes left out"
 
@@ -235,7 +238,7 @@ def fit_source(
 
 
 def _scatter(data: FitData, method: Method, term: Term) -> dict[str, object] | None:
-    """Return how the points scatter that are fitted: what mechanics rules out is not."""
+    """Return the scatter of the fitted points, without those that mechanics rules out."""
     fitted = data.read.copy()
     with np.errstate(invalid="ignore", divide="ignore"):
         for bound in method.forms[term.name].bounds:
@@ -247,16 +250,18 @@ def _refuse_unfit(
     method: Method, term: Term, kind: str, estimate_m: bool, rotation_deg: float | None
 ) -> None:
     if term.name not in method.forms:
-        known = (each.name for each in methods_of_kind(kind) if term.name in each.forms)
+        suitable = (
+            candidate.name for candidate in methods_of_kind(kind) if term.name in candidate.forms
+        )
         raise InputError(
             f"method {method.name} cannot be combined with the term {term.name}: it fits "
             f"{', '.join(method.forms)}; the term {term.name} of kind {kind} is fitted by "
-            f"{', '.join(known) or 'none'}"
+            f"{', '.join(suitable) or 'none'}"
         )
     if estimate_m and method.exponent is None:
-        known = (each.name for each in methods() if each.exponent is not None)
+        suitable = (candidate.name for candidate in methods() if candidate.exponent is not None)
         raise InputError(
-            f"method {method.name} keeps M = 1: the exponent is estimated by {', '.join(known)}"
+            f"method {method.name} keeps M = 1: the exponent is estimated by {', '.join(suitable)}"
         )
     if rotation_deg is not None and method.block.criterion is None:
         raise InputError(
@@ -285,7 +290,7 @@ def _events(data: FitData, of_outcomes: bool) -> int:
 def _dependence(
     data: FitData, method: Method, result: MethodResult, seed: int
 ) -> tuple[dict[str, object] | None, list[str]]:
-    """Return what blocks of one earthquake share as models store it, or why it is not known."""
+    """Return the dependence model of blocks in one earthquake, or why it is unknown."""
     try:
         blocks = observed_blocks(data, method.block, result.held_out)
         estimate = estimate_dependence(seed=seed, **blocks)
@@ -302,7 +307,7 @@ def _dependence(
 
 
 def _older(table: CombinationTable) -> list[str]:
-    """Return what is said of results that the present numerics have not made."""
+    """Return the warning about results of earlier numerics versions."""
     if IMPORTED in table.numerics_version:
         return ["the critical values are imported: safe islands below them are not seen"]
     return [

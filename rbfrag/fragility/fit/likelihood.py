@@ -1,4 +1,4 @@
-"""Maximum likelihood: blocks that failed or not, and normal values of which some have a limit only.
+"""Maximum likelihood of binary outcomes and of censored normal values.
 
 The fit of outcomes that is stored comes from statsmodels' GLM; the many fits of resamples and
 left-out earthquakes start from it and use the short iteration here, which the tests compare with
@@ -33,10 +33,10 @@ class Likelihood(Protocol):
 
     @property
     def event(self) -> NDArray[np.intp]:
-        """Number of each row's earthquake, shape (n,)."""
+        """Earthquake index of each row, shape (n,)."""
 
     def only(self, chosen: Chosen) -> Self:
-        """Return some of the rows."""
+        """Return a subset of the rows."""
 
     def log_likelihood(self, b: FloatArray) -> FloatArray:
         """Return the log likelihood of each row, shape (n,)."""
@@ -44,7 +44,9 @@ class Likelihood(Protocol):
     def derivatives(
         self, b: FloatArray, times: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return score, shape (k,), and information, shape (k, k), of rows that count `times`."""
+        """Return the score, shape (k,), and the information, shape (k, k), with rows weighted by
+        `times`.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +67,14 @@ class Binomial:
     event: NDArray[np.intp]
 
     def only(self, chosen: Chosen) -> Binomial:
-        """Return some of the rows."""
+        """Return a subset of the rows."""
         columns, outcome, weights = (
             part[chosen] for part in (self.columns, self.outcome, self.weights)
         )
         return Binomial(self.link, columns, outcome, weights, self.event[chosen])
 
     def eta(self, b: FloatArray) -> FloatArray:
-        """Return the argument of the link of each row, as far as exponentials are finite."""
+        """Return the linear predictor of each row, limited to the finite range of exponentials."""
         return np.clip(self.columns @ b, -700.0, 700.0)
 
     def probability(self, b: FloatArray) -> FloatArray:
@@ -95,7 +97,7 @@ class Binomial:
         return x.T @ (per_eta * (self.outcome - p)), (x * (per_eta * slope)[:, None]).T @ x
 
     def start(self) -> FloatArray:
-        """Return parameters to start from: least squares of P = 0.9 and 0.1."""
+        """Return starting values: least squares of P = 0.9 and 0.1."""
         middle = self.link.quantile(np.where(self.outcome > 0.5, 0.9, 0.1), arrays())
         root = np.sqrt(self.weights)
         return np.asarray(
@@ -110,7 +112,7 @@ Standardised = tuple[Any, Any, Sequence[Any], Sequence[Any]]
 
 @dataclass(frozen=True, eq=False)
 class CensoredNormal:
-    """Rows at which a block just fails, or beyond which it does, with P = Φ(eta) of failing.
+    """Rows at which a block just fails, or their limit, with failure probability P = Φ(eta).
 
     A found row has the density φ(eta)/σ, a censored one the probability Φ(-eta) of failing beyond,
     one that is known to fail between two ends the difference of theirs.
@@ -131,7 +133,7 @@ class CensoredNormal:
     nearer: Mapping[str, FloatArray] | None = None
 
     def only(self, chosen: Chosen) -> CensoredNormal:
-        """Return some of the rows."""
+        """Return a subset of the rows."""
         values, nearer = (
             None if part is None else {name: value[chosen] for name, value in part.items()}
             for part in (self.values, self.nearer)
@@ -141,7 +143,7 @@ class CensoredNormal:
         return CensoredNormal(self.formula, values, observed, event, nearer)
 
     def log_likelihood(self, b: FloatArray) -> FloatArray:
-        """Return the log likelihood of each row; NaN where the scatter is not above zero."""
+        """Return the log likelihood of each row; NaN where the dispersion is not above zero."""
         from scipy.special import log_ndtr
 
         with np.errstate(invalid="ignore"):
@@ -159,7 +161,7 @@ class CensoredNormal:
     def derivatives(
         self, b: FloatArray, times: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return score and information, exact where eta is linear in the parameters.
+        """Return the score and the information, exact where eta is linear in the parameters.
 
         Elsewhere the information leaves out what is zero in the mean.
         """
@@ -193,7 +195,7 @@ class CensoredNormal:
 
 
 def olsen(theta: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
-    """Return eta = columns · θ - h y, with θ = β/σ and h = 1/σ as last parameter.
+    """Return eta = columns · θ - h y with Olsen's parameters θ = β/σ and h = 1/σ, h last.
 
     In these parameters the likelihood of a censored line is concave (Olsen 1978, Econometrica
     46(5), 1211-1215), so that the iteration finds the one maximum.
@@ -205,7 +207,7 @@ def olsen(theta: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
 
 
 def from_olsen(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return β and ln σ of Olsen's parameters, and their derivatives by them."""
+    """Return β and ln σ from Olsen's parameters, and their derivatives."""
     jacobian = np.zeros((theta.size, theta.size))
     jacobian[:-1, :-1] = np.eye(theta.size - 1) / theta[-1]
     jacobian[:-1, -1] = -theta[:-1] / theta[-1] ** 2
@@ -220,7 +222,8 @@ def censored_line(
     event: NDArray[np.intp],
     least: FloatArray | None = None,
 ) -> tuple[CensoredNormal, FloatArray]:
-    """Return the likelihood of y = columns · β + σ·normal, and Olsen's parameters to start from.
+    """Return the likelihood of y = columns · β + σ·normal, and Olsen's parameters as starting
+    values.
 
     Args:
         columns: regressors, shape (n, k).
@@ -244,7 +247,7 @@ def maximise(
     times: FloatArray | None = None,
     tolerance: float = TOLERANCE,
 ) -> tuple[FloatArray, bool]:
-    """Maximise a likelihood by Newton's steps, halved where they go too far.
+    """Maximise a likelihood by Newton's method with step halving.
 
     Own code, because a fit takes hundreds of resamples: one of 45,000 rows takes .10 s here,
     .21 s by scipy's trust-exact with the same derivatives, .28 s by its BFGS.
@@ -259,8 +262,8 @@ def maximise(
     """
 
     def loss(b: FloatArray) -> float:
-        each = rows.log_likelihood(b)
-        return -float(each.sum() if times is None else times @ each)
+        row_values = rows.log_likelihood(b)
+        return -float(row_values.sum() if times is None else times @ row_values)
 
     b, value = start, loss(start)
     for _ in range(MOST_ITERATIONS):
@@ -280,7 +283,7 @@ def maximise(
 
 
 def most_likely(rows: Binomial) -> FloatArray:
-    """Return the parameters of greatest likelihood of outcomes.
+    """Return the maximum-likelihood parameters of outcomes.
 
     Raises:
         FitError: the outcomes are all alike, or the features separate them.
@@ -303,7 +306,7 @@ def most_likely(rows: Binomial) -> FloatArray:
 
 
 def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit outcomes by statsmodels' GLM.
+    """Fit outcomes with the GLM of statsmodels.
 
     Returns:
         The parameters, their covariance clustered by earthquake, H⁻¹ (Σ_e s_e s_eᵀ) H⁻¹ ·

@@ -1,4 +1,4 @@
-"""Fits of what blocks did: the methods that read outcomes.
+"""Fits of simulated outcomes, failed or not.
 
 A generalised linear model of binary outcomes on a grid that does not depend on the outcome; every
 block that is read counts the same. Blocks that mechanics says cannot fail are not fitted: P is 0.
@@ -28,7 +28,7 @@ FEWEST_FAILURES = 20
 
 @dataclass(frozen=True, eq=False)
 class OutcomeRows:
-    """The rows of a fit, and where they stand on the grid.
+    """The rows of a fit, and their indices in the grid.
 
     Args:
         data: features, outcomes, weights and earthquakes; blocks that are judged and not fitted
@@ -45,20 +45,20 @@ class OutcomeRows:
     bounded_failed: int
 
     def on_grid(self, b: FloatArray) -> FloatArray:
-        """Return P of every block of the grid, 0 where it is not among the rows."""
+        """Return P of every block of the grid, 0 for blocks without a row."""
         grid = np.zeros(self.bounded.shape)
         grid.flat[self.place] = self.data.probability(b)
         return grid
 
     def held_out(self, b: FloatArray) -> FloatArray:
-        """Return the same, each earthquake predicted by the fit to the others."""
+        """Return P of every block, each earthquake predicted by the fit to the others."""
         rows, grid = self.data, np.zeros(self.bounded.shape)
         parameters = left_out(
             rows.event, lambda rest: maximise(rows.only(rest), b, tolerance=1e-9)[0]
         )
-        for event, others in parameters.items():
-            own = rows.event == event
-            grid.flat[self.place[own]] = rows.only(own).probability(others)
+        for event, estimate in parameters.items():
+            event_rows = rows.event == event
+            grid.flat[self.place[event_rows]] = rows.only(event_rows).probability(estimate)
         return grid
 
 
@@ -69,7 +69,7 @@ _MOST_ALIKE = 1e11
 def fit_outcomes(
     data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
-    """Fit a method that reads outcomes."""
+    """Fit a method that uses outcomes."""
     # Maximum likelihood of sum w [f ln P + (1 - f) ln(1 - P)], P = link(eta(block, shaking; b)),
     # over all blocks of the outcome grid that mechanics allows to fail.
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
@@ -139,14 +139,14 @@ def fit_outcomes(
 
 
 def sensitive_share(data: FitData, rows: OutcomeRows) -> dict[str, float]:
-    """Return the share of the fitted outcomes that are sensitive, where some can be."""
+    """Return the fraction of the fitted outcomes that are numerically sensitive."""
     if data.sensitive is None:
         return {}
     return {"sensitive_share": float(np.nanmean(data.sensitive.ravel()[rows.place]))}
 
 
 def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> tuple[str, ...]:
-    """Return the names of the parameters that are fitted, in the order of the formula."""
+    """Return the names of the fitted parameters, in the order of the formula."""
     names = method.forms[term.name].parameters
     return tuple(name for name in names if estimate_m or name != method.exponent)
 
@@ -155,12 +155,12 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
     """Return the known outcomes with their features."""
     form, shape = method.forms[term.name], data.failed.shape
     positive = (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
-    known = positive & (data.read | data.scored) & np.isfinite(data.failed)
+    is_known = positive & (data.read | data.scored) & np.isfinite(data.failed)
     bounded = np.zeros(shape, dtype=np.bool_)
     for bound in form.bounds:
         bounded |= np.broadcast_to(bound.holds(data.blocks), shape)
-    bounded &= known
-    place = np.flatnonzero(known & ~bounded)
+    bounded &= is_known
+    place = np.flatnonzero(is_known & ~bounded)
     values = {name: data.grid(name).ravel()[place] for name in data.blocks}
     features = form.eta([0.0] * len(names), values, arrays()).slopes
     columns = np.column_stack([np.broadcast_to(f, place.size) for f in features])
@@ -174,7 +174,7 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
 
 
 def median_y_m_s(form: Form, method: Method, b: FloatArray, data: FitData) -> FloatArray:
-    """Return the toppling velocity at which P = 1/2 for each row [m/s]; NaN where there is none."""
+    """Return the toppling velocity at which P = 1/2 for each row [m/s]; NaN if there is none."""
     from scipy.optimize.elementwise import find_root
 
     def excess(ln_y: FloatArray, *columns: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Pairs of blocks as tables of log likelihoods over their correlation.
+"""Tables of the pairwise log likelihood of blocks over their correlation.
 
 Each pair adds its log likelihood, at every R of the table, to that of its earthquake and cell: what
 the two share, and how far apart they are.
@@ -34,7 +34,7 @@ _MOST_CELLS = 2000
 
 @dataclass(frozen=True, eq=False)
 class PairRows:
-    """Blocks with what they did, as the pairwise likelihood reads them; numbers without gaps.
+    """Blocks with their outcomes, as the pairwise likelihood uses them; indices without gaps.
 
     Args:
         bound: Φ⁻¹(P) of the prediction without the block's earthquake, shape (n,).
@@ -77,7 +77,9 @@ class PairTable:
     pairs: int
 
     def likelihood(self, times: FloatArray) -> Callable[[FloatArray], float]:
-        """Return the log likelihood of all pairs by R of the cells; earthquakes count `times`."""
+        """Return the log likelihood of all pairs by R of the cells; earthquakes are weighted by
+        `times`.
+        """
         total = np.tensordot(times[self.event], self.value, axes=1)
         spline = CubicSpline(ANGLES, total.T)
         cell = np.arange(total.shape[0])
@@ -94,7 +96,7 @@ class PairTable:
 
 
 def pair_table(rows: PairRows, kind: int, generator: np.random.Generator) -> PairTable:
-    """Return the table of the pairs of one of `KINDS`; pairs too many are drawn at random."""
+    """Return the table of the pairs of one of `KINDS`; a random sample where pairs are too many."""
     parts = [*_pairs(rows, kind, generator)]
     if not parts:
         nothing = np.empty(0)
@@ -102,9 +104,9 @@ def pair_table(rows: PairRows, kind: int, generator: np.random.Generator) -> Pai
     event, i, j, weight = (np.concatenate(part) for part in zip(*parts, strict=True))
     d_l = np.abs(rows.l[i] - rows.l[j])
     # beyond a component neither y nor polarity counts
-    own = kind == SAME_COMPONENT
-    d_y = np.abs(rows.ln_y[i] - rows.ln_y[j]) if own else np.zeros(i.size)
-    sign = rows.polarity[i] * rows.polarity[j] if own else np.zeros(i.size)
+    is_component = kind == SAME_COMPONENT
+    d_y = np.abs(rows.ln_y[i] - rows.ln_y[j]) if is_component else np.zeros(i.size)
+    sign = rows.polarity[i] * rows.polarity[j] if is_component else np.zeros(i.size)
     cell, count = _cells(d_l, d_y, sign)
     number = np.bincount(cell, minlength=count)
     middle_l, middle_y, side = (
@@ -115,10 +117,10 @@ def pair_table(rows: PairRows, kind: int, generator: np.random.Generator) -> Pai
     target = place * count + cell
     order = np.argsort(target, kind="stable")
     for start in range(0, order.size, _AT_ONCE):
-        some = order[start : start + _AT_ONCE]
-        each = _log_likelihoods(rows, i[some], j[some]) * weight[some]
-        at, first = np.unique(target[some], return_index=True)
-        value[at] += np.add.reduceat(each, first, axis=1).T
+        chunk = order[start : start + _AT_ONCE]
+        log_likelihood = _log_likelihoods(rows, i[chunk], j[chunk]) * weight[chunk]
+        at, first = np.unique(target[chunk], return_index=True)
+        value[at] += np.add.reduceat(log_likelihood, first, axis=1).T
     value = value.reshape(events.size, count, ANGLES.size)
     return PairTable(middle_l, middle_y, side, events, value, int(event.size))
 
@@ -126,44 +128,46 @@ def pair_table(rows: PairRows, kind: int, generator: np.random.Generator) -> Pai
 def _pairs(
     rows: PairRows, kind: int, generator: np.random.Generator
 ) -> Iterator[tuple[Indices, Indices, Indices, FloatArray]]:
-    """Yield earthquake, both rows and weight of the pairs of one kind, by earthquake."""
+    """Yield the earthquake, both rows and the weight of the pairs of one kind, by earthquake."""
     for number in np.unique(rows.earthquake):
-        own = np.flatnonzero(rows.earthquake == number)
+        members = np.flatnonzero(rows.earthquake == number)
         if kind == SAME_COMPONENT:
-            i, j = _within(own, rows.component)
+            i, j = _within(members, rows.component)
         elif kind == OTHER_COMPONENT:
-            i, j = _within(own, rows.site)
+            i, j = _within(members, rows.site)
             unlike = rows.component[i] != rows.component[j]
             i, j = i[unlike], j[unlike]
         else:
-            i, j = _across(own, rows.site, generator)
+            i, j = _across(members, rows.site, generator)
         if i.size:
-            total = _number_across(rows.site[own]) if kind == OTHER_SITE else i.size
+            total = _number_across(rows.site[members]) if kind == OTHER_SITE else i.size
             if i.size > MOST_PAIRS:
-                some = generator.choice(i.size, size=MOST_PAIRS, replace=False)
-                i, j = i[some], j[some]
+                sample = generator.choice(i.size, size=MOST_PAIRS, replace=False)
+                i, j = i[sample], j[sample]
             yield np.full(i.size, number), i, j, np.full(i.size, total / i.size)
 
 
-def _within(own: Indices, label: Indices) -> tuple[Indices, Indices]:
+def _within(rows: Indices, label: Indices) -> tuple[Indices, Indices]:
     """Return all pairs of rows with the same label."""
-    first, second = [own[:0]], [own[:0]]
-    for one in np.unique(label[own]):
-        members = own[label[own] == one]
+    first, second = [rows[:0]], [rows[:0]]
+    for name in np.unique(label[rows]):
+        members = rows[label[rows] == name]
         i, j = np.triu_indices(members.size, k=1)
         first.append(members[i])
         second.append(members[j])
     return np.concatenate(first), np.concatenate(second)
 
 
-def _across(own: Indices, site: Indices, generator: np.random.Generator) -> tuple[Indices, Indices]:
-    """Return pairs of rows with unlike labels: all, or `MOST_PAIRS` drawn at random."""
-    n = own.size
+def _across(
+    rows: Indices, site: Indices, generator: np.random.Generator
+) -> tuple[Indices, Indices]:
+    """Return pairs of rows with different labels: all, or a random sample of `MOST_PAIRS`."""
+    n = rows.size
     if n * (n - 1) // 2 <= 2 * MOST_PAIRS:
         i, j = np.triu_indices(n, k=1)
     else:
         i, j = generator.integers(n, size=(2, 2 * MOST_PAIRS))
-    i, j = own[i], own[j]
+    i, j = rows[i], rows[j]
     unlike = site[i] != site[j]
     return i[unlike][:MOST_PAIRS], j[unlike][:MOST_PAIRS]
 
@@ -174,7 +178,7 @@ def _number_across(label: Indices) -> float:
 
 
 def _cells(d_l: FloatArray, d_y: FloatArray, sign: FloatArray) -> tuple[Indices, int]:
-    """Return the cell of each pair, of like distances, and how many cells there are."""
+    """Return the cell of each pair, by distance, and the number of cells."""
     width = 1e-6
     while True:
         steps = [np.rint(d_l / width).astype(np.int64), np.rint(d_y / width).astype(np.int64)]
@@ -186,7 +190,7 @@ def _cells(d_l: FloatArray, d_y: FloatArray, sign: FloatArray) -> tuple[Indices,
 
 
 def _log_likelihoods(rows: PairRows, i: Indices, j: Indices) -> FloatArray:
-    """Return ln P(what both did) at every R of the table, shape (angles, n)."""
+    """Return ln P of the joint outcomes at every R of the table, shape (angles, n)."""
     side = rows.side[i] * rows.side[j]
     a, b = rows.side[i] * rows.bound[i], rows.side[j] * rows.bound[j]
     squares, product = 0.5 * (a * a + b * b), a * b * side

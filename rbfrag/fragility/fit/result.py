@@ -1,4 +1,4 @@
-"""What a method of fitting hands back."""
+"""Result of a fitting method."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLUSTERED = "clustered by earthquake, CR3 (each earthquake left out in turn)"
 
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """What a method of fitting hands back.
+    """Result of a fitting method: parameters, scores and details.
 
     Args:
         coefficients: value of each parameter by name, in the order of the formula.
@@ -42,14 +42,14 @@ class MethodResult:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Parameters with what is known of their errors.
+    """Parameters with their standard errors.
 
     Args:
         values: shape (k,).
         steps: change of the parameters without each earthquake, shape (G, k).
         samples: of a bootstrap by earthquake, shape (replicates, k).
         seed: seed of the bootstrap.
-        others: further standard errors by what the report calls them.
+        other_errors: further standard errors by what the report calls them.
     """
 
     names: Sequence[str]
@@ -57,7 +57,7 @@ class Estimates:
     steps: FloatArray
     samples: FloatArray
     seed: int
-    others: Mapping[str, FloatArray] = field(default_factory=dict)
+    other_errors: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def covariance(self) -> FloatArray:
@@ -70,7 +70,7 @@ class Estimates:
         return np.sqrt(np.diag(self.covariance))
 
     def named(self, values: FloatArray) -> dict[str, float]:
-        """Return numbers by name of the parameter."""
+        """Return values by parameter name."""
         return dict(zip(self.names, values.tolist(), strict=True))
 
 
@@ -85,7 +85,7 @@ def method_result(
     details: Mapping[str, object] | None = None,
     warnings: Sequence[str] = (),
 ) -> MethodResult:
-    """Return the result of a method whose errors are clustered by leaving out earthquakes.
+    """Return the result of a method with leave-one-earthquake-out standard errors.
 
     Args:
         in_sample: probabilities of the blocks of the grid, shape (n, m).
@@ -97,9 +97,11 @@ def method_result(
     judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
     scored = scores_of(judged, in_sample, held_out)
     real = data.judged_real
-    if real is not None and real.known.any():
-        own = scores_of(real, in_sample, held_out)
-        scored |= {f"{name}_kr05": own[name] for name in _OF_REAL_BLOCKS if name in own}
+    if real is not None and real.is_known.any():
+        real_scores = scores_of(real, in_sample, held_out)
+        scored |= {
+            f"{name}_kr05": real_scores[name] for name in _OF_REAL_BLOCKS if name in real_scores
+        }
     return MethodResult(
         coefficients=estimates.named(estimates.values),
         steps=estimates.steps,
@@ -107,10 +109,10 @@ def method_result(
         scores={**(scores or {}), **scored},
         details={
             "judged_on": judged.source,
-            "judged_outcomes": int(judged.known.sum()),
+            "judged_outcomes": int(judged.is_known.sum()),
             "score_intervals": score_intervals(judged, held_out, seed=estimates.seed),
             "standard_error_kinds": dict.fromkeys(estimates.names, CLUSTERED),
-            **{name: estimates.named(values) for name, values in estimates.others.items()},
+            **{name: estimates.named(values) for name, values in estimates.other_errors.items()},
             "bootstrap": {
                 "standard_errors": estimates.named(spread),
                 "replicates": len(estimates.samples),
@@ -125,14 +127,14 @@ def method_result(
 
 
 def scatter_of(data: FitData, ln_residual: FloatArray) -> dict[str, float] | None:
-    """Return the scatter of ln y between and within earthquakes, of finite residuals."""
+    """Return the between- and within-event dispersion of ln y, of finite residuals."""
     used = np.isfinite(ln_residual)
     scatter = nested_scatter(ln_residual[used], data.event[used], data.motion[used])
     return None if scatter is None else vars(scatter)
 
 
 def few_events(events: int) -> list[str]:
-    """Return what is to be said of few earthquakes."""
+    """Return the warning about a small number of earthquakes."""
     if events >= FEW_EVENTS:
         return []
     return [f"only {events} earthquakes: standard errors clustered by earthquake are too small"]

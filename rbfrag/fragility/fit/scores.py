@@ -1,4 +1,4 @@
-"""How well a model predicts what blocks did, on a grid that does not depend on the outcome.
+"""Scores of predicted against observed outcomes, on a grid that does not depend on the outcome.
 
 Where outcomes are stored, they are what it is judged on. Otherwise the outcome is "the critical
 value is at least the block's", which does not see the safe islands below the critical value; a
@@ -26,17 +26,17 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True, eq=False)
 class ScoredBlocks:
-    """The blocks that a fit is judged on.
+    """The blocks on which a fit is scored.
 
     Args:
         failed: 0 or 1, shape (n, m).
-        known: where the outcome is known.
+        is_known: where the outcome is known.
         event: number of each row's earthquake, shape (n,).
         source: where the outcomes come from.
     """
 
     failed: FloatArray
-    known: Mask
+    is_known: Mask
     event: NDArray[np.intp]
     source: str
 
@@ -44,7 +44,7 @@ class ScoredBlocks:
 def critical_outcomes(
     critical: FloatArray, observed: Mask, strength: FloatArray
 ) -> tuple[FloatArray, Mask]:
-    """Return the outcomes that critical values give, 0 or 1, and where they are known.
+    """Return the outcomes that follow from critical values, 0 or 1, and where they are known.
 
     Args:
         critical: critical strength, for censored points the value it lies below, shape (n,).
@@ -52,29 +52,30 @@ def critical_outcomes(
         strength: of the blocks, shape (n, m).
     """
     reached = critical[:, None] >= strength
-    known = (observed[:, None] | ~reached) & (strength > 0.0)
-    return (reached & observed[:, None]).astype(np.float64), known
+    is_known = (observed[:, None] | ~reached) & (strength > 0.0)
+    return (reached & observed[:, None]).astype(np.float64), is_known
 
 
-def log_loss(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
+def log_loss(probability: FloatArray, outcome: FloatArray, is_known: Mask) -> float:
     """Return the mean log loss of the known outcomes."""
-    p = np.clip(probability[known], CLIP, 1.0 - CLIP)
-    return float(-np.log(np.where(outcome[known] > 0.0, p, 1.0 - p)).mean())
+    p = np.clip(probability[is_known], CLIP, 1.0 - CLIP)
+    return float(-np.log(np.where(outcome[is_known] > 0.0, p, 1.0 - p)).mean())
 
 
-def brier(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
+def brier(probability: FloatArray, outcome: FloatArray, is_known: Mask) -> float:
     """Return the Brier score, the mean squared error of the probability."""
-    return float(((probability[known] - outcome[known]) ** 2).mean())
+    return float(((probability[is_known] - outcome[is_known]) ** 2).mean())
 
 
-def sharpness(probability: FloatArray, known: Mask) -> float:
-    """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
-    return float((probability[known] * (1.0 - probability[known])).mean())
+def sharpness(probability: FloatArray, is_known: Mask) -> float:
+    """Return the mean of P (1 - P), the Brier score of a perfectly calibrated model."""
+    return float((probability[is_known] * (1.0 - probability[is_known])).mean())
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A logistic regression of outcomes on the logit of the probability: 0 and 1 are perfect.
+    """Logistic regression of outcomes on the logit of the probability: intercept 0 and slope 1 are
+    perfect.
 
     Args:
         intercept: above 0 where too few failures are predicted.
@@ -85,20 +86,20 @@ class Calibration:
     slope: float
 
 
-def calibration(probability: FloatArray, outcome: FloatArray, known: Mask) -> Calibration:
+def calibration(probability: FloatArray, outcome: FloatArray, is_known: Mask) -> Calibration:
     """Return intercept and slope of the outcomes on the clipped logit of the probability.
 
     Args:
         probability: predicted, shape (n, m).
         outcome: 0 or 1, same shape.
-        known: where the outcome is known.
+        is_known: where the outcome is known.
     """
     from statsmodels.genmod.families import Binomial
     from statsmodels.genmod.generalized_linear_model import GLM
     from statsmodels.tools.sm_exceptions import PerfectSeparationWarning
 
-    p = np.clip(probability[known], CLIP, 1.0 - CLIP)
-    x, t = np.log(p / (1.0 - p)), outcome[known]
+    p = np.clip(probability[is_known], CLIP, 1.0 - CLIP)
+    x, t = np.log(p / (1.0 - p)), outcome[is_known]
     hits, misses = x[t > 0.5], x[t <= 0.5]
     if not (hits.size and misses.size) or hits.min() > misses.max() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
@@ -120,7 +121,7 @@ def scores_of(
         in_sample: probabilities by the fit to all data, shape (n, m).
         held_out: probabilities by fits without the earthquake concerned.
     """
-    outcomes = judged.failed, judged.known
+    outcomes = judged.failed, judged.is_known
     line = calibration(held_out, *outcomes)
     result = {
         "log_loss_in_sample": log_loss(in_sample, *outcomes),
@@ -129,7 +130,7 @@ def scores_of(
         "brier_held_out": brier(held_out, *outcomes),
         "calibration_slope_held_out": line.slope,
         "calibration_intercept_held_out": line.intercept,
-        "sharpness_held_out": sharpness(held_out, judged.known),
+        "sharpness_held_out": sharpness(held_out, judged.is_known),
     }
     return {name: value for name, value in result.items() if np.isfinite(value)}
 
@@ -141,7 +142,7 @@ def score_intervals(
     random = np.random.default_rng(seed)
     g = int(judged.event.max()) + 1
     drawn = random.multinomial(g, np.full(g, 1.0 / g), size=RESAMPLES).astype(np.float64)
-    count = np.bincount(judged.event, judged.known.sum(axis=1), minlength=g)
+    count = np.bincount(judged.event, judged.is_known.sum(axis=1), minlength=g)
     p = np.clip(held_out, CLIP, 1.0 - CLIP)
     losses = {
         "log_loss_held_out": -np.where(judged.failed > 0.5, np.log(p), np.log1p(-p)),
@@ -149,7 +150,7 @@ def score_intervals(
     }
     result = {}
     for name, loss in losses.items():
-        lost = np.where(judged.known, loss, 0.0).sum(axis=1)
+        lost = np.where(judged.is_known, loss, 0.0).sum(axis=1)
         means = (drawn @ np.bincount(judged.event, lost, minlength=g)) / np.maximum(
             drawn @ count, 1.0
         )
@@ -166,7 +167,7 @@ FEWEST_BLOCKS = 20
 
 @dataclass(frozen=True, eq=False)
 class CalibrationBins:
-    """What a model predicted for earthquakes it had not seen, and what happened.
+    """Predicted and observed failure fractions of held-out earthquakes, by predicted probability.
 
     Args:
         predicted: mean predicted probability of each bin, shape (m,).
@@ -185,7 +186,7 @@ class CalibrationBins:
 def calibration_bins(
     judged: ScoredBlocks, held_out: FloatArray, *, seed: int = 0
 ) -> CalibrationBins:
-    """Sort the blocks of known outcome by the probability that held-out fits gave them.
+    """Bin the blocks of known outcome by their held-out probability.
 
     Args:
         held_out: probabilities by fits without the earthquake concerned, shape (n, m).
@@ -195,7 +196,7 @@ def calibration_bins(
     # Blocks are counted in a table (earthquake, bin of P). In a calibrated model the fraction that
     # fails in a bin equals its mean P. The range comes from resampled earthquakes, which, unlike
     # blocks, are independent.
-    used = judged.known & np.isfinite(held_out)
+    used = judged.is_known & np.isfinite(held_out)
     event = np.broadcast_to(judged.event[:, None], held_out.shape)[used]
     p, failed = held_out[used], judged.failed[used]
     number = np.clip(np.searchsorted(EDGES, p, side="right") - 1, 0, EDGES.size - 2)
@@ -222,14 +223,14 @@ def calibration_bins(
         failed_fraction(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)
     ]
     total = count.sum(axis=0)
-    kept = total >= FEWEST_BLOCKS
-    low, high = np.nanquantile(np.array(draws)[:, kept], (0.025, 0.975), axis=0)
+    is_filled = total >= FEWEST_BLOCKS
+    low, high = np.nanquantile(np.array(draws)[:, is_filled], (0.025, 0.975), axis=0)
     return CalibrationBins(
-        predicted=expected.sum(axis=0)[kept] / total[kept],
-        observed=failures.sum(axis=0)[kept] / total[kept],
+        predicted=expected.sum(axis=0)[is_filled] / total[is_filled],
+        observed=failures.sum(axis=0)[is_filled] / total[is_filled],
         low=low,
         high=high,
-        blocks=total[kept].astype(np.intp),
+        blocks=total[is_filled].astype(np.intp),
         events=int(events.size),
     )
 
@@ -254,7 +255,7 @@ class NestedScatter:
 def nested_scatter(
     residual: FloatArray, event: NDArray[np.intp], motion: NDArray[np.int64]
 ) -> NestedScatter | None:
-    """Split residuals by the analysis of variance of unbalanced nested classes.
+    """Split residuals by an analysis of variance of unbalanced nested classes.
 
     Mean squares are equated to their expectations (Searle, Casella and McCulloch 1992,
     section 3.6); a negative component is zero.

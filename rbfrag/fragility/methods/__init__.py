@@ -18,7 +18,7 @@ def method_names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def method_named(name: str) -> Method:
-    """Return a method."""
+    """Return the method with this name."""
     if not name.isidentifier() or name.startswith("_"):
         raise _unknown(name)
     try:

@@ -1,4 +1,4 @@
-"""The method ``bounded``: outcomes, with P falling to 0 at the bounds of mechanics.
+"""The method ``bounded``: outcomes, with P decreasing to 0 at the bounds of mechanics.
 
     P = exp(-exp(-eta)),   eta = h(p) [sum of b times what the table names]
 
@@ -27,20 +27,28 @@ from typing import Any
 
 from rbfrag.fragility import fits, method
 from rbfrag.fragility.measures import spectral_velocity_m_s
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear, log_strength
+from rbfrag.fragility.method import (
+    ArrayNamespace,
+    Form,
+    LinearPredictor,
+    Method,
+    SizeFactor,
+    linear,
+    log_strength,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.vocabulary.quantities import SPECTRAL
 
 Values = Mapping[str, Any]
 
 
-def _pgv_kr(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pgv_kr(b: Sequence[float], v: Values, ns: ArrayNamespace) -> LinearPredictor:
     ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
     l = ns.log(v["p"])  # noqa: E741  as in the formula
     return linear(b, 1.0, -ns.log(ratio), ns.log(1.0 - ratio), l * l, log_strength(v, ns))
 
 
-def _pgv_pga(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pgv_pga(b: Sequence[float], v: Values, ns: ArrayNamespace) -> LinearPredictor:
     pga, x = v["pga_g"], v["intensity_m_s"]
     r = v["kr"] / pga
     below_two_pgv = ns.log(1.0 - v["y_m_s"] / (2.0 * x))
@@ -48,11 +56,11 @@ def _pgv_pga(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
     return linear(b, 1.0, -ns.log(r), ns.log(1.0 - r), below_two_pgv, log_z)
 
 
-def _pgv_pga_tm(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pgv_pga_tm(b: Sequence[float], v: Values, ns: ArrayNamespace) -> LinearPredictor:
     return linear(b, *_pgv_pga(b, v, ns).slopes, ns.log(v["p"] * v["tm_s"] / (2.0 * math.pi)))
 
 
-def _pgv_pga_sa(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pgv_pga_sa(b: Sequence[float], v: Values, ns: ArrayNamespace) -> LinearPredictor:
     w1, w3 = (
         ns.log(spectral_velocity_m_s(v[measure], period_s) / v["intensity_m_s"])
         for measure, period_s in (("sa10_g", 1.0), ("sa30_g", 3.0))
@@ -60,12 +68,14 @@ def _pgv_pga_sa(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
     return linear(b, *_pgv_pga(b, v, ns).slopes, w1, w3, w3 * ns.log(v["p"]))
 
 
-def _pga(b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pga(b: Sequence[float], v: Values, ns: ArrayNamespace) -> LinearPredictor:
     l = ns.log(v["p"])  # noqa: E741  as in the formula
     return linear(b, 1.0, l, l * l, ns.log(v["pga_g"] / v["kr"]), log_strength(v, ns))
 
 
-def _pga_sa(periods: tuple[str, ...], b: Sequence[float], v: Values, ns: Numbers) -> Eta:
+def _pga_sa(
+    periods: tuple[str, ...], b: Sequence[float], v: Values, ns: ArrayNamespace
+) -> LinearPredictor:
     l, pga = ns.log(v["p"]), v["pga_g"]  # noqa: E741  as in the formula
     slopes = [1.0, l, l * l, ns.log(pga / v["kr"])]
     for period in periods:

@@ -1,4 +1,5 @@
-"""The method ``capacity``: what slumping blocks did under scaled records, probit; and ``confined``.
+"""The method ``capacity``: outcomes of slumping blocks under scaled records, probit; and
+``confined``.
 
     P = Φ(eta), 0 from r = 1 on
 
@@ -18,12 +19,12 @@ from typing import Any
 from rbfrag.fragility import fits
 from rbfrag.fragility.method import (
     NORMAL,
+    ArrayNamespace,
     BlockParameters,
-    Bound,
-    Eta,
     Form,
+    LinearPredictor,
+    MechanicalBound,
     Method,
-    Numbers,
     linear,
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -44,7 +45,7 @@ _PARAMETERS = ("b0", "b_ln_excess", "b_ln_z", "b_ln_k")
 def capacity_method(
     name: str, kind: str, numbers: tuple[str, str], moves: str, *, criterion: str | None = None
 ) -> Method:
-    """Return the method for blocks of a kind that are followed under scaled records.
+    """Return the method for blocks of a kind that are simulated under scaled records.
 
     Args:
         numbers: names of the yield acceleration coefficient and of p² at rest [1/s²].
@@ -52,19 +53,19 @@ def capacity_method(
         criterion: name of the criterion of failure, if there are several.
     """
     strength, size = numbers
-    at_rest = Bound(
+    at_rest = MechanicalBound(
         lambda v: v[strength] >= v["pga_g"],
         strength,
         f"{QUANTITIES[strength].symbol}{{{strength}}} is not below PGA{{pga_g}}: "
         "the block does not move",
     )
 
-    def pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    def pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
         r = v[strength] / v["pga_g"]
         z = v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
         return linear(b, 1.0, ns.log((1.0 - r) / r), ns.log(z), ns.log(v[strength]))
 
-    def pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    def pgv_pga_m(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
         return linear(b, *pgv_pga(b, v, ns).slopes, v["magnitude"] - MIDDLE_MAGNITUDE)
 
     return Method(

@@ -1,4 +1,6 @@
-"""The method ``confined``: what blocks that topple under their back plane did; as ``capacity``."""
+"""The method ``confined``: outcomes of blocks that topple under their back plane; like
+``capacity``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The method ``displacement``: the permanent displacement of blocks that slide, lognormal.
+"""The method ``displacement``: permanent displacement of sliding blocks, lognormal.
 
 Sliding further than d on a level plane, with r = k_y/PGA:
 
@@ -22,14 +22,22 @@ from operator import mul
 from typing import Any
 
 from rbfrag.fragility import fits
-from rbfrag.fragility.method import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
+from rbfrag.fragility.method import (
+    NORMAL,
+    ArrayNamespace,
+    BlockParameters,
+    Form,
+    LinearPredictor,
+    MechanicalBound,
+    Method,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
-Formula = Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+Formula = Callable[[Sequence[float], Mapping[str, Any], ArrayNamespace], LinearPredictor]
 
 
-def _level(values: dict[str, Any], ns: Numbers) -> None:
-    """Make the displacement down a base that dips that on a level plane, d cos φ/cos(φ - β)."""
+def _level(values: dict[str, Any], ns: ArrayNamespace) -> None:
+    """Convert the displacement down a dipping base to a level plane, d cos φ/cos(φ - β)."""
     if "beta_deg" not in values:
         return
     beta = values["beta_deg"] * (math.pi / 180.0)
@@ -43,7 +51,7 @@ BLOCK = BlockParameters(
     "sliding",
     "ky",
     None,
-    Bound(
+    MechanicalBound(
         lambda v: v["ky"] >= v["pga_g"],
         "ky",
         "k_y{ky} is not below PGA{pga_g}: the block does not move",
@@ -52,7 +60,7 @@ BLOCK = BlockParameters(
     points="displacements",
     adjust=_level,
     refuses=(
-        Bound(
+        MechanicalBound(
             lambda v: (
                 "beta_deg" in v
                 and (abs(v["beta_deg"]) >= 90.0)
@@ -67,10 +75,10 @@ BLOCK = BlockParameters(
 """Blocks known by k_y = tan(φ - β) and the displacement that is too far [m]."""
 
 
-def _eta(further: Callable[[Mapping[str, Any], Numbers], tuple[Any, ...]]) -> Formula:
-    """Return the formula with further terms of the median, from values and functions."""
+def _eta(further: Callable[[Mapping[str, Any], ArrayNamespace], tuple[Any, ...]]) -> Formula:
+    """Return the formula with further terms of the median."""
 
-    def formula(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    def formula(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
         ky, pgv = v["ky"], v["pgv_m_s"]
         r = ky / v["pga_g"]
         size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
@@ -79,13 +87,13 @@ def _eta(further: Callable[[Mapping[str, Any], Numbers], tuple[Any, ...]]) -> Fo
         per = ns.exp(-log_sigma)
         median = sum(map(mul, b, columns))
         eta = (median - ns.log(v["displacement_m"])) * per
-        slopes = (*(each * per for each in columns), -eta, -eta * r)
-        return Eta(eta, slopes, log_sigma, (*(0.0 for _ in columns), 1.0, r))
+        slopes = (*(column * per for column in columns), -eta, -eta * r)
+        return LinearPredictor(eta, slopes, log_sigma, (*(0.0 for _ in columns), 1.0, r))
 
     return formula
 
 
-def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     ky, pgv = v["ky"], v["pgv_m_s"]
     size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
     a = ky / (ns.exp(b[3]) * pgv)
@@ -93,7 +101,7 @@ def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     per = ns.exp(-b[4])
     eta = (b[0] + b[1] * size - b[2] * u - ns.log(v["displacement_m"])) * per
     slopes = (per, size * per, -u * per, b[2] * per * a / (1.0 + a), -eta)
-    return Eta(eta, slopes, b[4], (0.0, 0.0, 0.0, 0.0, 1.0))
+    return LinearPredictor(eta, slopes, b[4], (0.0, 0.0, 0.0, 0.0, 1.0))
 
 
 METHOD = Method(

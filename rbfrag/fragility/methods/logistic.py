@@ -15,15 +15,23 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear, log_strength
+from rbfrag.fragility.method import (
+    ArrayNamespace,
+    Form,
+    LinearPredictor,
+    Method,
+    SizeFactor,
+    linear,
+    log_strength,
+)
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     ratio = ns.log(v["intensity_m_s"] / v["y_m_s"])
     return linear(b, 1.0, ratio) if len(b) == 2 else linear(b, 1.0, ratio, ns.log(v["p"]))
 
 
-def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     x, l = v["intensity_m_s"], ns.log(v["p"])  # noqa: E741  as in the formula
     return linear(b, 1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
 

@@ -11,19 +11,27 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits
-from rbfrag.fragility.method import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
+from rbfrag.fragility.method import (
+    NORMAL,
+    OF_CRITICAL,
+    TOPPLING_BLOCK,
+    ArrayNamespace,
+    Form,
+    LinearPredictor,
+    Method,
+)
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     log_x = ns.log(v["intensity_m_s"])
     per = ns.exp(-b[2])
     from_line = b[0] + b[1] * log_x - ns.log(v["y_m_s"])
     if len(b) == 3:
         eta = from_line * per
-        return Eta(eta, (per, log_x * per, -eta), b[2], (0.0, 0.0, 1.0))
+        return LinearPredictor(eta, (per, log_x * per, -eta), b[2], (0.0, 0.0, 1.0))
     log_p = ns.log(v["p"])
     eta = (from_line + b[3] * log_p) * per
-    return Eta(eta, (per, log_x * per, -eta, log_p * per), b[2], (0.0, 0.0, 1.0, 0.0))
+    return LinearPredictor(eta, (per, log_x * per, -eta, log_p * per), b[2], (0.0, 0.0, 1.0, 0.0))
 
 
 _FORM = Form(

@@ -1,4 +1,4 @@
-"""The method ``overturning``: what free-standing blocks did, logistic, with their restitution.
+"""The method ``overturning``: outcomes of free-standing blocks, logistic, with their restitution.
 
     P = 1/(1 + exp(-eta)), 0 from r = 1 on,   eta = h(p) [sum of b times what the forms name]
 
@@ -18,12 +18,12 @@ from typing import Any
 from rbfrag.fragility import fits, method
 from rbfrag.fragility.measures import spectral_velocity_m_s
 from rbfrag.fragility.method import (
+    ArrayNamespace,
     BlockParameters,
-    Bound,
-    Eta,
     Form,
+    LinearPredictor,
+    MechanicalBound,
     Method,
-    Numbers,
     SizeFactor,
     linear,
 )
@@ -33,8 +33,8 @@ LEAST_RESTITUTION = 1e-6
 """Stands for the restitution of stocky blocks, of whose speed an impact leaves nothing."""
 
 
-def _restitution(values: dict[str, Any], ns: Numbers) -> None:
-    """Complete the restitution: as given, or that of the rectangle times a factor of it."""
+def _restitution(values: dict[str, Any], ns: ArrayNamespace) -> None:
+    """Complete the restitution: as given, or that of the rectangle times a factor."""
     if "restitution" not in values:
         square = values["kr"] * values["kr"]
         formula = 1.0 - 1.5 * square / (1.0 + square)
@@ -56,7 +56,7 @@ BLOCK = BlockParameters(
     fractions=("restitution",),
     adjust=_restitution,
     refuses=(
-        Bound(
+        MechanicalBound(
             lambda v: (v["restitution"] <= 0.0) | (v["restitution"] > 1.0),
             "restitution",
             "must be above 0 and up to 1 (a block that comes to rest at its first impact is not "
@@ -69,31 +69,31 @@ BLOCK = BlockParameters(
 """Free-standing blocks known by p² [1/s²], k_r = tan(critical angle) and, if given, restitution."""
 
 
-def _log_odds(v: Mapping[str, Any], ns: Numbers) -> Any:
+def _log_odds(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
     r = v["kr"] / v["pga_g"]
     return ns.log(r / (1.0 - r))
 
 
-def _log_z(v: Mapping[str, Any], ns: Numbers) -> Any:
+def _log_z(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
     return ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
 
 
-def _small_magnitude(v: Mapping[str, Any], ns: Numbers) -> Any:
-    """Return M - 6.5, 0 from 6.5 on."""
+def _small_magnitude(v: Mapping[str, Any], ns: ArrayNamespace) -> Any:
+    """Return M - 6.5 below 6.5, otherwise 0."""
     return ns.minimum(v["magnitude"], _LARGE_MAGNITUDE) - _LARGE_MAGNITUDE
 
 
-def _over_pgv(measure: str, period_s: float) -> Callable[[Mapping[str, Any], Numbers], Any]:
+def _over_pgv(measure: str, period_s: float) -> Callable[[Mapping[str, Any], ArrayNamespace], Any]:
     return lambda v, ns: ns.log(spectral_velocity_m_s(v[measure], period_s) / v["pgv_m_s"])
 
 
-def _over_pga(measure: str, period_s: float) -> Callable[[Mapping[str, Any], Numbers], Any]:
+def _over_pga(measure: str, period_s: float) -> Callable[[Mapping[str, Any], ArrayNamespace], Any]:
     # g drops out
     return lambda v, ns: ns.log(v[measure] / v["pga_g"] * (period_s / (2.0 * math.pi)))
 
 
 _LARGE_MAGNITUDE = 6.5
-_FEATURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], Numbers], Any]]] = {
+_FEATURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], ArrayNamespace], Any]]] = {
     "logit_r": (r"\ln\frac{r}{1 - r}", _log_odds),
     "ln_z": (r"\ln z", _log_z),
     "ln_y_over_x": (r"\ln(y/x)", lambda v, ns: ns.log(v["y_m_s"] / v["intensity_m_s"])),
@@ -117,7 +117,7 @@ def _form(
     of_pga: bool = True,
     advice: str = "",
 ) -> Form:
-    """Return the form of a constant, some features, and products of two of them.
+    """Return the formula of a constant, features, and products of two features.
 
     Args:
         features: their names, with blanks between.
@@ -129,9 +129,9 @@ def _form(
     names = features.split()
     parts = {name: _FEATURES[name] for name in names}
 
-    def formula(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-        known = {name: of(v, ns) for name, (_, of) in parts.items()}
-        return linear(b, 1.0, *known.values(), *[known[x] * known[y] for x, y in products])
+    def formula(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
+        features = {name: of(v, ns) for name, (_, of) in parts.items()}
+        return linear(b, 1.0, *features.values(), *[features[x] * features[y] for x, y in products])
 
     return Form(
         ("b0", *(f"b_{name}" for name in names), *(f"b_{x}_{y}" for x, y in products)),

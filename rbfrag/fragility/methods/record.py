@@ -12,11 +12,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import Eta, Form, Method, Numbers, SizeFactor, linear
+from rbfrag.fragility.method import (
+    ArrayNamespace,
+    Form,
+    LinearPredictor,
+    Method,
+    SizeFactor,
+    linear,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     x = v["intensity_m_s"]
     log_s = ns.log(v["p"] * x / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
     return linear(b, 1.0, ns.log(x / v["y_m_s"]), log_s)

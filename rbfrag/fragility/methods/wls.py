@@ -1,4 +1,4 @@
-"""The method ``wls``: the dissertation's models, a straight line with normal scatter.
+"""The method ``wls``: the models of the dissertation, a straight line with normal dispersion.
 
     y* = c0 + c1 x + ε,   ε normal with variance  v(x) = v0 + v1 x (+ v2 x²)
     P  = P(y* >= y | x) = Φ(eta),   eta = (c0 + c1 x - y)/sqrt(v(x))
@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rbfrag.fragility import fits, method
-from rbfrag.fragility.method import Eta, FittedVariance, Form, Method, Numbers
+from rbfrag.fragility.method import ArrayNamespace, FittedVariance, Form, LinearPredictor, Method
 from rbfrag.fragility.straight_line import (
     NEGATIVE_LIMIT,
     mean_m_s,
@@ -23,18 +23,18 @@ from rbfrag.fragility.straight_line import (
 from rbfrag.results.numbers import exact_percent
 
 
-def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+def _eta(b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace) -> LinearPredictor:
     x = v["intensity_m_s"]
     variance = variance_m2_s2(b, x)
     per = 1.0 / ns.sqrt(variance)
     eta = (mean_m_s(b, x) - v["y_m_s"]) * per
     by_v = eta / (variance * -2.0)
     slopes = (per, x * per, by_v, by_v * x)
-    return Eta(eta, slopes if len(b) == 4 else (*slopes, by_v * x * x))
+    return LinearPredictor(eta, slopes if len(b) == 4 else (*slopes, by_v * x * x))
 
 
 def _doubts(
-    b: Sequence[float], v: Mapping[str, Any], ns: Numbers
+    b: Sequence[float], v: Mapping[str, Any], ns: ArrayNamespace
 ) -> Iterator[tuple[Any, str, str]]:
     outside = "is outside the range where the straight-line normal model makes sense"
     yield (

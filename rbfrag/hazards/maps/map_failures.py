@@ -1,4 +1,4 @@
-"""How many blocks of a map fail together in one earthquake, by draws of shaking and blocks.
+"""Joint failures of the blocks of a shaking map in one earthquake, by Monte Carlo simulation.
 
 The residual of the logarithm of a measure at a site is
 
@@ -61,7 +61,7 @@ _VALUES_AT_ONCE, _RESIDUALS_AT_ONCE = 2_000_000, 12_000_000
 
 @dataclass(frozen=True)
 class Failures:
-    """How many fail, by one law of how blocks fail together.
+    """Number of failures under one dependence model.
 
     Args:
         probability_any: probability that at least one fails.
@@ -108,24 +108,24 @@ class MapFailures:
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers under the keys of the JSON contract."""
-        one = self.by_law.get(COPULA)
-        known = dict.fromkeys(Failures.KEYS) if one is None else one.as_dict()
+        failures = self.by_law.get(COPULA)
+        numbers = dict.fromkeys(Failures.KEYS) if failures is None else failures.as_dict()
         bounds = (
             {}
-            if one
+            if failures
             else {name.replace(" ", "_"): law.as_dict() for name, law in self.by_law.items()}
         )
         return {
             "expected_failures": self.expected,
-            **known,
-            "joint_law": "bounds" if one is None else COPULA,
+            **numbers,
+            "joint_law": "bounds" if failures is None else COPULA,
             **({"bounds": bounds} if bounds else {}),
             "draws": self.draws,
         }
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What these numbers take for granted."""
+        """Warnings about the assumptions behind these numbers."""
         warnings = []
         if self.range_km is not None:
             text = (
@@ -147,8 +147,8 @@ _SAME_SITE_DEG = 0.001
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Where sites lie, and which of them are one site to the blocks.
+class SiteLocations:
+    """Coordinates of sites, and the groups that form one site for the blocks.
 
     Args:
         lon: longitudes [deg], shape (n,).
@@ -163,8 +163,8 @@ class Places:
     @classmethod
     def of(
         cls, lon: FloatArray, lat: FloatArray, names: NDArray[np.object_] | None = None
-    ) -> Places:
-        """Return places of which one site are those of one name, or else within 0.001° (100 m).
+    ) -> SiteLocations:
+        """Return locations grouped into sites by name, or else within 0.001° (100 m).
 
         Args:
             lon: longitudes [deg], shape (n,).
@@ -178,15 +178,15 @@ class Places:
             group = np.unique(names.astype(str), return_inverse=True)[1]
         return cls(lon, lat, np.asarray(group, dtype=np.intp))
 
-    def only(self, chosen: Indices) -> Places:
-        """Return some of the places."""
-        return Places(self.lon[chosen], self.lat[chosen], self.group[chosen])
+    def only(self, chosen: Indices) -> SiteLocations:
+        """Return a selection of the locations."""
+        return SiteLocations(self.lon[chosen], self.lat[chosen], self.group[chosen])
 
 
 def map_failures(
     answer: SiteProbability,
     numbers: Mapping[str, FloatArray],
-    places: Places,
+    locations: SiteLocations,
     *,
     weight: FloatArray | None = None,
     draws: int | None = None,
@@ -195,7 +195,7 @@ def map_failures(
     range_km: float | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> MapFailures:
-    """Return how many blocks fail together; they face unknown azimuths.
+    """Return the number of blocks that fail together, for unknown azimuths.
 
     Args:
         numbers: what the model read of the blocks, by field, shape (m,) each.
@@ -213,9 +213,9 @@ def map_failures(
     # plus a between-event term, then blocks by the dependence model at their site.
     columns = answer.shaking.model.method.block.filled(numbers)
     weights = np.ones(next(iter(columns.values())).size) if weight is None else weight
-    each = answer.each * weights[answer.block]
-    some = _worth_drawing(each)
-    site, blocks = answer.site[some], answer.block[some]
+    expected = answer.pair_probability * weights[answer.block]
+    pairs = _worth_drawing(expected)
+    site, blocks = answer.site[pairs], answer.block[pairs]
     draws = _number(draws, site.size)
     if not 0.0 <= between <= 1.0:
         raise InputError(
@@ -225,15 +225,20 @@ def map_failures(
         raise InputError(f"seed = {seed}: give 0 or more")
     if range_km is None:
         range_km = correlation_range_km(answer.shaking.names[0])
-    used, here = np.unique(site, return_inverse=True)
-    residuals = _Residuals(answer.shaking, used, places.only(used), between, range_km)
-    model, own = answer.shaking.model, {n: values[blocks] for n, values in columns.items()}
-    where = Placement.of_numbers(model.method.block, own, site=places.group[site], polarity=UNKNOWN)
+    used, site_index = np.unique(site, return_inverse=True)
+    residuals = _Residuals(answer.shaking, used, locations.only(used), between, range_km)
+    model, block_numbers = (
+        answer.shaking.model,
+        {n: values[blocks] for n, values in columns.items()},
+    )
+    where = Placement.of_numbers(
+        model.method.block, block_numbers, site=locations.group[site], polarity=UNKNOWN
+    )
     laws = normals_by_law(model.dependence, where, site.size)
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
-    given = {name: values[:, None] for name, values in own.items()}
+    block_columns = {name: values[:, None] for name, values in block_numbers.items()}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
     start = 0
     for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):
@@ -241,15 +246,15 @@ def map_failures(
         part = slice(start, start + count)
         start += count
         shaken = answer.shaking.shaken(used, logs)
-        values = {name: measure[here] for name, measure in shaken.items()}
-        prediction = array_answer(model, {**given, **values}, interval=False)
+        values = {name: measure[site_index] for name, measure in shaken.items()}
+        prediction = array_answer(model, {**block_columns, **values}, interval=False)
         for name, normals in laws.items():
             fails = ndtr(normals(count, generator).T) <= prediction.probability
             drawn[name][part] = weights[blocks] @ fails
             any_fails[name][part] = fails.any(axis=0)
         if on_progress is not None:
             on_progress(start, draws)
-    counted = answer.each[each > 0.0]
+    counted = answer.pair_probability[expected > 0.0]
     bounds = float(counted.max(initial=0.0)), min(float(counted.sum()), 1.0)
     by_law = {
         name: Failures(
@@ -259,8 +264,8 @@ def map_failures(
         )
         for name, counts in drawn.items()
     }
-    known = bool(answer.shaking.integrated)
-    return MapFailures(float(each.sum()), by_law, range_km if known else None, drawn)
+    is_uncertain = bool(answer.shaking.integrated)
+    return MapFailures(float(expected.sum()), by_law, range_km if is_uncertain else None, drawn)
 
 
 def _number(draws: int | None, blocks: int) -> int:
@@ -272,7 +277,7 @@ def _number(draws: int | None, blocks: int) -> int:
 
 
 def _worth_drawing(expected: FloatArray) -> Indices:
-    """Return where the most probable ones stand, but `LEFT_OUT` of their sum."""
+    """Return the indices of the most probable failures, all but `LEFT_OUT` of the sum."""
     order = np.argsort(expected, kind="stable")
     below = np.cumsum(expected[order])
     first = int(np.searchsorted(below, LEFT_OUT * below[-1])) if below.size else 0
@@ -280,13 +285,13 @@ def _worth_drawing(expected: FloatArray) -> Indices:
 
 
 class _Residuals:
-    """Draws residuals of the logarithms of the measures at some sites."""
+    """Sampler of residuals of the logarithms of the measures at sites."""
 
     def __init__(
         self,
         shaking: SiteShaking,
         site: Indices,
-        places: Places,
+        locations: SiteLocations,
         between: float,
         range_km: float,
     ) -> None:
@@ -294,8 +299,10 @@ class _Residuals:
         self._scatter = shaking.scatter
         self._parts = np.sqrt(between), np.sqrt(1.0 - between)
         self._factor = np.linalg.cholesky(correlations(shaking.names))
-        self._field = SpatialField(places.lon, places.lat, range_km) if shaking.integrated else None
-        self._group = np.unique(places.group, return_inverse=True)[1]
+        self._field = (
+            SpatialField(locations.lon, locations.lat, range_km) if shaking.integrated else None
+        )
+        self._group = np.unique(locations.group, return_inverse=True)[1]
 
     def in_parts(
         self, draws: int, at_once: int, generator: np.random.Generator
@@ -312,10 +319,10 @@ class _Residuals:
         n, k = self._deviations.shape
         logs = np.zeros((n, count, k))
         if self._field is not None:
-            common, own = self._parts
-            event = common * generator.standard_normal((count, k))
+            between_scale, within_scale = self._parts
+            event = between_scale * generator.standard_normal((count, k))
             within = self._field.draw(count * k, generator).reshape(n, count, k)
-            logs += (event + own * within) @ self._factor.T * self._deviations[:, None]
+            logs += (event + within_scale * within) @ self._factor.T * self._deviations[:, None]
         if self._scatter > 0.0:
             xi = generator.standard_normal((int(self._group.max(initial=-1)) + 1, count))
             logs += self._scatter * xi[self._group][:, :, None]

@@ -1,4 +1,4 @@
-"""The probability of failure at many sites whose shaking is known with uncertainty."""
+"""Probability of failure at many sites with uncertain shaking."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.prediction import array_answer
 from rbfrag.fragility.prediction_array import predict_many
 from rbfrag.fragility.shaking import Scatter
-from rbfrag.fragility.shaking_points import ShakingPoints
+from rbfrag.fragility.shaking_points import GroundMotionQuadrature
 from rbfrag.fragility.uncertain import UncertainModel
 from rbfrag.hazards.maps.site_shaking import SiteShaking
 from rbfrag.question.components import Component
@@ -39,7 +39,7 @@ _CHUNK = 100_000
 
 @dataclass(frozen=True, eq=False)
 class SiteProbability:
-    """Probabilities at n sites.
+    """Failure probabilities at n sites.
 
     Args:
         probability: P at each site, the mean over the blocks of a class, shape (n,).
@@ -50,7 +50,7 @@ class SiteProbability:
         shaking: what the model reads of the shaking, and its scatter.
         site: sites of the pairs of site and block of which any can fail, shape (k,).
         block: their blocks.
-        each: P of each pair.
+        pair_probability: P of each pair.
     """
 
     probability: FloatArray
@@ -61,11 +61,11 @@ class SiteProbability:
     shaking: SiteShaking
     site: Indices
     block: Indices
-    each: FloatArray
+    pair_probability: FloatArray
 
 
 class _Question(BlockKeywords[V], AnsweringFields, total=False):
-    """What is asked of blocks at sites."""
+    """Keywords of the blocks at sites, with model, level and database."""
 
 
 def site_probability(
@@ -77,7 +77,7 @@ def site_probability(
     std_ln: Mapping[str, FloatArray] | None = None,
     **question: Unpack[_Question[FloatArray]],
 ) -> SiteProbability:
-    """Return probabilities at sites, integrated over what is not known of the shaking.
+    """Return failure probabilities at sites, integrated over the uncertainty of the shaking.
 
     The best model that the measures suffice for reads its own of them. Their logarithms at a site
     are taken as normal about those of the given values, with the given standard deviations and the
@@ -96,22 +96,25 @@ def site_probability(
         question: the numbers of blocks that their one kind reads, NaN of an option for the
             blocks' own, and model, level and db as in :func:`rbfrag.predict`.
     """
-    given, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
-    kind, level = given.pop("kind", None), answering.get("level", LEVEL)
+    inputs, answering = parts_of(numbers, question, BLOCKS, ANSWERING)
+    kind, level = inputs.pop("kind", None), answering.get("level", LEVEL)
     shaking = SiteShaking.of(
-        measures, component, std_ln or {}, model_for(answering, (*given, *measures), kind)
+        measures, component, std_ln or {}, model_for(answering, (*inputs, *measures), kind)
     )
-    columns = shaking.model.method.block.filled(given)
+    columns = shaking.model.method.block.filled(inputs)
     size = next(iter(columns.values())).size
     chosen, n = shaking.model, shaking.median.shape[0]
     weights = np.full(size, 1.0) if weight is None else weight
     weights = np.ones(n) if own_block else weights / weights.sum()
     blocks = 1 if own_block else size
-    scatter, _ = Scatter.of(chosen.term, shaking.given(np.arange(n)))
+    scatter, _ = Scatter.of(chosen.term, shaking.inputs_at(np.arange(n)))
 
     def pairs_of(site: Indices, block: Indices) -> dict[str, FloatArray]:
-        """Return block and shaking of pairs of site and block."""
-        return {**{name: values[block] for name, values in columns.items()}, **shaking.given(site)}
+        """Return block parameters and shaking for pairs of site and block."""
+        return {
+            **{name: values[block] for name, values in columns.items()},
+            **shaking.inputs_at(site),
+        }
 
     # P = E[P(block | im)] over ln im ~ N(median, σ). Most pairs are clear: where even the median
     # fails with certainty or a strong deviation with no probability, fewer points suffice.
@@ -120,15 +123,15 @@ def site_probability(
     for sites in _chunks(np.arange(n), _CHUNK // blocks):
         site = np.repeat(sites, blocks)
         block = site if own_block else np.tile(np.arange(blocks), sites.size)
-        given = pairs_of(site, block)
-        measures = {name: given[name] for name in (*columns, *shaking.names)}
+        inputs = pairs_of(site, block)
+        measures = {name: inputs[name] for name in (*columns, *shaking.names)}
         median = array_answer(chosen, measures, level, interval=False)
         in_domain[sites] = median.in_domain.reshape(-1, blocks).all(axis=1)
         both = np.stack([site, block])
         if scatter is None:
             pairs.setdefault(-np.inf, []).append(both[:, ~(median.probability <= NOTHING)])
             continue
-        points = ShakingPoints(chosen, scatter)
+        points = GroundMotionQuadrature(chosen, scatter)
         for score in (_STRONGEST, *_SILENT):  # the highest of these at which nothing fails yet
             fails = points.fails_at(
                 pairs_of(*both), score, RARE if score == _STRONGEST else NOTHING
@@ -138,11 +141,11 @@ def site_probability(
             both = both[:, fails]
         pairs.setdefault(-np.inf, []).append(both)
     answers = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), *np.empty((3, 0)))]
-    for score, some in pairs.items():
-        site, block = np.concatenate(some, axis=1)
+    for score, pair_parts in pairs.items():
+        site, block = np.concatenate(pair_parts, axis=1)
         model = chosen
         if scatter is not None:
-            points = ShakingPoints(chosen, scatter, score)
+            points = GroundMotionQuadrature(chosen, scatter, score)
             model = UncertainModel.over(chosen, points=points, judged=False)
         for part in _chunks(np.arange(site.size), _CHUNK):
             answer = predict_many(
@@ -152,14 +155,22 @@ def site_probability(
             answers.append(
                 (site[part], block[part], answer.probability, answer.ci_low, answer.ci_high)
             )
-    site, block, *each = (np.concatenate(column) for column in zip(*answers, strict=True))
+    site, block, *estimates = (np.concatenate(column) for column in zip(*answers, strict=True))
     probability, low, high = (
-        np.bincount(site, row * weights[block], n).astype(np.float64) for row in each
+        np.bincount(site, row * weights[block], n).astype(np.float64) for row in estimates
     )
     return SiteProbability(
-        probability, low, high, in_domain, level, shaking, site, block, each=each[0]
+        probability,
+        low,
+        high,
+        in_domain,
+        level,
+        shaking,
+        site,
+        block,
+        pair_probability=estimates[0],
     )
 
 
-def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
-    return [places[i : i + max(size, 1)] for i in range(0, places.size, max(size, 1))]
+def _chunks(indices: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
+    return [indices[i : i + max(size, 1)] for i in range(0, indices.size, max(size, 1))]

@@ -1,4 +1,4 @@
-"""The shaking at many sites in one earthquake, as a model reads it, and what is not known of it."""
+"""Uncertain shaking at many sites in one earthquake, as the predictors of a model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rbfrag.solver.results import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class SiteShaking:
-    """Measures of single components at n sites, whose logarithms are normal.
+    """Single-component measures at n sites, with lognormal uncertainty.
 
     Args:
         model: the model that reads them.
@@ -44,23 +44,23 @@ class SiteShaking:
         """Return the shaking of :func:`rbfrag.hazards.maps.site_probability.site_probability`."""
         names = model.term.inputs
         # each measure varies by its own; one without is taken as certain
-        given = {name: std_ln[name] for name in names if name in std_ln}
+        sigmas = {name: std_ln[name] for name in names if name in std_ln}
         nothing = np.zeros(measures[names[0]].size)
         return cls(
             model=model,
             median=np.stack([measures[name] / component.ratio(name) for name in names], axis=-1),
-            deviations=np.stack([given.get(name, nothing) for name in names], axis=-1),
+            deviations=np.stack([sigmas.get(name, nothing) for name in names], axis=-1),
             scatter=component.sigma,
-            integrated=tuple(given),
+            integrated=tuple(sigmas),
         )
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The measures."""
+        """Names of the measures."""
         return self.model.term.inputs
 
-    def given(self, site: NDArray[np.intp]) -> dict[str, FloatArray]:
-        """Return medians by name, and the scatter about them, at some sites."""
+    def inputs_at(self, site: NDArray[np.intp]) -> dict[str, FloatArray]:
+        """Return the medians by name, and their dispersions, at selected sites."""
         return {
             **{name: self.median[site, i] for i, name in enumerate(self.names)},
             **{
@@ -72,7 +72,7 @@ class SiteShaking:
         }
 
     def shaken(self, site: NDArray[np.intp], logs: FloatArray) -> dict[str, FloatArray]:
-        """Return measures by name with residuals of their logarithms, shape (sites, points, k)."""
+        """Return the measures by name for residuals of their logarithms, (sites, points, k)."""
         return {
             name: self.median[site, None, i] * np.exp(logs[:, :, i])
             for i, name in enumerate(self.names)

@@ -1,4 +1,4 @@
-"""Residuals of ground motion that are correlated in space, without a dense matrix."""
+"""Spatially correlated ground-motion residuals, without a dense matrix."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def correlation_range_km(measure: str) -> float:
 
 
 class SpatialField:
-    """Standard normal fields with the correlation exp(-3h/b) at some places.
+    """Standard normal random fields with the correlation exp(-3h/b) at given locations.
 
     The value at a place is drawn given those at the nearest `NEIGHBOURS` of the places that stand
     before it in a random order: the approximation of Vecchia, A. V. (1988), Journal of the Royal
@@ -64,12 +64,12 @@ class SpatialField:
     """
 
     def __init__(self, lon: FloatArray, lat: FloatArray, range_km: float) -> None:
-        places, self._of = np.unique(np.column_stack([lon, lat]), axis=0, return_inverse=True)
+        coordinates, self._of = np.unique(np.column_stack([lon, lat]), axis=0, return_inverse=True)
         # the order belongs to the approximation, not to the draws
-        self._order = np.random.default_rng(0).permutation(len(places))
-        points = on_sphere(*places[self._order].T)
-        self._given = _earlier_neighbours(points)
-        self._weight, self._new = _conditionals(points, self._given, range_km)
+        self._order = np.random.default_rng(0).permutation(len(coordinates))
+        points = on_sphere(*coordinates[self._order].T)
+        self._neighbours = _earlier_neighbours(points)
+        self._weight, self._new = _conditionals(points, self._neighbours, range_km)
 
     def draw(self, count: int, generator: np.random.Generator) -> FloatArray:
         """Return independent fields, shape (n, count)."""
@@ -77,30 +77,30 @@ class SpatialField:
         value *= self._new[:, None]
         for i in range(1, self._order.size):
             k = min(i, NEIGHBOURS)
-            value[i] += self._weight[i, :k] @ value[self._given[i, :k]]
+            value[i] += self._weight[i, :k] @ value[self._neighbours[i, :k]]
         field = np.empty_like(value)
         field[self._order] = value
         return np.asarray(field[self._of])
 
 
 def on_sphere(lon: FloatArray, lat: FloatArray) -> FloatArray:
-    """Return places as points [km], shape (n, 3)."""
+    """Return locations as points on a sphere [km], shape (n, 3)."""
     x, y = np.radians(lon), np.radians(lat)
     around = np.cos(y)
     return EARTH_RADIUS_KM * np.column_stack([around * np.cos(x), around * np.sin(x), np.sin(y)])
 
 
 def _earlier_neighbours(points: FloatArray) -> Indices:
-    """Return the nearest of the points before each, shape (n, NEIGHBOURS).
+    """Return the nearest preceding points of each point, shape (n, NEIGHBOURS).
 
     Of point i only the first min(i, NEIGHBOURS) count.
     """
     from scipy.spatial import KDTree
 
     n = len(points)
-    given = np.zeros((n, NEIGHBOURS), dtype=np.intp)
+    neighbours = np.zeros((n, NEIGHBOURS), dtype=np.intp)
     for i in range(1, min(n, NEIGHBOURS + 1)):
-        given[i, :i] = np.arange(i)
+        neighbours[i, :i] = np.arange(i)
     start = NEIGHBOURS + 1
     while start < n:
         # of the points before a doubled end at least half stand before each of the second half
@@ -111,36 +111,36 @@ def _earlier_neighbours(points: FloatArray) -> Indices:
             before = near < waiting[:, None]
             enough = before.sum(axis=1) >= NEIGHBOURS
             first = np.argsort(~before[enough], axis=1, kind="stable")[:, :NEIGHBOURS]
-            given[waiting[enough]] = np.take_along_axis(near[enough], first, axis=1)
+            neighbours[waiting[enough]] = np.take_along_axis(near[enough], first, axis=1)
             waiting, count = waiting[~enough], 2 * count
         start = end
-    return given
+    return neighbours
 
 
 def _conditionals(
-    points: FloatArray, given: Indices, range_km: float
+    points: FloatArray, neighbours: Indices, range_km: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return weights of the neighbours, and standard deviations of what is new at each point."""
-    weight, new = np.zeros(given.shape), np.ones(len(points))
+    """Return the weights of the neighbours, and the conditional standard deviations."""
+    weight, new = np.zeros(neighbours.shape), np.ones(len(points))
     for rows, k in _alike(len(points)):
-        near = points[given[rows, :k]]
+        near = points[neighbours[rows, :k]]
         between = _correlation(near[:, :, None] - near[:, None, :], range_km)
         between[:, np.arange(k), np.arange(k)] += _NUGGET
         there = _correlation(near - points[rows][:, None], range_km)
         weight[rows, :k] = np.linalg.solve(between, there[:, :, None])[:, :, 0]
-        kept = (weight[rows, :k] * there).sum(axis=1)
-        new[rows] = np.sqrt(np.maximum(1.0 - kept, 0.0))
+        explained = (weight[rows, :k] * there).sum(axis=1)
+        new[rows] = np.sqrt(np.maximum(1.0 - explained, 0.0))
     return weight, new
 
 
 def _correlation(apart: FloatArray, range_km: float) -> FloatArray:
-    """Return exp(-3h/b) of vectors; h is the chord, of 100 km a metre shorter than the arc."""
+    """Return exp(-3h/b) of vectors; the chord h of 100 km is a metre shorter than the arc."""
     h = np.sqrt(np.einsum("...i,...i->...", apart, apart))
     return np.asarray(np.exp(-3.0 / range_km * h))
 
 
 def _alike(n: int) -> Iterator[tuple[Indices, int]]:
-    """Yield groups of points that have as many neighbours, and how many."""
+    """Yield groups of points with the same number of neighbours, and that number."""
     for i in range(1, min(n, NEIGHBOURS)):
         yield np.array([i]), i
     step = _SOLVED_AT_ONCE // NEIGHBOURS**2

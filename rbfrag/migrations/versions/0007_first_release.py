@@ -1,4 +1,4 @@
-"""The schema of the first release, which later migrations follow.
+"""Schema of the first release, the base of later migrations.
 
 A new database is made from :mod:`rbfrag.db.schema`.
 

@@ -1,4 +1,4 @@
-"""The yield acceleration of a combination's block, which fits of scaled records read.
+"""Yield acceleration of a combination's block, used by fits of scaled records.
 
 Revision: 0008
 """
@@ -35,7 +35,7 @@ def upgrade() -> None:
 
 
 def _fill(connection: Connection, combination: Table) -> None:
-    """Calculate the yield of each block that has a shape; of others none is known."""
+    """Compute the yield acceleration of each block with a geometry; others have none."""
     column = combination.c
     query = select(column.kind, column.block).where(column.block.like('%"s1_m"%')).distinct()
     values = [

@@ -1,4 +1,4 @@
-"""The ledger, by which rows that another program deleted or added are found.
+"""Ledger that reveals rows deleted or added by another program.
 
 Revision: 0009
 """

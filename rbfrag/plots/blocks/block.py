@@ -1,4 +1,4 @@
-"""Figure of one block on its planes, with what moves it first, and the lines it consists of."""
+"""Figure of one block on its planes with the resultant at yield, and the lines of the drawing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CLOSE = 0.05
 
 @dataclass(frozen=True)
 class BlockLines:
-    """A block to scale on its base and back planes, out of the slope to the right.
+    """Lines of a block to scale on its base and back planes; out of the slope is to the right.
 
     All points are (out of the slope, up) from the centroid [m].
 
@@ -47,7 +47,7 @@ class BlockLines:
 
 
 def block_lines(block: Block, stability: Stability) -> BlockLines:
-    """Return what a drawing of the block consists of."""
+    """Return the lines of the drawing of a block."""
     beta = math.radians(stability.beta_deg)
     cosine, sine = math.cos(beta), math.sin(beta)
 

@@ -23,7 +23,7 @@ _SHADE = "#8a8a8a"
 def projected(
     plunge_deg: np.ndarray | float, trend_deg: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where lines stand on the net, east and north of its centre, of radius 1.
+    """Return the positions of lines on the net, east and north of its centre, of radius 1.
 
     Args:
         plunge_deg: plunges, 0 to 90 [deg].
@@ -47,7 +47,7 @@ def great_circle(plane: Plane) -> tuple[np.ndarray, np.ndarray]:
 
 @canvas.in_own_style
 def plot_planes(planes: Mapping[str, Plane], path: canvas.Out) -> canvas.Picture:
-    """Draw planes and their poles, the line of base and back, and what a section refuses.
+    """Draw planes and their poles, the line of base and back, and excluded directions.
 
     Args:
         planes: face, base and, if there is one, back.
@@ -81,7 +81,7 @@ def plot_planes(planes: Mapping[str, Plane], path: canvas.Out) -> canvas.Picture
 
 
 def _draw_net(axes: Axes, face: Plane) -> None:
-    """Draw the rim, and shade the poles of planes whose strike is refused."""
+    """Draw the rim, and shade the poles of planes whose strike is rejected."""
     from matplotlib.patches import Wedge
 
     east = 90.0 - face.direction_deg

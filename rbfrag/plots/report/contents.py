@@ -1,4 +1,4 @@
-"""What a report says: sentences, tables of what was asked and answered, and what stands behind."""
+"""Contents of a report: headlines, tables of inputs and answers, and versions."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
 from rbfrag.vocabulary.quantities import (
     BLOCK,
+    COMMON,
     INTENSITY,
     QUANTITIES,
     REQUEST,
     SHAKING,
-    WHOLE,
     word_of,
 )
 
@@ -57,7 +57,7 @@ Table = tuple[str, Rows]
 
 @dataclass(frozen=True)
 class RateQuestion:
-    """How often a year a block is asked to fail.
+    """Hazard curve and period for the annual rate of failure.
 
     Args:
         curve: the hazard curve or its file, or several of one logic tree; None where the question
@@ -111,7 +111,7 @@ class Contents(Result):
 
     @property
     def is_unstable(self) -> bool:
-        """Whether the block fails without an earthquake."""
+        """True if the block fails without an earthquake."""
         return self.prediction.probability == 1.0 and self.prediction.how == BY_MECHANICS
 
     def sentences(self) -> Iterator[str]:
@@ -133,15 +133,15 @@ class Contents(Result):
 
 
 def contents_of(
-    given: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[RangeFields]
+    request: Mapping[str, Any], rate: RateQuestion | None = None, **answering: Unpack[RangeFields]
 ) -> Contents:
     """Answer a question about one block.
 
     Raises:
         InputError: a question that cannot be answered.
     """
-    options = {name: given[name] for name in ("kind", *REQUEST) if name in given}
-    inputs = {name: value for name, value in given.items() if name not in options}
+    options = {name: request[name] for name in ("kind", *REQUEST) if name in request}
+    inputs = {name: value for name, value in request.items() if name not in options}
     how: dict[str, Any] = {**options, **answering}
     prediction = answer_block(inputs, **how)
     read = prediction.inputs
@@ -167,10 +167,10 @@ def contents_of(
         hazard=annual,
         sections=(
             ("Block", _block_rows(shape, facts, numbers, model, prediction.y_m_s)),
-            ("Shaking", shaking_rows({n: v for n, v in given.items() if n in OF_REQUEST})),
+            ("Shaking", shaking_rows({n: v for n, v in request.items() if n in OF_REQUEST})),
         ),
         versions=tuple(_versions(model, annual, prediction.data)),
-        drawing=_drawing(shape, numbers, free=facts.free_standing),
+        drawing=_drawing(shape, numbers, is_free_standing=facts.free_standing),
         numbers=numbers,
         measures=measures,
         model=model,
@@ -179,23 +179,23 @@ def contents_of(
     )
 
 
-OF_BLOCK = frozenset((*BLOCK, *WHOLE))
+OF_BLOCK = frozenset((*BLOCK, *COMMON))
 OF_REQUEST = (*SHAKING, "component", "mechanism", "gmm")
 """Fields of the shaking that a report prints as they were given."""
 
 
-def shaking_rows(given: Mapping[str, Any]) -> Rows:
-    """Return the shaking that was asked about, as names and values."""
+def shaking_rows(shaking: Mapping[str, Any]) -> Rows:
+    """Return the shaking inputs as names and values."""
     return tuple(
         describe.labelled_value(name, value, 6) if isinstance(value, int | float)
         else (word_of(name).replace("_", " "), str(value))
-        for name, value in given.items()
+        for name, value in shaking.items()
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ReportedBlock:
-    """One block of a report, or several identical ones: its answer, or why there is none."""
+    """One block of a report, or several identical ones: the answer, or why there is none."""
 
     name: str
     contents: Contents | None
@@ -204,7 +204,7 @@ class ReportedBlock:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Its row of the summary; of one that is not answered its name."""
+        """Cells of the block in the summary; only the name without an answer."""
         name = self.name if self.count == 1 else f"{self.name} ({self.count} blocks)"
         if self.contents is None:
             return (name,)
@@ -226,7 +226,7 @@ COLUMNS = ("block", "failure mode", "P", "interval", "return period")
 
 
 class Report(NamedTuple):
-    """What a report is of.
+    """The contents of a report.
 
     Args:
         entries: the blocks, those that are unstable without shaking first.
@@ -274,7 +274,7 @@ def report_of(
     warnings: Sequence[str] = (),
     **answering: Unpack[RangeFields],
 ) -> Report:
-    """Answer a question about each of several blocks; one alone must be answered.
+    """Answer a question about each of several blocks; a single block must have an answer.
 
     Args:
         rows: fields of block and shaking, with ``block_id``, ``count``, and ``reason`` of what is
@@ -288,7 +288,7 @@ def report_of(
     entries, errors = [], []
     for i, row in enumerate(rows, start=1):
         count = row.get("count", 1.0)
-        given = {n: v for n, v in row.items() if n not in ("block_id", "site_id", "mode", "crs",
+        request = {n: v for n, v in row.items() if n not in ("block_id", "site_id", "mode", "crs",
                                                            "count", "reason")}  # fmt: skip
         name = str(row.get("block_id", i))
         try:
@@ -296,7 +296,7 @@ def report_of(
                 raise InputError(row["reason"])
             if count != int(count) or count < 1:
                 raise InputError(f"count = {count:g}: give a whole number of blocks, 1 or more")
-            contents = contents_of(given, rate, **answering)
+            contents = contents_of(request, rate, **answering)
             entries.append(ReportedBlock(name, contents, count=int(count)))
         except InputError as error:
             errors.append(error)
@@ -319,7 +319,7 @@ def _totals(
     rate: RateQuestion,
     answering: RangeFields,
 ) -> tuple[Rows, dict[str, Any], tuple[str, ...]]:
-    """Return what holds for all blocks of a report, its numbers, and what to know about them."""
+    """Return the summary of all blocks of a report, its numbers, and the warnings."""
     answered = [(e.contents, e.count) for e in entries if e.contents is not None]
     unstable = sum(count for contents, count in answered if contents.is_unstable)
     standing = [pair for pair in answered if not pair[0].is_unstable]
@@ -406,10 +406,10 @@ def _annual_rate(
 def _held(
     model: FragilityModel, numbers: Mapping[str, float], measures: Mapping[str, float]
 ) -> HeldMeasures | None:
-    """Return what the design chart holds; None for a model that has none."""
-    others = {name: v for name, v in numbers.items() if not name.endswith("_sigma")}
+    """Return the variables held constant in the design chart; None for a model without a chart."""
+    block_inputs = {name: v for name, v in numbers.items() if not name.endswith("_sigma")}
     if model.term.name not in (*ONE_NUMBER_TERMS, *MORE_TERMS) or not all(
-        others.pop(name, 0.0) for name in TOPPLING_BLOCK.names
+        block_inputs.pop(name, 0.0) for name in TOPPLING_BLOCK.names
     ):
         return None
     read = {
@@ -417,11 +417,13 @@ def _held(
         for name in ("pga_g", "tm_s")
         if name in model.term.inputs and model.term.name in MORE_TERMS
     }
-    return replace(held_measures(model, p2=numbers["p2"], **read), others=others)
+    return replace(held_measures(model, p2=numbers["p2"], **read), block_inputs=block_inputs)
 
 
-def _drawing(shape: Shape | None, numbers: Mapping[str, float], *, free: bool) -> Drawing | None:
-    """Return the block to draw; None where its shape is not known."""
+def _drawing(
+    shape: Shape | None, numbers: Mapping[str, float], *, is_free_standing: bool
+) -> Drawing | None:
+    """Return the block to draw; None where its shape is unknown."""
     if shape is not None:
         block, planes, title = shape.block, shape.rough(), "The block to scale"
     elif {*TOPPLING_BLOCK.names} <= {*numbers}:
@@ -431,7 +433,7 @@ def _drawing(shape: Shape | None, numbers: Mapping[str, float], *, free: bool) -
         title = "The rectangle of this p² and k_r on a level base"
     else:
         return None
-    if free:
+    if is_free_standing:
         planes["back_fracture"] = False
     return Drawing(block, stability(block, **planes), title)
 

@@ -1,4 +1,4 @@
-"""The pictures of a report, each drawn into a figure or a part of one."""
+"""Figures of a report, each drawn into a figure or a part of one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Panel(NamedTuple):
-    """One picture."""
+    """One figure of a report."""
 
     name: str
     title: str
@@ -26,7 +26,7 @@ class Panel(NamedTuple):
 
 
 def panels_of(contents: Contents) -> list[Panel]:
-    """Return the pictures of a report, in their order."""
+    """Return the figures of a report, in order."""
     panels = []
     if (drawing := contents.drawing) is not None:
         panels.append(Panel("block", drawing.title, lambda part: _block(part, drawing)))
@@ -66,11 +66,11 @@ def _chart(part: FigureBase, contents: Contents) -> None:
 
 
 def _curve(part: FigureBase, contents: Contents) -> None:
-    first, *others = contents.model.term.inputs
+    first, *other_names = contents.model.term.inputs
     axes = part.subplots()
     draw_curve(
         axes, contents.model, contents.numbers, first,
-        {name: contents.measures[name] for name in others}, level=contents.prediction.level,
+        {name: contents.measures[name] for name in other_names}, level=contents.prediction.level,
         at=contents.measures[first], sites=contents.prediction.sites,
     )  # fmt: skip
     part.legend(loc="outside lower center", fontsize=7, frameon=False)

@@ -1,4 +1,4 @@
-"""A report as one page of A4."""
+"""Reports on A4 pages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 _WIDTH_IN, _HEIGHT_IN = 8.27, 11.69
-_LEFT, _RIGHT = 0.085, 0.915
+_LEFT_EDGE, _RIGHT_EDGE = 0.085, 0.915
 """Edges of what is written, of the width of the sheet."""
 
 _MARGIN = 0.11
@@ -48,7 +48,7 @@ _NOTE_SIZE, _NOTE_STEP_IN = 8.0, 0.15
 
 _TITLE_STEP_IN = 0.27
 
-_LINES, _SUMMARY, _VALUE = 66, (_LEFT, 0.31, 0.54, 0.67, 0.82), 0.46
+_LINES, _SUMMARY, _VALUE = 66, (_LEFT_EDGE, 0.31, 0.54, 0.67, 0.82), 0.46
 """Lines of a page of the summary, where the columns of its table begin, and values of its head."""
 
 _BELOW = {"r": "\N{LATIN SUBSCRIPT SMALL LETTER R}", "s": "\N{LATIN SUBSCRIPT SMALL LETTER S}"}
@@ -59,7 +59,7 @@ _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 
 @in_own_style
 def write_sheet(report: Report, title: str, date: str, target: Path) -> None:
-    """Write a report as pages of A4, PDF, or of one block PNG, by the suffix of the file."""
+    """Write a report as A4 pages: PDF, or PNG for one block, by the suffix of the file."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 
@@ -78,7 +78,7 @@ def write_sheet(report: Report, title: str, date: str, target: Path) -> None:
 
 
 def _pages(report: Report, title: str, date: str) -> Iterator[Figure]:
-    """Yield the pages: one of a single block; or the summary, and half a page for each block."""
+    """Yield the pages: one for a single block; or the summary, and half a page for each block."""
     answered = [(e.name, e.contents) for e in report.entries if e.contents is not None]
     lines = _summary_lines(report)
     draws: list[Callable[[Figure], None]] = [
@@ -106,7 +106,8 @@ def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
     heading: dict[str, Any] = {"fontsize": 8.2, "fontweight": "bold", "color": BLUE}
     normal: dict[str, Any] = {"fontsize": 8.2}
     lines: list[tuple[Line, dict[str, Any]]] = [
-        (((_LEFT, name), (_VALUE, _cut(value, _NARROW))), normal) for name, value in report.summary
+        (((_LEFT_EDGE, name), (_VALUE, _cut(value, _NARROW))), normal)
+        for name, value in report.summary
     ]
     lines += [((), normal), (tuple(zip(_SUMMARY, COLUMNS, strict=True)), heading)]
     for entry in report.entries:
@@ -117,11 +118,11 @@ def _summary_lines(report: Report) -> list[tuple[Line, dict[str, Any]]]:
         lines += [(((_SUMMARY[1], text),), normal) for text in reasons[1:]]
     notes = labelled(report.notes)
     if notes:
-        lines += [((), normal), (((_LEFT, "Warnings and notes"),), heading)]
-        lines += [(((_LEFT, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
+        lines += [((), normal), (((_LEFT_EDGE, "Warnings and notes"),), heading)]
+        lines += [(((_LEFT_EDGE, text),), {"fontsize": _NOTE_SIZE}) for text in _note_lines(notes)]
     versions = dict.fromkeys(v for e in report.entries if e.contents for v in e.contents.versions)
     lines += [((), normal)]
-    lines += [(((_LEFT, text),), {"fontsize": 6.8}) for text in _wrapped_all(versions)]
+    lines += [(((_LEFT_EDGE, text),), {"fontsize": 6.8}) for text in _wrapped_all(versions)]
     return lines
 
 
@@ -129,8 +130,8 @@ def _list(
     figure: Figure, lines: Sequence[tuple[Line, dict[str, Any]]], title: str, date: str
 ) -> None:
     (part,) = figure.subfigures(1, 1, squeeze=False)[0]
-    _write(part, _LEFT, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
-    _write(part, _RIGHT, 0.964, date, fontsize=9, ha="right")
+    _write(part, _LEFT_EDGE, 0.964, _cut(title, _TITLE), fontsize=15, fontweight="bold", color=BLUE)
+    _write(part, _RIGHT_EDGE, 0.964, date, fontsize=9, ha="right")
     for i, (texts, style) in enumerate(lines):
         for x, text in texts:
             _write(part, x, 0.93 - i * _STEP_IN / _HEIGHT_IN, text, **style)
@@ -145,8 +146,8 @@ def _draw_halves(figure: Figure, report: Report, entries: Sequence[tuple[str, Co
         heights = [head_in, 0.5 * _HEIGHT_IN - head_in - foot_in, foot_in]
         head, body, foot = half.subfigures(3, 1, height_ratios=heights)
         _write_head(head, contents, [_cut(name, _TITLE)], "", head_in)
-        left, *cells, _ = body.subfigures(1, 4, width_ratios=[3.9, 2.1, 2.1, 0.17])
-        _write_table(left, 0.18, 0.46, contents.sections, heights[1])
+        table_part, *cells, _ = body.subfigures(1, 4, width_ratios=[3.9, 2.1, 2.1, 0.17])
+        _write_table(table_part, 0.18, 0.46, contents.sections, heights[1])
         for cell, panel in zip(cells, panels_of(contents), strict=False):
             panel.draw(cell)
             for axes in cell.axes:
@@ -171,7 +172,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     _write_head(parts[0], contents, titles, date, head_in)
-    for x, wide, table in zip((_LEFT, 0.54), (0.235, 0.235), contents.sections, strict=True):
+    for x, wide, table in zip((_LEFT_EDGE, 0.54), (0.235, 0.235), contents.sections, strict=True):
         _write_table(parts[1], x, wide, [table], tables_in)
     for part, row in zip(parts[2:-1], rows, strict=True):
         # one picture alone is as wide as two
@@ -204,12 +205,12 @@ def _wrapped_all(texts: Iterable[str]) -> list[str]:
 
 
 def _shown(text: str) -> str:
-    """Return a text with the index of k_r where it belongs."""
+    """Return a text with the subscript of k_r set as such."""
     return SYMBOL.sub(lambda match: match[1] + _BELOW.get(match[2], f"_{match[2]}"), text)
 
 
 def _write(part: SubFigure, x: float, y: float, text: str, **style: Any) -> None:
-    """Write letters as they are, dollars too."""
+    """Write a text literally, including dollar signs."""
     part.text(x, y, _shown(text), va="center", parse_math=False, **style)
 
 
@@ -217,14 +218,14 @@ def _write_head(
     part: SubFigure, contents: Contents, titles: Sequence[str], date: str, tall_in: float
 ) -> None:
     y = 1.0 - 0.42 / tall_in
-    _write(part, _RIGHT, y, date, fontsize=9, ha="right")
+    _write(part, _RIGHT_EDGE, y, date, fontsize=9, ha="right")
     for line in titles:
-        _write(part, _LEFT, y, line, fontsize=15, fontweight="bold", color=BLUE)
+        _write(part, _LEFT_EDGE, y, line, fontsize=15, fontweight="bold", color=BLUE)
         y -= _TITLE_STEP_IN / tall_in
     y -= (0.33 - _TITLE_STEP_IN) / tall_in
     for line, is_first in _head_lines(contents):
         size, weight = (11, "bold") if is_first else (9, "normal")
-        _write(part, _LEFT, y, line, fontsize=size, fontweight=weight)
+        _write(part, _LEFT_EDGE, y, line, fontsize=size, fontweight=weight)
         y -= (0.2 if is_first else 0.165) / tall_in
 
 
@@ -235,7 +236,7 @@ def _cut(text: str, letters: int) -> str:
 def _write_table(
     part: SubFigure, x: float, wide: float, tables: Sequence[Table], tall_in: float
 ) -> None:
-    """Write tables below each other from x on, their values behind names so wide."""
+    """Write tables below each other from x on, with a given width of the names."""
     step = _STEP_IN / tall_in
     y = 1.0 - 0.5 * step
     for heading, rows in tables:
@@ -254,19 +255,19 @@ def _note_lines(sentences: Iterable[str]) -> list[str]:
 def _write_notes(
     part: SubFigure, lines: Sequence[str], tall_in: float, above_in: float = 0.2
 ) -> None:
-    """Write the notes under their heading, the last so far above the foot of a part."""
+    """Write the notes under their heading, with the last one a given distance above the foot."""
     if not lines:
         return
     y = (above_in + _NOTE_STEP_IN * len(lines)) / tall_in
-    _write(part, _LEFT, y, "Warnings and notes", fontsize=9, fontweight="bold", color=BLUE)
+    _write(part, _LEFT_EDGE, y, "Warnings and notes", fontsize=9, fontweight="bold", color=BLUE)
     for line in lines:
         y -= _NOTE_STEP_IN / tall_in
-        _write(part, _LEFT, y, line, fontsize=_NOTE_SIZE)
+        _write(part, _LEFT_EDGE, y, line, fontsize=_NOTE_SIZE)
 
 
 def _write_lines(part: SubFigure, lines: Sequence[str], tall_in: float) -> None:
     """Write small lines at the foot of a part."""
     y = 0.25 / tall_in + 0.13 * (len(lines) - 1) / tall_in
     for line in lines:
-        _write(part, _LEFT, y, line, fontsize=6.8, color="#333333")
+        _write(part, _LEFT_EDGE, y, line, fontsize=6.8, color="#333333")
         y -= 0.13 / tall_in

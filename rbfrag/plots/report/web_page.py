@@ -1,4 +1,4 @@
-"""A report as one file of HTML with its pictures in it."""
+"""Reports as one HTML file with embedded figures."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ sub { font-size: 75%; line-height: 0; }
 
 @in_own_style
 def write_html(report: Report, title: str, date: str, target: Path) -> None:
-    """Write a report as a page that needs nothing but itself: the summary, and each block."""
+    """Write a report as a self-contained page: the summary, and each block."""
     entries = report.entries
     several = len(entries) > 1
     answered = [(e.name, e.contents) for e in entries if e.contents is not None]
@@ -78,7 +78,7 @@ def write_html(report: Report, title: str, date: str, target: Path) -> None:
 
 
 def _summary(entries: Sequence[ReportedBlock]) -> str:
-    """Return a table of all blocks; a reason takes the cells of an answer."""
+    """Return a table of all blocks; rows without an answer show the reason."""
     rows = [f"<tr>{''.join(f'<th><b>{name}</b></th>' for name in COLUMNS)}</tr>"]
     for entry in entries:
         texts = "".join(f"<td>{_written(cell)}</td>" for cell in entry.cells)
@@ -89,7 +89,7 @@ def _summary(entries: Sequence[ReportedBlock]) -> str:
 
 
 def _block(contents: Contents, notes: Sequence[str], name: str, prefix: str) -> str:
-    """Return what is said of a block; of several each has two pictures, and names of its own."""
+    """Return the section of a block; with several blocks, each has unique element names."""
     first, *further = contents.sentences()
     figures = (_figure(panel._replace(name=prefix + panel.name)) for panel in panels_of(contents))
     return "\n".join([
@@ -103,13 +103,13 @@ def _block(contents: Contents, notes: Sequence[str], name: str, prefix: str) -> 
 
 
 def _notes(sentences: Sequence[str]) -> str:
-    """Return the warnings in a box; nothing where there are none."""
+    """Return the warnings in a box; empty where there are none."""
     items = "".join(f"<li>{_written(text)}</li>" for text in sentences)
     return f'<div class="notes"><h2>Warnings and notes</h2><ul>{items}</ul></div>' if items else ""
 
 
 def _written(text: str) -> str:
-    """Return a text for the page: the index of k_r where it belongs, no percent sign alone."""
+    """Return a text for the page: the subscript of k_r set as such, no isolated percent sign."""
     return SYMBOL.sub(r"\1<sub>\2</sub>", escape(text)).replace(" %", "&nbsp;%")
 
 
@@ -131,7 +131,7 @@ def _figure(panel: Panel) -> str:
 
 
 def _svg(panel: Panel) -> str:
-    """Return a picture as an element of the page; names inside it are its own."""
+    """Return a figure as an element of the page, with unique names inside it."""
     from matplotlib import rc_context
 
     with rc_context({"svg.hashsalt": panel.name, "font.size": 9}):

@@ -1,4 +1,4 @@
-"""`report`: a question about one block and its answer as a page to attach."""
+"""`report`: a question about one block and its answer as a page."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class _Spectrum(TypedDict, total=False):
 
 
 class _Scenario(ShakingFields[float | None], SourceFields, RangeFields, total=False):
-    """The shaking, or the scenario that it follows from, and which model answers."""
+    """Keywords of the shaking or of a scenario, and of the model."""
 
     rotation_deg: float | None
 
 
 class ReportKeywords(BlockKeywords[float | None], _Scenario, _Spectrum, CurveKeywords, total=False):
-    """What a report is of: a block, its shaking, the curve of a rate, and which model answers."""
+    """Keywords of a report: block, shaking, hazard curve and model."""
 
 
 def report(
@@ -52,7 +52,7 @@ def report(
     date: str = "",
     **question: Unpack[ReportKeywords],
 ) -> Path:
-    """Write one page about one block: sentence, drawing, inputs, chart, curve, rate, versions.
+    """Write one page about one block: headline, drawing, inputs, chart, curve, rate, versions.
 
     The same question gives the same file, byte for byte, with the same versions of rbfrag and
     matplotlib.
@@ -84,11 +84,11 @@ def report(
         ("sa_g",),
         CurveKeywords.__optional_keys__,
     )
-    given = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
+    request = {**block, **shaking, **spectral(spectrum.get("sa_g") or {})}
     if (component := meaning.get("component")) is not None:
-        given["component"] = component
+        request["component"] = component
     rate = RateQuestion(curve, years, meaning, weights)
-    write_report(out, [given], rate, title=title, date=date)
+    write_report(out, [request], rate, title=title, date=date)
     return Path(out)
 
 
@@ -102,7 +102,7 @@ def write_report(
     warnings: Sequence[str] = (),
     **answering: Unpack[RangeFields],
 ) -> Report:
-    """Write the report of blocks, each a row of its fields, and return what it is of.
+    """Write the report of blocks, each given by a row of fields, and return its contents.
 
     Args:
         warnings: what to know about the table of the blocks.

@@ -110,7 +110,7 @@ def test_intervals_are_wider_where_earthquakes_differ() -> None:
     shift = rng.normal(size=40)[np.arange(2000) % 40][:, None]
     real = 1.0 / (1.0 + np.exp(-(np.log(p / (1.0 - p)) + shift)))
     toppled = (rng.uniform(size=p.shape) < real).astype(float)
-    apart = calibration_bins(ScoredBlocks(toppled, seen.known, seen.event, ""), p)
+    apart = calibration_bins(ScoredBlocks(toppled, seen.is_known, seen.event, ""), p)
     middle = slice(4, 9)
     assert ((apart.high - apart.low) > 2.0 * (same.high - same.low))[middle].all()
     assert calibration_bins(seen, p).low == pytest.approx(same.low)
